@@ -149,7 +149,7 @@ contains
          if (size(stated_microphone) > 0) microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
       end associate
       call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), ball, microphone, &
-         request%get_number('pressure') > 0.0_wp, room)
+         request%get_number('pressure') > 0.0_wp, room, get_highest(request, box))
       call bundle%add_array('sides', [3], box%sides)
       call bundle%add_array('ball', shape(ball), ball)
       call bundle%add_array('microphone', shape(microphone), microphone)
@@ -165,6 +165,16 @@ contains
       call bundle%add_number('sample_rate', room%sample_rate)
       if (allocated(room%pressure)) call bundle%add_array('pressure', shape(room%pressure), room%pressure)
    end subroutine answer_modal_room
+
+   !> Highest mid frequency, Hz, of the modal bands of a request: `highest`, or the crossover.
+   function get_highest(request, box) result(frequency)
+      type(request_type), intent(in) :: request
+      type(box_type), intent(in) :: box
+      real(wp) :: frequency
+
+      frequency = request%get_number('highest')
+      if (.not. request%has('highest')) frequency = get_crossover(box)
+   end function get_highest
 
    !> Natural frequencies, Hz, and loss factors of the modes of a case's floor up to `highest`, Hz, and the shapes of its
    !> radiating plate at the points `x`, `y`, m, 1/sqrt(kg).

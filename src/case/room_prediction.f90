@@ -190,19 +190,19 @@ contains
             octave = min(2 + (i - 1)/3, octave_count)
             changed%level(i) = prediction%level(i) + (limits%upper_level(octave) - limits%lower_level(octave))/2
          end do
-         source = (get_weighted(changed%level) - prediction%a_weighted)*[-1, 1]
+         source = (get_weighted(changed%level) - get_weighted(prediction%level))*[-1, 1]
          edges = [(get_weighted(prediction%edge_level(:, i)) - modal, i=1, 2)]
          edges = [min(minval(edges), 0.0_wp), max(maxval(edges), 0.0_wp)]
          do i = 1, 2
             room = case%room
             room%reverberation_time%values = room%reverberation_time%values*time_ratio**(2*i - 3)
             call get_room_level(plate, conductance, radiation_factor, room, prediction%bands, level, changed)
-            time(i) = changed%a_weighted - prediction%a_weighted
+            time(i) = get_weighted(changed%level) - get_weighted(prediction%level)
          end do
          positions = coverage*get_weighted_spread(prediction)*[-1, 1]
-         model = abs(modal - prediction%a_weighted)/2*[-1, 1]
+         model = abs(modal - get_weighted(prediction%level))/2*[-1, 1]
       end associate
-      prediction%rated = (modal + prediction%a_weighted)/2
+      prediction%rated = (modal + get_weighted(prediction%level))/2
       ! The contributions are independent of each other.
       prediction%interval = prediction%rated + [-1, 1]*norm2(prediction%contribution, dim=2)
    end subroutine add_contributions

@@ -15,10 +15,6 @@ module thud_joist_floor
 
    public :: joist_floor_type
 
-   !> Static compliance of sheathing over many rigid joists, midway between two of them, multiplied by B'/spacing**2. One
-   !> span alone has 0.01696 (Timoshenko and Woinowsky-Krieger), three spans 0.01130, five 0.01108, seven 0.01107.
-   real(wp), parameter :: local_compliance = 0.01107_wp
-
    !> Ratio of the shear modulus of softwood to its modulus of elasticity (EN 338).
    real(wp), parameter :: shear_ratio = 1.0_wp/16
 
@@ -218,42 +214,7 @@ contains
       reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
    end subroutine get_validity
 
-   !> Frequency at which half a bending wavelength in the sheathing equals the distance between joists, Hz.
-   pure function get_smeared_limit(options) result(frequency)
-      class(joist_floor_type), intent(in) :: options
-      real(wp) :: frequency
-
-      frequency = pi/(2*options%spacing**2) &
-         *sqrt(get_sheathing_stiffness(options)/(options%sheathing_density*options%sheathing_thickness))
-   end function get_smeared_limit
-
-   !> Resistance of the infinite sheathing without joists, N s/m.
-   pure function get_sheathing_resistance(options) result(resistance)
-      class(joist_floor_type), intent(in) :: options
-      real(wp) :: resistance
-
-      resistance = 8*sqrt(get_sheathing_stiffness(options)*options%sheathing_density*options%sheathing_thickness)
-   end function get_sheathing_resistance
-
-   !> Static compliance of the sheathing between two joists, m/N.
-   pure function get_local_compliance(options) result(compliance)
-      class(joist_floor_type), intent(in) :: options
-      real(wp) :: compliance
-
-      compliance = local_compliance*options%spacing**2/get_sheathing_stiffness(options)
-   end function get_local_compliance
-
-   !> Corner frequency above which the sheathing acts as an infinite plate, 0.8 times the limit of the smeared plate.
-   pure function get_local_corner(options) result(corner)
-      class(joist_floor_type), intent(in) :: options
-      !> The corner frequency, rad/s.
-      real(wp) :: corner
-
-      corner = 1/(get_sheathing_resistance(options)*sqrt(2.0_wp)*get_local_compliance(options))
-   end function get_local_corner
-
-   !> The smeared plate. Its conductance is that of the infinite plate, plus that of the sheathing if the source is between
-   !> two joists.
+   !> The smeared plate, and its conductance if it were infinite.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)
@@ -263,8 +224,6 @@ contains
 
       plate = get_smeared(options)
       conductance = 1/get_resistance(plate)
-      if (options%source_on == 'sheathing') conductance = conductance + 1/(get_sheathing_resistance(options) &
-         *(1 + (get_local_corner(options)/(2*pi*frequency))**4))
    end subroutine get_radiator
 
    !> No homogeneous plate represents the floor.

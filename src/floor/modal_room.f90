@@ -19,11 +19,12 @@ module thud_modal_room
    !> Number of overlapping modes of the room above which the sound is statistical.
    real(wp), parameter :: overlap_limit = 3.0_wp
 
-   !> Frequency of the highest modes of the room over the upper edge of the highest band: its filter attenuates them by 40 dB.
-   real(wp), parameter :: room_ratio = 1.5_wp
+   !> Frequency of the highest modes of the room over the upper edge of the highest band: at a quiet position, modes above
+   !> the band add up to 0.5 dB.
+   real(wp), parameter :: room_ratio = 2.0_wp
 
    !> Frequency of the highest modes of the floor over that of the room: higher ones answer with their compliance.
-   real(wp), parameter :: floor_ratio = 3.0_wp
+   real(wp), parameter :: floor_ratio = 2.0_wp
 
    !> Samples per second over the frequency of the highest modes.
    real(wp), parameter :: sample_ratio = 2.56_wp
@@ -105,7 +106,7 @@ contains
    end subroutine get_standard_positions
 
    !> Levels at positions for a force on the floor.
-   subroutine get_modal_room(modes, box, force, sample_rate, ball, microphone, with_pressure, room)
+   subroutine get_modal_room(modes, box, force, sample_rate, ball, microphone, with_pressure, room, max_frequency)
       type(floor_modes_type), intent(in) :: modes
       type(box_type), intent(in) :: box
       !> Force on the floor, N: [n_force], and samples per second, Hz.
@@ -115,6 +116,8 @@ contains
       !> Also return the sound pressure.
       logical, intent(in) :: with_pressure
       type(modal_room_type), intent(out) :: room
+      !> Highest mid frequency of a band, Hz (default: the crossover).
+      real(wp), intent(in), optional :: max_frequency
       real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), signal(:), frequency(:), shape_x(:, :)
       real(wp), allocatable :: shape_y(:, :)
       complex(wp), allocatable :: spectrum(:), velocity(:, :), flow(:, :), answer(:, :, :), sound(:, :)
@@ -124,6 +127,7 @@ contains
       integer :: i, j, n_sample, n_line, n_pair
 
       room%n_band = count(box%bands%center <= get_crossover(box))
+      if (present(max_frequency)) room%n_band = count(box%bands%center <= max_frequency)
       do
          if (room%n_band == 0) exit
          highest = room_ratio*box%bands(room%n_band)%upper

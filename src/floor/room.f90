@@ -9,9 +9,11 @@ module thud_room
    use thud_field, only: field_type, list_type, name_length
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
    use thud_kinds, only: wp
+   use thud_lapack, only: dgetf2, dgetrs
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
-   use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level
+   use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level, get_rounded, get_standardization, &
+      rating_names
    use thud_response_spread, only: get_band_variance, get_level_spread
    use thud_text, only: to_text
    use thud_transient_energy, only: get_fast_history, get_fast_maximum
@@ -19,7 +21,8 @@ module thud_room
    private
 
    public :: check_below, check_room, few_modes, get_completed_room, get_reverberation_times, get_room_bands
-   public :: get_room_fields, get_room_level, modal_radiation, room_level_type, room_type, standard_positions
+   public :: get_room_fields, get_room_level, meets_requirement, modal_radiation, room_level_type, room_type
+   public :: standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
@@ -82,6 +85,10 @@ module thud_room
       character(len=name_length) :: radiation = modal_radiation
       !> Positions of ball and microphone: `standard` or `even` ones.
       character(len=name_length) :: positions = standard_positions
+      !> Maximum rating that is required, dB; 0: none.
+      real(wp) :: required = 0.0_wp
+      !> The rating that it refers to, one of `rating_names`.
+      character(len=name_length) :: required_rating = rating_names(1)
    end type room_type
 
    !> A prediction in one-third-octave bands.
@@ -104,10 +111,13 @@ module thud_room
       real(wp), allocatable :: floor_modes(:), room_modes(:)
       !> Maximum Fast level in the room, dB re 20 uPa, and its time after the impact, s: [n_band].
       real(wp), allocatable :: level(:), time(:)
+      !> Fractions of the energy that enters the room, over all times: from the floor, directly or through a ceiling, and
+      !> from each flanking wall: [n_band, 1 + n_wall].
+      real(wp), allocatable :: path_share(:, :)
       !> Expected standard deviation of that level for one source and one microphone position, dB: [n_band].
       real(wp), allocatable :: spread(:)
-      !> A-weighted maximum level, dB (ISO 717-2 annex D).
-      real(wp) :: a_weighted = 0.0_wp
+      !> Ratings in the order of `rating_names`, not rounded, dB.
+      real(wp) :: rating(size(rating_names)) = 0.0_wp
       !> Octave bands, their levels and times, as above: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:), octave_time(:)
@@ -133,6 +143,8 @@ module thud_room
       real(wp), allocatable :: loss_matrix(:, :)
       !> Initial energies, J, and squared sound pressure per energy, Pa2/J: [n].
       real(wp), allocatable :: initial_energy(:), weight(:)
+      !> Rates at which energy flows from them into the room, 1/s; those of the floor, the walls and then others: [n].
+      real(wp), allocatable :: into_room(:)
    end type band_energies_type
 
 contains
@@ -141,7 +153,7 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [19].
+      !> One field per component: [21].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -166,7 +178,10 @@ contains
          [character(len=9) :: modal_radiation, 'iso_12354']), &
          choice_field('positions', room%positions, &
          'positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each', &
-         [character(len=8) :: standard_positions, 'even'])]
+         [character(len=8) :: standard_positions, 'even']), &
+         real_field('required', room%required, 'dB', 'maximum rating that is required; 0: none', '[0, 200]'), &
+         choice_field('required_rating', room%required_rating, 'rating that required refers to: of octaves (KS F ' &
+         //'2863-2), thirds (ISO 717-2) or standardized thirds', rating_names)]
    end function get_room_fields
 
    !> Checks the number of reverberation times.
@@ -215,8 +230,8 @@ contains
       product = completed%length*completed%width*completed%height
       if (abs(product - completed%volume) > volume_tolerance*completed%volume) then
          error = input_error('&room: length, width and height, '//to_text(completed%length)//' x ' &
-            //to_text(completed%width)//' x '//to_text(completed%height)//' m (a length or width that is not stated is that ' &
-            //'of the floor), contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
+            //to_text(completed%width)//' x '//to_text(completed%height)//' m (not stated: those of the floor), ' &
+            //'contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
             //to_text(product)//' m3, or without volume or height')
       else if (completed%volume < min_volume) then
          error = input_error('&room: the volume is '//to_text(completed%volume)//' m3; allowed: at least ' &
@@ -276,21 +291,35 @@ contains
       prediction%floor_modes = get_mode_density(plate)*width
       prediction%room_modes = get_room_mode_density(room, bands%center)*width
       allocate (prediction%level(size(bands)), prediction%time(size(bands)), prediction%spread(size(bands)))
+      allocate (prediction%path_share(size(bands), 1 + room%walls%lengths%count))
       floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
          energies(i) = get_band_energies(plate, room, prediction, i)
          call get_fast_maximum(energies(i)%loss_matrix, energies(i)%initial_energy, energies(i)%weight, maximum(i), &
             prediction%time(i))
+         prediction%path_share(i, :) = get_path_shares(energies(i), size(prediction%path_share, 2))
          prediction%spread(i) = get_level_spread([ &
             get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
             get_band_variance(3, get_room_mode_density(room, bands(i)%center), &
             decay_of_60_db/prediction%reverberation_time(i), width(i))])
       end do
       prediction%level = 10*log10(maximum/reference_pressure**2)
-      prediction%a_weighted = get_a_weighted_level(third_set, prediction%level)
       call add_octaves(energies, prediction)
+      prediction%rating = [get_a_weighted_level(octave_set, prediction%octave_level), &
+         get_a_weighted_level(third_set, prediction%level), get_a_weighted_level(third_set, prediction%level &
+         + get_standardization(prediction%reverberation_time, prediction%volume))]
       call add_history(energies, prediction)
    end subroutine get_room_level
+
+   !> Whether a prediction meets the requirement of its room: the rounded rating is at most the required one.
+   pure function meets_requirement(room, prediction) result(met)
+      !> A room with a requirement.
+      type(room_type), intent(in) :: room
+      type(room_level_type), intent(in) :: prediction
+      logical :: met
+
+      met = get_rounded(prediction%rating(findloc(rating_names == room%required_rating, .true., dim=1))) <= room%required
+   end function meets_requirement
 
    !> Levels of the octaves. The detector is linear in the energies, so an octave needs the sum of the energies of its
    !> one-third-octave bands; the maximum of the sum is at most the sum of the maxima.
@@ -399,9 +428,34 @@ contains
          allocate (energies%initial_energy(size(flow%internal_loss)), energies%weight(size(flow%internal_loss)), &
             source=0.0_wp)
          energies%initial_energy(1) = prediction%energy(band)
+         allocate (energies%into_room, source=flow%rate(at_room, :))
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume
       end associate
    end function get_band_energies
+
+   !> Fractions of the energy that enters the room by each path: [n_path].
+   !>
+   !> With dE/dt = -A E the integrals of the energies over time are A**-1 E(0).
+   pure function get_path_shares(energies, n_path) result(share)
+      type(band_energies_type), intent(in) :: energies
+      !> Number of paths: the floor and the walls. What else radiates, a ceiling's cavity, belongs to the floor.
+      integer, intent(in) :: n_path
+      real(wp) :: share(n_path)
+      real(wp) :: matrix(size(energies%initial_energy), size(energies%initial_energy))
+      real(wp) :: integral(size(energies%initial_energy), 1)
+      integer :: pivot(size(energies%initial_energy))
+      integer :: n, info
+
+      n = size(energies%initial_energy)
+      matrix = energies%loss_matrix
+      integral(:, 1) = energies%initial_energy
+      call dgetf2(n, n, matrix, n, pivot, info)
+      call dgetrs('N', n, 1, matrix, n, pivot, integral, n, info)
+      integral(:, 1) = energies%into_room*integral(:, 1)
+      share = integral(:n_path, 1)
+      share(1) = share(1) + sum(integral(n_path + 1:, 1))
+      share = share/sum(share)
+   end function get_path_shares
 
    !> Modes of a room per hertz, s.
    elemental function get_room_mode_density(room, frequency) result(density)

@@ -14,7 +14,7 @@ module thud_run
       motion_file_names
    use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
-   use thud_room_report, only: get_room_files, get_room_table, room_file_names
+   use thud_room_report, only: get_room_files, get_room_summary, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
    use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
@@ -190,6 +190,7 @@ contains
          summary = summary//text
          call add_history_files(results%on_floor, 'floor_', write_all, files)
       end if
+      if (case%has_room) summary = summary//get_room_summary(case, results%room)
       call add_file(files, 'summary.nml', summary)
       if (case%has_room) then
          call get_room_table(case, results%room, results%impact%history%contact_time, allocated(results%on_floor), text)

@@ -9,7 +9,7 @@ module thud_rating
    private
 
    public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_class
-   public :: get_inverse_a_rating, get_rounded, get_standardization, rated_set_names
+   public :: get_inverse_a_rating, get_rounded, get_standardization, rated_set_names, rating_names, rating_titles
 
    !> Maximum number of bands in a rating.
    integer, parameter :: max_rated = 12
@@ -34,6 +34,15 @@ module thud_rating
 
    !> Names of the sets: [n_set].
    character(len=24), parameter :: rated_set_names(*) = rated_sets%name
+
+   !> Single-number ratings of a prediction: A-weighted maximum levels of octaves or one-third octaves in the room, and of
+   !> standardized one-third octaves.
+   character(len=12), parameter :: rating_names(*) = [character(len=12) :: 'octaves', 'thirds', 'standardized']
+
+   !> Symbols, bands and standards of these ratings.
+   character(len=60), parameter :: rating_titles(size(rating_names)) = [character(len=60) :: &
+      'L_iA,Fmax of octaves (KS F 2863-2)', 'L_iA,Fmax of one-third octaves (ISO 717-2)', &
+      'standardized L_iA,Fmax of one-third octaves (ISO 16283-2)']
 
    !> Reference volume, m3, and reverberation time, s (ISO 16283-2).
    real(wp), parameter :: reference_volume = 50.0_wp, reference_reverberation = 0.5_wp

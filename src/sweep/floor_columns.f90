@@ -8,7 +8,6 @@ module thud_floor_columns
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_rating, only: get_a_weighted_level, get_standardization
    use thud_room, only: get_room_bands, room_level_type
    implicit none (type, external)
    private
@@ -77,8 +76,7 @@ contains
       else
          values(:n_band) = impact%assessment%level(impact%assessment%first_band:, 2)
       end if
-      if (case%has_room) values(n_band + 2:) = [room%level, room%a_weighted, get_a_weighted_level(room%bands(1)%set, &
-         room%level + get_standardization(room%reverberation_time, room%volume))]
+      if (case%has_room) values(n_band + 2:) = [room%level, room%rating(2:)]
    end subroutine get_floor_values
 
 end module thud_floor_columns

@@ -13,6 +13,7 @@ import pytest
 from conftest import REPOSITORY, names_in, naming
 
 import thud
+from thud.base._schema import RATINGS
 from thud.base.bridge import ask
 from thud.case.case import case_text
 from thud.cli import main
@@ -138,7 +139,10 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
     assert thin.level == pytest.approx(expected.level)
     rows = {row[0]: row[1:] for row in found.rows()}
     assert rows[""] == ("thin", "thick")
-    assert rows["L_iA,Fmax, dB"] == (str(thin.rating.rounded), str(thick.rating.rounded))
+    assert rows[f"{RATINGS['thirds']}, dB"] == (str(thin.rating.rounded), str(thick.rating.rounded))
+    assert rows[f"{RATINGS['octaves']}, dB"] == tuple(
+        f"{one.octave_rating.rounded}, class none" for one in (thin, thick)
+    )
     assert rows["63 Hz octave, dB"] == (
         f"{thin.octave_level[0]:.1f}",
         f"{thick.octave_level[0]:.1f}",
@@ -257,7 +261,7 @@ def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> Non
 def test_page_of_rooms_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
     page = REPOSITORY.joinpath("docs/rooms.md").read_text(encoding="utf-8")
     shown = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", page, re.DOTALL)
-    assert len(shown) == 3
+    assert len(shown) == 4
     with contextlib.chdir(REPOSITORY):
         for code, output in shown:
             exec(code, {})  # noqa: S102 - the page's own

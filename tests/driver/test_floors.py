@@ -38,7 +38,8 @@ FLOORS: dict[str, FloorOptions] = {
     "oscillator": thud.Oscillator(),
     "light_oscillator": thud.Oscillator(20.0, 20 * (80 * np.pi) ** 2, 0.02 * 20 * 80 * np.pi),
     "plate": thud.Plate(thickness=0.05),
-    "floating_floor": thud.FloatingFloor(),
+    "laminate_floor": thud.LaminateFloor(),
+    "floating_floor": thud.Plate(screed_thickness=0.05),
     "joist_floor": thud.JoistFloor(),
     "measured_mobility": thud.MeasuredMobility(1e-4, [60.0], [0.05], [0.02], [0.0]),
 }
@@ -198,12 +199,12 @@ def test_points_of_a_plate_move(run: Run, case_file: CaseFile) -> None:
     ("kind", "group"),
     [
         (thud.Plate, "&plate:"),
-        (thud.FloatingFloor, "&floating_floor:"),
+        (thud.LaminateFloor, "&laminate_floor:"),
         (thud.JoistFloor, "&joist_floor:"),
     ],
 )
 def test_points_without_a_second_coordinate_are_refused_in_the_group_of_their_floor(
-    kind: type[thud.Plate | thud.FloatingFloor | thud.JoistFloor], group: str
+    kind: type[thud.Plate | thud.LaminateFloor | thud.JoistFloor], group: str
 ) -> None:
     with pytest.raises(thud.InputError, match=naming(group, "point_x", 2, "point_y", 1)):
         thud.solve(floor=kind(point_x=[1.0, 2.0], point_y=[1.0]))

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
+import f90nml
 import numpy as np
 import pytest
 from conftest import REPOSITORY, naming, recorded
@@ -46,7 +47,7 @@ def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -
     assert (found.floor.thickness, found.room.volume) == (0.2, 40)
     assert [float(row["level_dB"]) for row in rows] == pytest.approx(found.level, abs=1e-9)
     assert [float(row["nominal_Hz"]) for row in rows] == found.frequency.tolist()
-    shown = re.search(r"L_iA,Fmax (\d+) dB \((\S+)\)", done.stdout)
+    shown = re.search(r"ISO 717-2\) +(\d+) dB \((\S+)\)", done.stdout)
     assert shown is not None
     assert f"&room: {found.source_warnings[0]}" in done.stderr
     assert int(shown[1]) == found.rating.rounded
@@ -196,7 +197,7 @@ def test_walls_ceiling_octaves_and_history_are_written(
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert "Room of 40.0 m3, reverberation time 0.80 s." in done.stdout
-    assert re.search(r"KS F 2863-2, of octaves: L_iA,Fmax \d\d\.\d\d dB, no class", done.stdout)
+    assert re.search(r"\(KS F 2863-2\) +\d\d dB \(\d\d\.\d\d\), (no )?class", done.stdout)
     folder = case_file(ROOM_CASE).parent / "out"
     octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
     history = np.genfromtxt(folder / "room_history.csv", delimiter=",", skip_header=1)
@@ -470,7 +471,7 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
         assert thud.read_case(file).model == _schema.ROOM_SOURCE
         assert thud.Case.from_text(text).model == _schema.ROOM_SOURCE
     done = run(file, "-o", "out")
-    assert f"L_iA,Fmax {found.rating.rounded} dB ({found.rating.a_weighted:.2f})" in done.stdout
+    assert f"{found.rating.rounded} dB ({found.rating.a_weighted:.2f})" in done.stdout
     assert "does not conform" not in done.stderr
 
 
@@ -518,3 +519,59 @@ def test_reverberation_time_is_one_number_or_a_list() -> None:
     assert octaves.reverberation_time.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
     with pytest.raises(thud.InputError, match=naming("reverberation_time", "empty")):
         thud.Room(reverberation_time=())
+
+
+@pytest.mark.parametrize("name", ["octaves", "thirds", "standardized"])
+def test_requirement_is_judged_by_the_rating_that_it_names(
+    run: Run, case_file: CaseFile, shell: thud.Impact, name: Literal["octaves", "thirds"]
+) -> None:
+    room = thud.Room(volume=70.0, reverberation_time=0.8)
+    floor = thud.Plate(thickness=0.2)
+    found = thud.predict_level(shell, floor, room)
+    assert found.requirement is None
+    assert list(found.ratings) == list(_schema.RATINGS)
+    level = found.ratings[name].rounded
+    # The three ratings of this room differ.
+    assert len({rating.rounded for rating in found.ratings.values()}) == 3
+    for limit, met in ((level, True), (level - 1, False)):
+        strict = replace(room, required=limit, required_rating=name)
+        verdict = thud.predict_level(shell, floor, strict).requirement
+        assert verdict is not None
+        assert (verdict.level, verdict.required, verdict.met) == (level, limit, met)
+        keys = f"volume = 70\n reverberation_time = 0.8\n required = {limit}"
+        text = ROOM_CASE.replace("volume = 40", f"{keys}\n required_rating = '{name}'")
+        done = run(case_file(text), "-o", f"out_{limit}")
+        word = "met" if met else "not met"
+        assert f"Required of {name}: at most {limit:.1f} dB: {word}." in done.stdout
+        summary = f90nml.read(case_file(text).parent / f"out_{limit}" / "summary.nml")
+        assert summary["room_summary"]["met"] is met
+        assert summary["room_summary"]["level"] == pytest.approx(
+            [rating.a_weighted for rating in found.ratings.values()], abs=1e-9
+        )
+        page = thud.compare_floors({"floor": thud.predict_level(shell, floor, strict)})
+        assert ("required, dB", f"{limit} ({name}): {word}") in page.rows()
+
+
+def test_paths_share_the_energy_that_enters_the_room(
+    shell: thud.Impact, run: Run, case_file: CaseFile
+) -> None:
+    floor = thud.Plate(thickness=0.2)
+    bare = thud.predict_level(shell, floor, thud.Room(volume=40.0))
+    assert bare.path_shares.tolist() == [[1.0]] * 12
+    room = thud.Room(volume=40.0, wall_lengths=(5, 4, 4))
+    found = thud.predict_level(shell, floor, room)
+    assert found.path_shares.shape == (12, 4)
+    assert found.path_shares.sum(axis=1) == pytest.approx(1.0)
+    # Equal walls have equal shares. Walls decay as slowly as the floor does: the level rises as
+    # much as the energy.
+    assert found.path_shares[:, 2] == pytest.approx(found.path_shares[:, 3])
+    rise = -10 * np.log10(found.path_shares[:, 0])
+    assert found.level - bare.level == pytest.approx(rise, abs=0.3)
+    assert (rise > 0.1).all()
+    text = ROOM_CASE.replace("volume = 40", "volume = 40\n wall_lengths = 5, 4, 4")
+    done = run(case_file(text), "-o", "out")
+    assert "Energy that enters the room through the floor:" in done.stdout
+    path = case_file(text).parent / "out" / "room_levels.csv"
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    columns = [table[name] for name in ("direct_share", "wall_1_share", "wall_2_share")]
+    assert pytest.approx(found.path_shares[:, :3], abs=1e-9) == np.array(columns).T

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -191,7 +192,7 @@ def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
 
 def test_column_that_hardly_is_a_position_raises_a_warning(tmp_path: Path) -> None:
     rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
-    (tmp_path / "levels.csv").write_text(f"frequency,first,Nachhallzeit\n{rows}")
+    (tmp_path / "levels.csv").write_text(f"frequency,first,Abklingzeit\n{rows}")
     assert any("59 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").warnings)
     # A known title is no position.
     (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
@@ -345,3 +346,75 @@ def test_tables_hold_the_numbers_of_the_survey() -> None:
     # The class is that of the levels in the room only.
     assert [row[2] for row in both[1:]] == [after[1][1], "", after[3][1]]
     assert rating_table(replace(found, volume=None)) == alone
+
+
+@pytest.mark.parametrize(
+    "titles",
+    [
+        "Terzmittenfrequenz in Hz;Position 1;Position 2;Störpegel [dB];Nachhallzeit (s)",
+        "중심주파수(Hz);측정점 1;측정점 2;배경소음 (dB);잔향시간(s)",
+        "周波数（Hz）;測定点1;測定点2;暗騒音レベル（dB）;残響時間（s）",  # noqa: RUF001 - as printed
+        "Centre frequency, Hz;Position 1;Position 2;Background noise, dB;RT, s",
+    ],
+)
+def test_titles_are_read_in_four_languages(titles: str, tmp_path: Path) -> None:
+    path = tmp_path / "levels.csv"
+    bands = zip((63, 125, 250, 500), (70, 60, 55, 50), strict=True)
+    rows = [f"{f};{level};{level + 2};{level - 30};0,6" for f, level in bands]
+    path.write_text("\n".join([titles, *rows]), encoding="utf-8")
+    found = thud.read_room_levels(path, volume=50.0)
+    assert found.positions.tolist() == [[70, 60, 55, 50], [72, 62, 57, 52]]
+    assert found.background is not None
+    assert found.background.tolist() == [40, 30, 25, 20]
+    assert found.reverberation_time is not None
+    assert found.reverberation_time.tolist() == [0.6] * 4
+
+
+@pytest.mark.parametrize(
+    ("titles", "encoding", "words"),
+    [
+        ("Frequenz;Pegel 1;Störpegel", "latin-1", naming("UTF-8")),
+        ("주파수;위치 1;평균레벨", "utf-8", naming("평균레벨", "position")),
+        ("周波数(Hz);L1;残響時間(ms)", "utf-8", naming("残響時間(ms)", "s")),
+    ],
+)
+def test_titles_that_would_mislead_are_refused(
+    titles: str, encoding: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "levels.csv"
+    rows = [f"{f};50;40" for f in (63, 125, 250, 500)]
+    path.write_bytes("\n".join([titles, *rows]).encode(encoding))
+    with pytest.raises(thud.InputError, match=words):
+        thud.read_room_levels(path)
+
+
+def test_workbook_is_read_like_a_table(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["Messung vom 3. Mai"])
+    sheet = book.create_sheet("Pegel")
+    sheet.append(["Bericht"])
+    sheet.append([])
+    sheet.append([None, "Frequenz (Hz)", "P1", "P2", None, "Nachhallzeit"])
+    for f, level in zip((63, 125, 250, 500), (70.5, 60, 55, 50), strict=True):
+        sheet.append([None, f, level, level + 2, None, 0.6])
+    path = tmp_path / "levels.xlsx"
+    book.save(path)
+    found = thud.read_room_levels(path)
+    assert found.positions.tolist() == [[70.5, 60, 55, 50], [72.5, 62, 57, 52]]
+    assert found.reverberation_time is not None
+    sheet["C6"] = "60 dB"
+    book.save(path)
+    with pytest.raises(thud.InputError, match=naming("Pegel", "row 6", "60 dB")):
+        thud.read_room_levels(path)
+    path.write_bytes(b"PK no workbook")
+    with pytest.raises(thud.InputError, match=naming("levels.xlsx", "cannot be read")):
+        thud.read_room_levels(path)
+
+
+def test_missing_package_of_workbooks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    with pytest.raises(thud.InputError, match=naming("openpyxl", "pip install")):
+        thud.read_room_levels(tmp_path / "levels.xlsx")

@@ -21,7 +21,7 @@ LUMPED = ("hollow_sphere", "hunt_crossley", "two_mass", "measured_modes")
 WEIGHTS = (4, 3, 1, 2)
 # Of 1000 tries so many drop on each floor too.
 FLOOR_SHARE = {"infinite_plate": 80, "oscillator": 60, "measured_mobility": 30, "joist_floor": 15,
-               "plate": 8, "floating_floor": 3}  # fmt: skip
+               "plate": 8, "laminate_floor": 3}  # fmt: skip
 # Samples of a record, and steps, on a rigid floor, on a small receiver, and on one of many modes.
 MOST_STEPS = {"": 20_000, "infinite_plate": 1500, "oscillator": 1500, "measured_mobility": 1500}
 FEW_STEPS = 300

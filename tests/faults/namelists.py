@@ -41,7 +41,7 @@ MEAN_TIME, FILE_TIME = 0.006, 0.01
 # Fraction of the cases without a model, and of those over a radiator, that are computed.
 WITHOUT_MODEL, OVER_RADIATOR = 0.05, 0.2
 # Floors over which a room may be.
-RADIATORS = ("plate", "floating_floor", "joist_floor")
+RADIATORS = ("plate", "laminate_floor", "joist_floor")
 # Groups that a case of their owner has.
 NEEDED = (
     "modes", "mesh", "room", "compression", "measured_modes", "measured_mobility", "hunt_crossley",
@@ -280,7 +280,7 @@ def _usual() -> dict[tuple[str, str, str], float]:
         ("measured_mobility", "damping_ratio"): 0.03, ("measured_mobility", "residue_real"): 0.01,
         ("measured_mobility", "residue_imaginary"): 1e-4,
         ("plate", "point_x"): 1.0, ("plate", "point_y"): 1.0,
-        ("floating_floor", "point_x"): 1.0, ("floating_floor", "point_y"): 1.0,
+        ("laminate_floor", "point_x"): 1.0, ("laminate_floor", "point_y"): 1.0,
         ("joist_floor", "point_x"): 1.0, ("joist_floor", "point_y"): 1.0,
         ("room", "reverberation_time"): 0.5, ("room", "wall_lengths"): 4.0,
         ("modal_ball", "static_families"): 12.0,

@@ -85,6 +85,7 @@ RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
 RoomPositions = Literal["standard", "even"]
+RoomRequiredRating = Literal["octaves", "thirds", "standardized"]
 BandSet = Literal["octave", "third"]
 
 
@@ -329,6 +330,11 @@ class Room(Group):
     positions : str
         Positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones
         each; "standard", "even".
+    required : float
+        Maximum rating that is required; 0: none, dB; 0 <= required <= 200.
+    required_rating : str
+        Rating that required refers to: of octaves (KS F 2863-2), thirds (ISO 717-2) or
+        standardized thi; "octaves", "thirds", "standardized".
     """
 
     length: float = 0.0
@@ -354,6 +360,8 @@ class Room(Group):
     corner_y: float = 0.0
     radiation: RoomRadiation = "modes"
     positions: RoomPositions = "standard"
+    required: float = 0.0
+    required_rating: RoomRequiredRating = "octaves"
 
 
 @dataclass(frozen=True, eq=False)
@@ -1212,6 +1220,13 @@ LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]] = {
 # Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.
 CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 
+# Single-number ratings of a level in a room, with symbols, bands and standards.
+RATINGS: dict[RoomRequiredRating, str] = {
+    "octaves": "L_iA,Fmax of octaves (KS F 2863-2)",
+    "thirds": "L_iA,Fmax of one-third octaves (ISO 717-2)",
+    "standardized": "standardized L_iA,Fmax of one-third octaves (ISO 16283-2)",
+}
+
 # Every key, in the order of an input file.
 KEYS = (
     Key("", "case", "name", "text", "", "name of the case and of its output directory"),
@@ -1427,4 +1442,6 @@ KEYS = (
     Key("room", "room", "corner_y", "real", "m", "position of the room along the width of a larger floor", (), 0.0, 100.0),
     Key("room", "room", "radiation", "choice", "", "radiation factor of the floor, by its modes or by ISO 12354-1", ('modes', 'iso_12354')),
     Key("room", "room", "positions", "choice", "", "positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each", ('standard', 'even')),
+    Key("room", "room", "required", "real", "dB", "maximum rating that is required; 0: none", (), 0.0, 200.0),
+    Key("room", "room", "required_rating", "choice", "", "rating that required refers to: of octaves (KS F 2863-2), thirds (ISO 717-2) or standardized thi", ('octaves', 'thirds', 'standardized')),
 )

@@ -13,6 +13,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.errors import InputError
+from thud.base.workbooks import read_workbook
 
 if TYPE_CHECKING:
     import os
@@ -82,9 +83,16 @@ def read_titled(
     The titles are the cells of the line above the first number, if there is such a line. Commas,
     semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells may
     be quoted. One decimal mark holds for the whole table, see `find_decimal`. Empty lines, comments
-    after ``#`` and lines above the first number are skipped. Raise InputError, naming file and
-    line, if a line is not numeric or has a different number of columns.
+    after ``#`` and lines above the first number are skipped. A workbook (.xlsx) is read in the same
+    way. Raise InputError, naming file and line, if a line is not numeric or has a different number
+    of columns.
     """
+    is_workbook = Path(path).suffix.lower() == ".xlsx"
+    return read_workbook(path, allowed) if is_workbook else _read_text(path, allowed)
+
+
+def _read_text(path: str | os.PathLike[str], allowed: str) -> tuple[list[str], NDArray[np.float64]]:
+    """Return the titles and the numbers of a text."""
     try:
         if not Path(path).is_file():  # opening a pipe could block
             raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))

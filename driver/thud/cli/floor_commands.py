@@ -124,7 +124,7 @@ RATE = Command(
     (
         argument(
             "levels",
-            metavar="LEVELS.csv",
+            metavar="LEVELS.csv|LEVELS.xlsx",
             help="frequency, levels at positions; optional: background, reverberation_time",
         ),
         argument("--volume", type=float, metavar="M3", help="volume of the room"),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
+from thud.base._schema import QUANTITIES, RATINGS, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.case.case import tables_case
@@ -22,6 +22,7 @@ from thud.impact.ensemble import get_cost
 from thud.impact.floor_impact import FloorImpact
 from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import get_bands
+from thud.level.rating import class_text
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.recordings.config import config_from
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.case.case import Case
+    from thud.floors.prediction import RoomPrediction
     from thud.impact.impact import Impact
     from thud.level.assessment import Criterion
     from thud.level.impact_result import ImpactResult
@@ -246,10 +248,17 @@ def _room(impact: Impact) -> Answer:
     return {
         "frequency": _to_json(prediction.frequency),
         "level": _to_json(prediction.level),
-        "rating": prediction.rating.rounded,
-        "standardized": prediction.standardized_rating.rounded,
+        "ratings": _ratings_text(prediction),
         "warnings": list(prediction.warnings),
     }
+
+
+def _ratings_text(prediction: RoomPrediction) -> str:
+    """Return the ratings by name, the class and the verdict on a requirement."""
+    words = [f"{title} {prediction.ratings[name].rounded} dB" for name, title in RATINGS.items()]
+    words[0] += f", {class_text(prediction.octave_rating.korean_class or 0)}"
+    required = prediction.requirement
+    return "; ".join([*words, *([str(required)] if required else [])])
 
 
 def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:

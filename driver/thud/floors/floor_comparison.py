@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from thud.base._schema import RATINGS
 from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
@@ -16,7 +17,7 @@ from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
 from thud.level.levels import get_bands
-from thud.level.rating import CLASSES
+from thud.level.rating import CLASSES, Rating
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,11 +51,13 @@ class FloorComparison(Displayed, Page):
         """Return header and rows of text, with a column for each floor."""
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         titles = (
-            "", "floor", "force", "L_iA,Fmax, dB", "standardized, dB", *octaves,
-            "class (KS F 2863-2)", "energy, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
+            "", "floor", "force", *(f"{title}, dB" for title in RATINGS.values()),
+            "required, dB", *octaves, "energy, 50 to 630 Hz, mJ",
+            "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
         columns = (_column(*item) for item in self.predictions.items())
-        return list(zip(titles, *columns, strict=True))
+        rows = list(zip(titles, *columns, strict=True))
+        return [row for row in rows if row[0] != "required, dB" or any(row[1:])]
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -124,13 +127,28 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         name,
         prediction.floor.name.replace("_", " "),
         prediction.force,
-        str(prediction.rating.rounded),
-        str(prediction.standardized_rating.rounded),
+        *(_rated(rating) for rating in prediction.ratings.values()),
+        _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
-        CLASSES[prediction.octave_rating.korean_class or 0],
         f"{1e3 * prediction.energy.sum():.3g}",
         _tapping(prediction),
     )
+
+
+def _rated(rating: Rating) -> str:
+    """Return a rating, with its class if the standard has classes."""
+    if rating.korean_class is None:
+        return str(rating.rounded)
+    return f"{rating.rounded}, class {CLASSES[rating.korean_class]}"
+
+
+def _required(prediction: RoomPrediction) -> str:
+    """Return the requirement of a room and the verdict; empty without one."""
+    required = prediction.requirement
+    if required is None:
+        return ""
+    verdict = "met" if required.met else "not met"
+    return f"{required.required:g} ({required.rating}): {verdict}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:

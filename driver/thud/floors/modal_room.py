@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.display import Displayed
 from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
@@ -121,6 +121,7 @@ def modal_room(
     *,
     balls: ArrayLike | None = None,
     microphones: ArrayLike | None = None,
+    max_frequency: float | None = None,
 ) -> ModalRoom:
     """Compute modal levels below a floor for pairs of positions, up to the crossover of the room.
 
@@ -138,6 +139,8 @@ def modal_room(
         Positions of the ball from the corner of the room, m; by default those of ``room.positions``.
     microphones : array_like, shape (n_microphone, 3), optional
         Positions of the microphone, m; the third coordinate is the height.
+    max_frequency : float, optional
+        Highest mid frequency of a band, Hz; by default the crossover.
 
     Returns
     -------
@@ -147,10 +150,12 @@ def modal_room(
     Raises
     ------
     InputError
-        If the floor has no modes, or a position is outside.
+        If the floor has no modes, a position is outside, or no band lies below `max_frequency`.
     """
     prediction = predict_level(source, floor, room)
-    return positions_below(prediction, balls=balls, microphones=microphones)
+    return positions_below(
+        prediction, balls=balls, microphones=microphones, max_frequency=max_frequency
+    )
 
 
 def positions_below(
@@ -158,6 +163,7 @@ def positions_below(
     *,
     balls: ArrayLike | None = None,
     microphones: ArrayLike | None = None,
+    max_frequency: float | None = None,
 ) -> ModalRoom:
     """Compute the `modal_room` for the impact, floor and room of a prediction."""
     bare = replace(prediction.room, wall_lengths=(), ceiling_mass=0.0)
@@ -166,6 +172,9 @@ def positions_below(
     source = prediction.source
     case = replace(source.case, modes=None, floor=prediction.floor, room=prediction.room)
     size = prediction.size
+    if max_frequency is not None:
+        require_number("max_frequency", max_frequency)
+    request = {} if max_frequency is None else {"highest": float(max_frequency)}
     answer = ask(
         "modal_room",
         case=case_text(case),
@@ -174,7 +183,14 @@ def positions_below(
         pressure=1.0,
         ball=_positions("balls", balls, size[:2]),
         microphone=_positions("microphones", microphones, size),
+        **request,
     )
+    if not len(answer["frequency"]):
+        crossover = answer["crossover"] if max_frequency is None else max_frequency
+        refuse(
+            f"room: the modes overlap above {crossover:.0f} Hz, below the lowest band",
+            "a smaller volume, or max_frequency of at least 50 Hz and few enough modes",
+        )
     return ModalRoom(
         prediction=prediction,
         size=size,

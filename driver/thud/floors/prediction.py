@@ -18,13 +18,20 @@ from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, force_exposure_levels, get_bands
-from thud.level.rating import Rating, rated_bands, rating, standardized_level
+from thud.level.rating import (
+    CLASSES,
+    Rating,
+    Requirement,
+    rated_bands,
+    rating,
+    standardized_level,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import FloorOptions, Room
+    from thud.base._schema import FloorOptions, Room, RoomRequiredRating
 
     Array = NDArray[np.float64]
 
@@ -86,6 +93,24 @@ class RoomPrediction(RoomLevel, Displayed):
     def octave_rating(self) -> Rating:
         """Single-number rating of the octave levels in the room, with the Korean class."""
         return rating(self.octave_level, BANDWIDTHS[0])
+
+    @property
+    def ratings(self) -> dict[RoomRequiredRating, Rating]:
+        """Ratings by name, one for each standard: octaves, thirds and standardized thirds."""
+        return {
+            "octaves": self.octave_rating,
+            "thirds": self.rating,
+            "standardized": self.standardized_rating,
+        }
+
+    @property
+    def requirement(self) -> Requirement | None:
+        """Verdict on the requirement of the room (its key `required`); None without one."""
+        room = self.room
+        if not room.required:
+            return None
+        level = self.ratings[room.required_rating].rounded
+        return Requirement(room.required_rating, room.required, level)
 
     @property
     def standardized(self) -> Array:
@@ -159,9 +184,14 @@ class RoomPrediction(RoomLevel, Displayed):
     def __repr__(self) -> str:
         """Return the single-number ratings."""
         low, high = self.interval
+        octaves = self.octave_rating
+        required = self.requirement
         return (
             f"<RoomPrediction: L_iA,Fmax {self.rated:.0f} dB ({low:.0f} to {high:.0f}; ISO 717-2), "
-            f"statistical {self.rating.rounded} dB, modal {self.modal_rating.rounded} dB>"
+            f"statistical {self.rating.rounded} dB, modal {self.modal_rating.rounded} dB; octaves "
+            f"{octaves.rounded} dB (KS F 2863-2, class {CLASSES[octaves.korean_class or 0]}), "
+            f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)"
+            f"{f'; {required}' if required else ''}>"
         )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,13 +37,19 @@ R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
 FREQUENCY_TOLERANCE = 0.03
 # Minimum number of positions (ISO 16283-2).
 MIN_POSITIONS = 4
-# Kinds of columns by title, in lower case without unit; other columns are levels.
-TITLES = {
-    "frequency": "frequency", "f": "frequency", "band": "frequency", "hz": "frequency",
-    "reverberation time": "time", "t": "time", "t20": "time", "t30": "time", "t60": "time",
-    "rt": "time", "rt20": "time", "rt30": "time", "rt60": "time",
-    "background": "background", "background level": "background", "noise": "background",
-}  # fmt: skip
+# Titles of the kinds of columns in English, German, Korean and Japanese, in lower case, without
+# unit and blanks; other columns are levels.
+WORDS = {
+    "frequency": "frequency f band hz centerfrequency centrefrequency midfrequency "
+    "frequenz mittenfrequenz terzmittenfrequenz oktavmittenfrequenz terz terzband oktave oktavband "
+    "주파수 중심주파수 밴드 옥타브밴드 周波数 中心周波数 バンド オクターブバンド",
+    "time": "reverberationtime t t20 t30 t60 rt rt20 rt30 rt60 nachhallzeit 잔향시간 残響時間",
+    "background": "background backgroundlevel backgroundnoise backgroundnoiselevel noise "
+    "hintergrund hintergrundpegel hintergrundgeräusch grundgeräusch grundgeräuschpegel störpegel "
+    "störgeräusch fremdgeräusch fremdgeräuschpegel ruhepegel "
+    "배경소음 배경소음레벨 암소음 암소음레벨 暗騒音 暗騒音レベル 背景騒音",
+}
+TITLES = {word: kind for kind, words in WORDS.items() for word in words.split()}
 ALLOWED = (
     "a header row, and for each band a row of frequency, Hz, levels, dB, of one or "
     "more positions, and, if known, the columns background, dB, and reverberation_time, s"
@@ -54,6 +61,9 @@ OTHER_UNITS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
 NO_POSITION = {
     "mean", "average", "median", "standardized", "spread", "std", "sd", "stdev",
     "deviation", "uncertainty", "edt", "nominal",
+    "mittelwert", "mittel", "mittlerer", "standardisiert", "standardabweichung", "streuung",
+    "unsicherheit", "평균", "평균값", "평균레벨", "표준편차", "표준화", "불확도", "平均", "平均値",
+    "平均レベル", "標準偏差", "標準化", "不確かさ",
 }  # fmt: skip
 # Maximum plausible difference between levels of two positions, dB, mean over the bands.
 MAX_DIFFERENCE = 15.0
@@ -234,9 +244,10 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     Parameters
     ----------
     path
-        Columns with a header row: ``frequency``, Hz; ``background``, dB, and
-        ``reverberation_time``, s, if known; every other column holds the levels of a position, dB.
-        There is a row for each rated band, and optionally for other bands.
+        Columns with a header row, as text or in the first sheet of a workbook (.xlsx) that has
+        numbers: ``frequency``, Hz; ``background``, dB, and ``reverberation_time``, s, if known;
+        every other column holds the levels of a position, dB. Titles may be German, Korean or
+        Japanese. There is a row for each rated band, and optionally for other bands.
     volume
         Volume of the room, m3.
 
@@ -248,6 +259,8 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     titles, table = read_titled(path, ALLOWED)
     if len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", ALLOWED)
+    if broken := [title for title in titles if "\N{REPLACEMENT CHARACTER}" in title]:
+        refuse(f"{path}: the title {broken[0].strip()!r} is not UTF-8", "a table in UTF-8")
     kinds = [_kind(title, path) for title in titles]
     positions = [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"]
     other = next((title for title in positions if NO_POSITION & {*_plain(title).split()}), "")
@@ -305,8 +318,8 @@ def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
 
 def _kind(title: str, path: object) -> str:
     """Return the kind of a column; raise InputError if its title states another unit."""
-    kind = TITLES.get(_plain(title), "level")
-    if OTHER_UNITS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
+    kind = TITLES.get(_plain(title).replace(" ", ""), "level")
+    if OTHER_UNITS & {word.lower() for word in re.findall(r"[^\W\d_]+", title)[1:]}:
         refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
     return kind
 
@@ -317,8 +330,10 @@ def _plain(title: str) -> str:
     >>> _plain("Reverberation_time (s)")
     'reverberation time'
     """
-    word = re.split(r"[,.;(\[/]", title.strip().strip('"').lower())[0]
-    return re.sub(r"[_\s]+(hz|s|db)$", "", word.strip()).replace("_", " ").strip()
+    # NFKC replaces full-width brackets by those of ASCII.
+    text = unicodedata.normalize("NFKC", title).strip().strip('"').lower()
+    word = re.split(r"[,.;(\[/]", text)[0]
+    return re.sub(r"([_\s]+in)?[_\s]+(hz|s|db)$", "", word.strip()).replace("_", " ").strip()
 
 
 def _nominal(frequency: float, path: object) -> float:

@@ -48,6 +48,9 @@ class RoomLevel(Immutable):
     spread : ndarray, shape (12,)
         Expected standard deviation of the level at a single position of source and microphone, dB,
         by the modal overlap (Langley and Cotoni 2004).
+    path_shares : ndarray, shape (12, 1 + n_wall)
+        Fractions of the energy that enters the room, from the floor, directly or through a ceiling,
+        and from each flanking wall.
     octave_level, octave_time : ndarray, shape (4,)
         Maximum Fast levels of the octaves 63 to 500 Hz, dB, and the times of these maxima, s. The
         level of an octave is the energy sum of its bands at an instant.
@@ -91,6 +94,7 @@ class RoomLevel(Immutable):
     mass_per_area: float
     volume: float
     spread: Array
+    path_shares: Array
     octave_level: Array
     octave_time: Array
     history_time: Array
@@ -118,6 +122,7 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         few_modes=answer["room"]["few_modes"],
         mass_per_area=answer["room"]["surface_mass"],
         volume=answer["room"]["volume"],
+        path_shares=answer["room_paths"]["share"],
         octave_level=answer["room_octaves"]["level"],
         octave_time=answer["room_octaves"]["time"],
         history_time=answer["room_history"]["time"],

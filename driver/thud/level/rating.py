@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import CLASS_LIMITS, RATED_BANDS
+from thud.base._schema import CLASS_LIMITS, RATED_BANDS, RATINGS
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
@@ -16,7 +16,7 @@ from thud.level.levels import BANDWIDTHS
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet
+    from thud.base._schema import BandSet, RoomRequiredRating
 
 # Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
@@ -65,10 +65,50 @@ class Rating(Displayed):
         ]
         if self.korean_class is not None:
             rows += [
-                ("class (KS F 2863-2)", CLASSES[self.korean_class]),
+                ("class (KS F 2863-2)", class_text(self.korean_class)),
                 ("inverse-A curve rating, dB (KS F 2863-2, former)", str(self.curve)),
             ]
         return rows
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """Requirement on the level in the room below, and whether it is met.
+
+    Attributes
+    ----------
+    rating : str
+        Rating that it refers to: ``"octaves"``, ``"thirds"`` or ``"standardized"``.
+    required, level : float and int
+        Maximum rating, and the rounded rating of the prediction, dB.
+    met : bool
+        Whether the rating is at most the required one.
+    """
+
+    rating: RoomRequiredRating
+    required: float
+    level: int
+
+    @property
+    def met(self) -> bool:
+        """Whether the rounded rating is at most the required one."""
+        return self.level <= self.required
+
+    def __str__(self) -> str:
+        """Return rating, requirement and verdict in words."""
+        verdict = "met" if self.met else "not met"
+        return f"{RATINGS[self.rating]}: {self.level} dB, required {self.required:g} dB, {verdict}"
+
+
+def class_text(korean_class: int) -> str:
+    """Return a class of KS F 2863-2 with its limit.
+
+    >>> class_text(4)
+    'class 4 (at most 49 dB)'
+    """
+    if korean_class:
+        return f"class {korean_class} (at most {CLASS_LIMITS[korean_class - 1]:g} dB)"
+    return f"no class (class {len(CLASS_LIMITS)}: at most {CLASS_LIMITS[-1]:g} dB)"
 
 
 def rated_bands(bands: BandSet) -> NDArray[np.float64]:

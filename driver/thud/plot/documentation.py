@@ -10,9 +10,9 @@ from thud.base._schema import (
     Ball,
     Drop,
     FiniteElement,
-    FloatingFloor,
     InfinitePlate,
     JoistFloor,
+    LaminateFloor,
     Levels,
     Plate,
 )
@@ -146,14 +146,11 @@ def _draw_floors() -> Figure:
     return floor_mobilities(
         {
             "180 mm of concrete": concrete,
-            "screed on a soft layer on it": FloatingFloor(
-                layer_stiffness=8e6, layer_loss_factor=0.15, screed_loss_factor=0.02,
-                source_x=0.4, source_y=0.35,
+            "screed on a soft layer on it": replace(
+                concrete, screed_thickness=0.05, screed_loss_factor=0.02,
+                layer_stiffness=8e6, layer_loss_factor=0.15,
             ),
-            "200 mm of cross-laminated timber": replace(
-                timber, thickness=0.2, density=470, wave_speed=3180, stiffness_ratio=0.293,
-                torsion_ratio=0.25, loss_factor=0.03,
-            ),
+            "160 mm of cross-laminated timber": LaminateFloor(source_x=0.4, source_y=0.35),
             "timber joists, between two": JoistFloor(
                 sheathing_modulus=3.1e9, source_x=0.4, source_y=0.35
             ),
@@ -174,7 +171,7 @@ def _draw_impedances() -> Figure:
     }
     floors: dict[str, FloorOptions] = {
         "chipboard on joists": JoistFloor(),
-        "floating screed": FloatingFloor(),
+        "floating screed": Plate(screed_thickness=0.05),
         "180 mm concrete": Plate(),
     }
     return ball_impedances(sources, floors)

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from thud.base._schema import FloorOptions, Plate
+from thud.base._schema import FloorOptions
+from thud.base.bridge import ask
 from thud.base.checks import refuse_value, require_kind, require_whole
+from thud.case.case import Case, case_text
 from thud.impact.mobility import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, low_pass
 from thud.plot.impact_figures import TIME_LABEL
@@ -129,42 +131,41 @@ def _draw_mobility(axes: Axes, impact: FloorImpact) -> None:
 
 
 @own_style()
-def plate_modes(floor: Plate, count: int = 6, columns: int = 3) -> Figure:
-    """Draw the lowest mode shapes of a simply supported plate.
+def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure:
+    """Draw the lowest mode shapes of the plate of a floor that radiates into the room below.
 
     Parameters
     ----------
     floor
-        The plate.
+        A floor of rectangular plates.
     count
         Number of shapes.
     columns
         Shapes side by side.
     """
-    # SciPy is slow to import.
-    from thud.floors.modal_room import plate_frequencies
-
-    require_kind("floor", floor, Plate)
     require_whole("count", count, 1, MAX_SHAPES)
     require_whole("columns", columns, 1, MAX_SHAPES)
-    numbers = np.array([(m, n) for m in range(1, count + 1) for n in range(1, count + 1)])
-    frequency = plate_frequencies(floor, numbers)
-    lowest = np.argsort(frequency, kind="stable")[:count]
+    case = case_text(Case(floor=floor))
+    modes = ask("floor_modes", case=case, highest=1e6)
+    frequency = modes["frequency"][:count]
+    count = len(frequency)
+    x, y = np.linspace(0, modes["length"], POINTS), np.linspace(0, modes["width"], POINTS)
+    points = [coordinate.ravel() for coordinate in np.meshgrid(x, y)]
+    highest = frequency[-1] * (1 + 1e-9)
+    shapes = ask("floor_modes", case=case, highest=highest, x=points[0], y=points[1])["shape"]
     columns = min(columns, count)
     rows = -(-count // columns)
     side = WIDTH / columns
-    ratio = floor.width / floor.length
+    ratio = modes["width"] / modes["length"]
     figure = new_figure(0.5 + rows * (side * ratio + 0.25), WIDTH)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    x, y = np.linspace(0, floor.length, POINTS), np.linspace(0, floor.width, POINTS)
     for axes in panels:
         axes.set_axis_off()
-    for axes, mode in zip(panels, lowest, strict=False):
-        m, n = numbers[mode]
-        shape = np.outer(np.sin(n * np.pi * y / floor.width), np.sin(m * np.pi * x / floor.length))
+    for axes, natural, values in zip(panels, frequency, shapes, strict=False):
+        shape = values.reshape(POINTS, POINTS) / values[np.argmax(abs(values))]
         drawn = axes.pcolormesh(x, y, shape, cmap="RdBu_r", vmin=-1, vmax=1, rasterized=True)
         axes.set_aspect("equal")
-        axes.set_title(f"{frequency[mode]:.1f} Hz ({m}, {n})")
+        axes.set_title(f"{natural:.1f} Hz")
     figure.colorbar(
         drawn, ax=panels.tolist(), location="bottom", shrink=0.7, aspect=30,
         label="Displacement relative to its maximum",

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from thud.base._schema import CLASS_LIMITS
+from thud.base._schema import CLASS_LIMITS, RATINGS
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
@@ -351,20 +351,19 @@ def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
 
 
 def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
-    """Draw the ratings of floors, and the limits of the Korean classes."""
+    """Draw the ratings of floors by each standard, and the limits of the Korean classes."""
     x = np.arange(len(comparison.predictions))
-    room = [prediction.octave_rating.a_weighted for prediction in comparison.predictions.values()]
-    standardized = [
-        prediction.standardized_rating.a_weighted for prediction in comparison.predictions.values()
+    width = 0.8 / len(RATINGS)
+    levels = [
+        [prediction.ratings[name].a_weighted for prediction in comparison.predictions.values()]
+        for name in RATINGS
     ]
-    axes.bar(
-        x - 0.2, room, 0.36, color=COLORS[5], edgecolor="black", linewidth=0.5,
-        label="KS F 2863-2: in the room, of octaves",
-    )  # fmt: skip
-    axes.bar(
-        x + 0.2, standardized, 0.36, color="white", edgecolor="black", linewidth=0.5,
-        hatch="//////", label="ISO 717-2: standardized, of thirds",
-    )  # fmt: skip
+    styles = ((COLORS[5], ""), ("0.75", ".."), ("white", "////"))
+    for i, (title, values) in enumerate(zip(RATINGS.values(), levels, strict=True)):
+        axes.bar(
+            x + (i - (len(RATINGS) - 1) / 2) * width, values, 0.9 * width, edgecolor="black",
+            linewidth=0.5, label=title, color=styles[i][0], hatch=styles[i][1],
+        )  # fmt: skip
     for number, limit in enumerate(CLASS_LIMITS, 1):
         axes.axhline(limit, color=COLORS[1], linewidth=0.8, linestyle="--")
         axes.annotate(
@@ -372,6 +371,6 @@ def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
             va="center", fontsize="x-small", color=COLORS[1],
         )  # fmt: skip
     axes.set_xticks(x, [escape_label(name) for name in comparison.predictions], rotation=20)
-    axes.set_ylabel("L_iA,Fmax, dB")
-    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *standardized]) - 5)
+    axes.set_ylabel("Rating, dB; classes: KS F 2863-2")
+    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *np.ravel(levels)]) - 5)
     axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import Plate
 from thud.plot.style import (
     COLORS,
     GRAY,
@@ -83,20 +82,26 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     )  # fmt: skip
     middle.set_ylim(bottom=0)
     middle.set_ylabel("Floor")
-    low, high = prediction.level - prediction.spread, prediction.level + prediction.spread
-    below.fill_between(x, low, high, color=GRAY, linewidth=0, label="± expected spread")
+    modal = slice(0, prediction.n_modal)
+    if prediction.n_modal:
+        edges = np.array([prediction.simple_level, prediction.clamped_level])[:, modal]
+        below.fill_between(
+            x[modal], edges.min(axis=0), edges.max(axis=0), color=GRAY, linewidth=0,
+            label="modal, simply supported to clamped",
+        )  # fmt: skip
+        below.plot(
+            x[modal], prediction.modal_level[modal], color=COLORS[1], marker="s", markersize=3.5,
+            linewidth=1, linestyle="--",
+            label=f"by modes: L_iA,Fmax {prediction.modal_rating.rounded} dB",
+        )  # fmt: skip
     below.plot(x, prediction.level, color=COLORS[0])
     for marks, face in ((few, "white"), (~few, COLORS[0])):
         below.plot(
             x[marks], prediction.level[marks], color=COLORS[0], marker="o", markersize=4,
             markerfacecolor=face, linestyle="none",
         )  # fmt: skip
-    label = f"in the room: L_iA,Fmax {prediction.rating.rounded} dB"
+    label = f"statistical: {prediction.rating.rounded} dB"
     below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
-    below.plot(
-        x, prediction.standardized, color=COLORS[1], marker="s", markersize=3, linewidth=1,
-        linestyle="--", label=f"standardized: {prediction.standardized_rating.rounded} dB",
-    )  # fmt: skip
     if measured is not None:
         level = prediction.level + prediction.difference(measured)
         label = f"measured: {measured.rating.rounded} dB"
@@ -158,13 +163,8 @@ def draw_modal_room(room: ModalRoom) -> Figure:
 
 @own_style()
 def draw_positions(prediction: RoomPrediction) -> Figure | None:
-    """Draw the levels of positions below a plate; None if its modes cannot be counted."""
-    # SciPy is slow to import.
-    from thud.floors.modal_room import ModeCountError, positions_below
+    """Draw the levels of positions below a floor; None if no band is modal."""
+    # Imported late: modal_room imports the prediction.
+    from thud.floors.modal_room import positions_below
 
-    if not isinstance(prediction.floor, Plate):
-        return None
-    try:
-        return draw_modal_room(positions_below(prediction, balls=8, microphones=16))
-    except ModeCountError:
-        return None
+    return draw_modal_room(positions_below(prediction)) if prediction.n_modal else None

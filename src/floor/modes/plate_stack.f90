@@ -20,7 +20,7 @@ module thud_plate_stack
 
    !> Maximum number of functions of a stack, if all are coupled, if those of equal symmetry in one or in both directions
    !> are, if only those along the width are, and if none is. The first four take about as long.
-   integer, parameter :: max_coupled(0:2) = [700, 1100, 1700], max_half_coupled = 6000, max_uncoupled = 40000
+   integer, parameter :: max_coupled(0:2) = [700, 1100, 1700], max_half_coupled = 6000, max_uncoupled = 100000
 
    !> Springs along an edge of a plate.
    type :: edge_type

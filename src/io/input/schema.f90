@@ -9,7 +9,7 @@ module thud_schema
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_quantities, only: history_quantity_count, quantities, quantity_type, sample_quantity_count
-   use thud_rating, only: class_limits, find_rated_bands, rated_set_names
+   use thud_rating, only: class_limits, find_rated_bands, rated_set_names, rating_names, rating_titles
    use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type, &
       source_names
@@ -55,7 +55,12 @@ contains
          call describe_limits(source_names(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(source_names)))
       end do
-      text = text//'},'//newline//'"class_limits": ['//join(class_limits)//'],'//newline//'"quantities": ['
+      text = text//'},'//newline//'"class_limits": ['//join(class_limits)//'],'//newline//'"ratings": {'
+      do i = 1, size(rating_names)
+         text = text//newline//text_value(rating_names(i))//': '//text_value(rating_titles(i)) &
+            //trim(merge(',', ' ', i < size(rating_names)))
+      end do
+      text = text//'},'//newline//'"quantities": ['
       do i = 1, size(quantities)
          call describe_quantity(quantities(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(quantities)))

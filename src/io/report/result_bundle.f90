@@ -129,6 +129,7 @@ contains
       do i = 1, size(contribution_names)
          call bundle%add_array('room_contributions.'//trim(contribution_names(i)), [2], room%contribution(:, i))
       end do
+      call bundle%add_array('room_paths.share', shape(room%path_share), room%path_share)
       n = size(room%octaves)
       call bundle%add_array('room_octaves.frequency', n, room%octaves%nominal)
       call bundle%add_array('room_octaves.level', n, room%octave_level)

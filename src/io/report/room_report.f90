@@ -5,14 +5,15 @@ module thud_room_report
    use thud_csv, only: get_table_csv
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_rating, only: get_a_weighted_level, get_class, get_rounded
-   use thud_room, only: few_modes, room_level_type
+   use thud_rating, only: class_limits, get_a_weighted_level, get_class, get_rounded, rating_names, rating_titles
+   use thud_report, only: line
+   use thud_room, only: few_modes, meets_requirement, room_level_type
    use thud_room_prediction, only: contribution_names
-   use thud_text, only: fixed, newline, replaced, to_text
+   use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, to_text
    implicit none (type, external)
    private
 
-   public :: get_room_files, get_room_table, room_file_names
+   public :: get_room_files, get_room_summary, get_room_table, room_file_names
 
    !> Files of a prediction.
    character(len=*), parameter :: room_file_names(*) = [character(len=16) :: 'room_levels.csv', 'room_octaves.csv', &
@@ -32,16 +33,21 @@ contains
       type(room_level_type), intent(in) :: prediction
       !> The files: [size(room_file_names)].
       type(text_file_type), intent(out) :: files(:)
-      character(len=:), allocatable :: header
+      character(len=:), allocatable :: header, wall_titles
       integer :: i
 
       files%name = room_file_names
+      wall_titles = ''
+      do i = 1, size(prediction%path_share, 2) - 1
+         wall_titles = wall_titles//',wall_'//to_text(i)//'_share'
+      end do
       files(1)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,' &
          //'loss_factor,reverberation_time_s,floor_modes,room_modes,modal_level_dB,modal_spread_dB,' &
-         //'simply_supported_level_dB,clamped_level_dB', reshape([prediction%bands%nominal, prediction%level, &
-         prediction%time, prediction%spread, prediction%energy, prediction%radiation_factor, prediction%loss_factor, &
-         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes, prediction%modal_level, &
-         prediction%modal_spread, prediction%edge_level], [size(prediction%level), 14]))
+         //'simply_supported_level_dB,clamped_level_dB,direct_share'//wall_titles, &
+         reshape([prediction%bands%nominal, prediction%level, prediction%time, prediction%spread, prediction%energy, &
+         prediction%radiation_factor, prediction%loss_factor, prediction%reverberation_time, prediction%floor_modes, &
+         prediction%room_modes, prediction%modal_level, prediction%modal_spread, prediction%edge_level, &
+         prediction%path_share], [size(prediction%level), 14 + size(prediction%path_share, 2)]))
       files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
          prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]))
       header = 'time_s'
@@ -84,7 +90,7 @@ contains
       do i = 1, size(prediction%octaves)
          text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(prediction%octave_level(i), 1)//' dB'
       end do
-      call add_ratings(prediction, coupled, text)
+      call add_ratings(case, prediction, coupled, text)
       resistance = 1/maxval(prediction%conductance)
       text = text//'  Room of '//fixed(prediction%volume, 1)//' m3, reverberation time ' &
          //fixed(minval(prediction%reverberation_time), 2)
@@ -98,37 +104,76 @@ contains
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 
-   !> Adds the ratings of octaves and of one-third octaves.
-   subroutine add_ratings(prediction, coupled, text)
+   !> Adds the ratings, and whether they meet a requirement.
+   subroutine add_ratings(case, prediction, coupled, text)
+      type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
       !> The prediction uses the force on the mobile floor.
       logical, intent(in) :: coupled
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
-      real(wp) :: level
-      integer :: korean_class, i
+      integer :: i
 
       text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax '//to_text(get_rounded(prediction%rated))//' dB (' &
          //fixed(prediction%interval(1), 0)//' to '//fixed(prediction%interval(2), 0)//'), statistical ' &
-         //fixed(prediction%a_weighted, 1)//' dB, modal ' &
+         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, modal ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
       text = text//'  Contributions:'
       do i = 1, size(contribution_names)
          text = text//merge(',', ' ', i > 1)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
             //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
       end do
-      text = text//' dB'//newline
-      level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
-      korean_class = get_class(level)
-      text = text//'  KS F 2863-2, of octaves: L_iA,Fmax '//fixed(level, 2)//' dB, '
-      if (korean_class > 0) then
-         text = text//'class '//to_text(korean_class)
-      else
-         text = text//'no class'
-      end if
-      text = text//' (statistical)'//newline//'  Means over positions, by the ' &
+      text = text//' dB'//newline//'  Statistical:'//newline
+      do i = 1, size(rating_names)
+         text = text//'  '//rating_titles(i)//to_text(get_rounded(prediction%rating(i)))//' dB (' &
+            //fixed(prediction%rating(i), 2)//')'
+         if (rating_names(i) == 'octaves') text = text//', '//get_class_text(prediction%rating(i))
+         text = text//newline
+      end do
+      if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
+         //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
+         //' %, from the walls the rest.'//newline
+      associate (room => case%room)
+         if (room%required > 0.0_wp) text = text//'  Required of '//trim(room%required_rating)//': at most ' &
+            //to_text(room%required)//' dB: '//trim(merge('met    ', 'not met', meets_requirement(room, prediction))) &
+            //'.'//newline
+      end associate
+      text = text//'  Statistical means over positions, by the ' &
          //trim(merge('contact force', 'blocked force', coupled))//'.'//newline
    end subroutine add_ratings
+
+   !> The class of a rating, with the limit of the class.
+   function get_class_text(rating) result(text)
+      !> Rating of octaves, dB.
+      real(wp), intent(in) :: rating
+      character(len=:), allocatable :: text
+      integer :: number
+
+      number = get_class(rating)
+      if (number > 0) then
+         text = 'class '//to_text(number)//' (at most '//fixed(class_limits(number), 0)//' dB)'
+      else
+         text = 'no class (class '//to_text(size(class_limits))//': at most '//fixed(class_limits(size(class_limits)), 0) &
+            //' dB)'
+      end if
+   end function get_class_text
+
+   !> Ratings and verdict as a group of `summary.nml`.
+   function get_room_summary(case, prediction) result(text)
+      type(case_type), intent(in) :: case
+      type(room_level_type), intent(in) :: prediction
+      !> The group.
+      character(len=:), allocatable :: text
+
+      text = newline//'&room_summary'//newline//line('rating', join_quoted(rating_names), '') &
+         //line('meaning', join_quoted(rating_titles), '')//line('level', join(prediction%rating), 'dB') &
+         //line('rounded', join(real(get_rounded(prediction%rating), wp)), 'dB') &
+         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none')
+      if (case%room%required > 0.0_wp) text = text//line('required', to_text(case%room%required), 'dB') &
+         //line('required_rating', quoted(case%room%required_rating), '') &
+         //line('met', to_text(meets_requirement(case%room, prediction)), '')
+      text = text//'/'//newline
+   end function get_room_summary
 
    !> A text padded to the width of a column.
    pure function padded(text) result(cell)

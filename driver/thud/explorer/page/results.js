@@ -34,8 +34,7 @@ export function show(variants, remove) {
       x: { title: "One-third-octave band", unit: "Hz", bands: names(rooms[0].answer.room) },
       y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
     });
-    byId("room_text").replaceChildren(...rooms.map((variant) => element("li", {}, label(variants, variant), "L", element("sub", {}, "iA,Fmax"),
-      ` ${variant.answer.room.rating} dB, standardized ${variant.answer.room.standardized} dB`)));
+    byId("room_text").replaceChildren(...rooms.map((variant) => element("li", {}, label(variants, variant), variant.answer.room.ratings)));
   }
   showCriteria(variants);
   showVariants(variants, remove);
