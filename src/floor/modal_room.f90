@@ -132,6 +132,11 @@ contains
          if (room%n_band == 0) exit
          highest = room_ratio*box%bands(room%n_band)%upper
          kept = modes%omega < min(floor_ratio*2*pi*highest, modes%limit)
+         ! A floor without modes there answers with its compliance only, which nothing here contains.
+         if (.not. any(kept)) then
+            room%n_band = 0
+            exit
+         end if
          omega = pack(modes%omega, kept)
          decay = omega*pack(modes%loss_factor, kept)
          duration = 0.5_wp + 6*log(10.0_wp)/min(max(minval(decay), 1.0_wp), 6*log(10.0_wp)/maxval(box%reverberation_time))

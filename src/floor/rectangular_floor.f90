@@ -88,7 +88,7 @@ contains
       fields = [ &
          choice_field('support', options%support, 'support of the edges', supports), &
          list_field('support_stiffness', options%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
-         //'deflection per length: 1 value or x = 0, x = length, y = 0, y = width', '[0, 1e14]'), &
+         //'deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)', '[0, 1e14]'), &
          list_field('support_rotation', options%support_rotation, 'N', &
          'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
          list_field('line_x', options%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &

@@ -180,8 +180,8 @@ contains
          'positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each', &
          [character(len=8) :: standard_positions, 'even']), &
          real_field('required', room%required, 'dB', 'maximum rating that is required; 0: none', '[0, 200]'), &
-         choice_field('required_rating', room%required_rating, 'rating that required refers to: of octaves (KS F ' &
-         //'2863-2), thirds (ISO 717-2) or standardized thirds', rating_names)]
+         choice_field('required_rating', room%required_rating, 'rating that required refers to (KS F 2863-2, ISO ' &
+         //'717-2, ISO 16283-2)', rating_names)]
    end function get_room_fields
 
    !> Checks the number of reverberation times.
@@ -233,6 +233,12 @@ contains
             //to_text(completed%width)//' x '//to_text(completed%height)//' m (not stated: those of the floor), ' &
             //'contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
             //to_text(product)//' m3, or without volume or height')
+      else if (room%corner_x + completed%length > plate%length*(1 + 1.0e-9_wp)) then
+         error = input_error('&room: corner_x + length = '//to_text(room%corner_x + completed%length)//' m lies beyond the ' &
+            //'floor; allowed: up to its length, '//to_text(plate%length)//' m')
+      else if (room%corner_y + completed%width > plate%width*(1 + 1.0e-9_wp)) then
+         error = input_error('&room: corner_y + width = '//to_text(room%corner_y + completed%width)//' m lies beyond the ' &
+            //'floor; allowed: up to its width, '//to_text(plate%width)//' m')
       else if (completed%volume < min_volume) then
          error = input_error('&room: the volume is '//to_text(completed%volume)//' m3; allowed: at least ' &
             //to_text(min_volume)//' m3')

@@ -85,7 +85,12 @@ def test_mean_of_positions_is_the_modal_level_of_the_prediction(shell: thud.Impa
         ({"microphones": [[1.0, 1.0]]}, naming("microphones", "(1, 2)")),
         ({"max_frequency": "high"}, naming("max_frequency")),
         ({"floor": thud.Oscillator()}, naming("&floor: name", "plate")),
-        ({"room": thud.Room(volume=1e5, height=5000.0)}, naming("overlap", "volume")),
+        (
+            {"floor": thud.Plate(length=40.0, width=30.0), "room": thud.Room(height=10.0)},
+            naming("overlap", "volume"),
+        ),
+        ({"room": thud.Room(length=5.0, width=3.0)}, naming("length", 5.0, 4.5)),
+        ({"room": thud.Room(corner_y=2.0, width=2.0)}, naming("corner_y", 4.0, 3.7)),
         ({"room": thud.Room(volume=-1.0)}, naming("&room: volume", "-1.0")),
     ],
 )

@@ -333,8 +333,8 @@ class Room(Group):
     required : float
         Maximum rating that is required; 0: none, dB; 0 <= required <= 200.
     required_rating : str
-        Rating that required refers to: of octaves (KS F 2863-2), thirds (ISO 717-2) or
-        standardized thi; "octaves", "thirds", "standardized".
+        Rating that required refers to (KS F 2863-2, ISO 717-2, ISO 16283-2); "octaves", "thirds",
+        "standardized".
     """
 
     length: float = 0.0
@@ -665,8 +665,8 @@ class Plate(Group):
     support : str
         Support of the edges; "simple", "clamped", "free", "elastic".
     support_stiffness : sequence of float
-        Stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y =
-        0, y, N/m2; 0 <= support_stiffness <= 1e+14.
+        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
+        y at, N/m2; 0 <= support_stiffness <= 1e+14.
     support_rotation : sequence of float
         Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
         support_rotation <= 1e+14.
@@ -784,8 +784,8 @@ class LaminateFloor(Group):
     support : str
         Support of the edges; "simple", "clamped", "free", "elastic".
     support_stiffness : sequence of float
-        Stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y =
-        0, y, N/m2; 0 <= support_stiffness <= 1e+14.
+        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
+        y at, N/m2; 0 <= support_stiffness <= 1e+14.
     support_rotation : sequence of float
         Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
         support_rotation <= 1e+14.
@@ -906,8 +906,8 @@ class JoistFloor(Group):
     support : str
         Support of the edges; "simple", "clamped", "free", "elastic".
     support_stiffness : sequence of float
-        Stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y =
-        0, y, N/m2; 0 <= support_stiffness <= 1e+14.
+        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
+        y at, N/m2; 0 <= support_stiffness <= 1e+14.
     support_rotation : sequence of float
         Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
         support_rotation <= 1e+14.
@@ -1324,7 +1324,7 @@ KEYS = (
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
-    Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y = 0, y", (), 0.0, 100000000000000.0),
+    Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1358,7 +1358,7 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
-    Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y = 0, y", (), 0.0, 100000000000000.0),
+    Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1393,7 +1393,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
     Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
-    Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value or x = 0, x = length, y = 0, y", (), 0.0, 100000000000000.0),
+    Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1443,5 +1443,5 @@ KEYS = (
     Key("room", "room", "radiation", "choice", "", "radiation factor of the floor, by its modes or by ISO 12354-1", ('modes', 'iso_12354')),
     Key("room", "room", "positions", "choice", "", "positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each", ('standard', 'even')),
     Key("room", "room", "required", "real", "dB", "maximum rating that is required; 0: none", (), 0.0, 200.0),
-    Key("room", "room", "required_rating", "choice", "", "rating that required refers to: of octaves (KS F 2863-2), thirds (ISO 717-2) or standardized thi", ('octaves', 'thirds', 'standardized')),
+    Key("room", "room", "required_rating", "choice", "", "rating that required refers to (KS F 2863-2, ISO 717-2, ISO 16283-2)", ('octaves', 'thirds', 'standardized')),
 )

@@ -9,7 +9,7 @@ module thud_modal_radiation
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
-   use thud_plate, only: air_type, get_surface_mass, get_total_loss, plate_type
+   use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
    use thud_ritz_system, only: get_mode_values
    implicit none (type, external)
    private
@@ -94,6 +94,13 @@ contains
          else
             square = get_square_shapes(modes, kept)
             call add_modes(modes, kept, omega, loss_factor, square, air, bands(i), area, power, velocity, total)
+         end if
+         if (.not. velocity > 0.0_wp) then
+            ! A plate without modes there.
+            radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
+            radiation%conductance(i) = 1/get_resistance(plate)
+            radiation%radiated(i) = 0.0_wp
+            cycle
          end if
          radiation%radiation_factor(i) = power/velocity
          radiation%radiated(i) = air%density*air%sound_speed*power/total
