@@ -10,7 +10,7 @@ module thud_room_prediction
    use thud_kinds, only: wp
    use thud_modal_radiation, only: get_modal_radiation, get_strike_points, modal_radiation_type
    use thud_modal_room, only: box_type, get_highest_frequency, get_modal_room, &
-      get_standard_positions, modal_room_type
+      get_standard_positions, modal_room_type, n_standard
    use thud_plate, only: get_plate_radiation, plate_type
    use thud_rating, only: get_a_weighted_level
    use thud_room, only: check_below, get_completed_room, get_reverberation_times, get_room_bands, get_room_level, &
@@ -108,7 +108,8 @@ contains
       type(plate_type), intent(in) :: plate
       !> Modes of the floor as it is supported.
       type(floor_modes_type), intent(in) :: modes
-      real(wp), intent(in) :: force(:), sample_rate
+      real(wp), intent(in) :: force(:)
+      real(wp), intent(in) :: sample_rate
       type(room_level_type), intent(inout) :: prediction
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
@@ -151,7 +152,7 @@ contains
       integer :: i
 
       if (room%positions == standard_positions) then
-         allocate (ball(2, 5), microphone(3, 5))
+         allocate (ball(2, n_standard), microphone(3, n_standard))
          call get_standard_positions(box, ball, microphone)
          return
       end if

@@ -13,8 +13,8 @@ module thud_warnings
    use thud_plate, only: plate_type
    use thud_registry, only: floor_names, model_names
    use thud_room, only: get_completed_room, room_type
-   use thud_sampling, only: get_rate_limit
    use thud_room, only: get_completed_room, room_type
+   use thud_sampling, only: get_rate_limit
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
    use thud_validity_limit, only: get_limit_message, is_outside, validity_limit_type

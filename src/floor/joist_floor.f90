@@ -125,6 +125,8 @@ contains
                source(2) = get_nearest(joists, y)/options%width
              case ('sheathing')
                if (n > 1) source(2) = get_nearest((joists(:n - 1) + joists(2:))/2, y)/options%width
+             case default
+               continue
             end select
          end associate
       end associate
@@ -132,7 +134,8 @@ contains
 
    !> The value next to a given one.
    pure function get_nearest(values, value) result(nearest)
-      real(wp), intent(in) :: values(:), value
+      real(wp), intent(in) :: values(:)
+      real(wp), intent(in) :: value
       real(wp) :: nearest
 
       nearest = values(minloc(abs(values - value), dim=1))
@@ -159,8 +162,8 @@ contains
 
    !> The orthotropic plate with smeared joists, as thick as the sheathing.
    !>
-   !> The bending stiffness along the joists is that of sheathing and joists, across them B' of the sheathing; H = B' + G J of
-   !> a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
+   !> The bending stiffness along the joists is that of sheathing and joists, across them B' of the sheathing; H = B' + G J
+   !> of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
    pure function get_smeared(options) result(plate)
       class(joist_floor_type), intent(in) :: options
       type(plate_type) :: plate

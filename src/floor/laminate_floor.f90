@@ -58,14 +58,17 @@ contains
          'thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &
          list_field('layer_angle', options%layer_angle, 'deg', &
          'directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with 0)', '[0, 90]'), &
-         real_field('youngs_modulus', options%youngs_modulus, 'Pa', 'modulus of elasticity along the grain', '[1e8, 1e12]'), &
+         real_field('youngs_modulus', options%youngs_modulus, 'Pa', &
+         'modulus of elasticity along the grain', '[1e8, 1e12]'), &
          real_field('cross_modulus', options%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
          real_field('shear_modulus', options%shear_modulus, 'Pa', 'shear modulus along the grain', '[1e6, 1e12]'), &
-         real_field('rolling_shear_modulus', options%rolling_shear_modulus, 'Pa', 'modulus of rolling shear', '[1e6, 1e12]'), &
+         real_field('rolling_shear_modulus', options%rolling_shear_modulus, 'Pa', &
+         'modulus of rolling shear', '[1e6, 1e12]'), &
          real_field('torsion_factor', options%torsion_factor, '', &
          'fraction of the torsional stiffness that joints between boards leave', '[0, 1]'), &
          real_field('density', options%density, 'kg/m3', 'density of the layers', '[10, 20000]'), &
-         real_field('added_mass', options%added_mass, 'kg/m2', 'mass without stiffness on the plate, as gravel', '[0, 1000]'), &
+         real_field('added_mass', options%added_mass, 'kg/m2', &
+         'mass without stiffness on the plate, as gravel', '[0, 1000]'), &
          real_field('loss_factor', options%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          options%get_source_fields(), options%get_build_up_fields(), options%get_point_fields()]

@@ -15,6 +15,7 @@ module thud_modal_room
    private
 
    public :: box_type, get_crossover, get_highest_frequency, get_modal_room, get_standard_positions, modal_room_type
+   public :: n_standard
 
    !> Number of overlapping modes of the room above which the sound is statistical.
    real(wp), parameter :: overlap_limit = 3.0_wp
@@ -34,6 +35,9 @@ module thud_modal_room
 
    !> Time constant of the Fast detector, s; reference sound pressure, Pa.
    real(wp), parameter :: time_constant = 0.125_wp, reference_pressure = 2.0e-5_wp
+
+   !> Number of standard positions.
+   integer, parameter :: n_standard = 5
 
    !> Distance of standard positions from the walls, m, and height of the microphones, m (KS F 2810-2).
    real(wp), parameter :: wall_distance = 0.75_wp, microphone_height = 1.2_wp
@@ -92,10 +96,10 @@ contains
    pure subroutine get_standard_positions(box, ball, microphone)
       type(box_type), intent(in) :: box
       !> Positions of the ball, from the corner of the room, m: [2, 5].
-      real(wp), intent(out) :: ball(2, 5)
+      real(wp), intent(out) :: ball(2, n_standard)
       !> Positions of the microphone, m: [3, 5].
-      real(wp), intent(out) :: microphone(3, 5)
-      real(wp), parameter :: corner(2, 5) = reshape([0, 0, -1, -1, 1, -1, -1, 1, 1, 1], [2, 5])
+      real(wp), intent(out) :: microphone(3, n_standard)
+      real(wp), parameter :: corner(2, n_standard) = reshape([0, 0, -1, -1, 1, -1, -1, 1, 1, 1], [2, n_standard])
       integer :: i
 
       do i = 1, 2
@@ -110,7 +114,8 @@ contains
       type(floor_modes_type), intent(in) :: modes
       type(box_type), intent(in) :: box
       !> Force on the floor, N: [n_force], and samples per second, Hz.
-      real(wp), intent(in) :: force(:), sample_rate
+      real(wp), intent(in) :: force(:)
+      real(wp), intent(in) :: sample_rate
       !> Positions of the ball on the floor and of the microphone, from the corner of the room, m: [2, n_ball], [3, n_mic].
       real(wp), intent(in) :: ball(:, :), microphone(:, :)
       !> Also return the sound pressure.
@@ -217,7 +222,8 @@ contains
 
    !> Fourier transform of a force, N s, at frequencies in equal steps.
    pure function get_spectrum(force, sample_rate, frequency) result(spectrum)
-      real(wp), intent(in) :: force(:), sample_rate
+      real(wp), intent(in) :: force(:)
+      real(wp), intent(in) :: sample_rate
       !> Frequencies, Hz, multiples of the first one: [n].
       real(wp), intent(in) :: frequency(:)
       complex(wp) :: spectrum(size(frequency))
@@ -241,7 +247,8 @@ contains
       type(box_type), intent(in) :: box
       real(wp), intent(in) :: highest
       integer, allocatable, intent(out) :: lx(:), ly(:)
-      integer :: n(2), i, j
+      integer :: n(2)
+      integer :: i, j
 
       n = int(2*highest*box%sides(1:2)/box%air%sound_speed)
       lx = [((i, i=0, n(1)), j=0, n(2))]
@@ -399,7 +406,8 @@ contains
    subroutine add_room_energies(box, lx, ly, highest, frequency, flow, step, input, loss)
       type(box_type), intent(in) :: box
       integer, intent(in) :: lx(:), ly(:)
-      real(wp), intent(in) :: highest, frequency(:)
+      real(wp), intent(in) :: highest
+      real(wp), intent(in) :: frequency(:)
       !> Volume flow into pairs of half waves: [n_pair, n_line].
       complex(wp), intent(in) :: flow(:, :)
       !> Distance of the frequencies, Hz.

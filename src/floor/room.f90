@@ -100,7 +100,8 @@ module thud_room
       !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
       !> Volume of the room, m3, and its length, width and height, m.
-      real(wp) :: volume = 0.0_wp, sides(3) = 0.0_wp
+      real(wp) :: volume = 0.0_wp
+      real(wp) :: sides(3) = 0.0_wp
       !> Energy that the impact injects into the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -132,7 +133,8 @@ module thud_room
       !> Contributions to the interval of the A-weighted level, differences from it, dB: [2, n_contribution].
       real(wp), allocatable :: contribution(:, :)
       !> Mean of the A-weighted levels of both predictions, dB, and the ends of its interval, dB: [2].
-      real(wp) :: rated = 0.0_wp, interval(2) = 0.0_wp
+      real(wp) :: rated = 0.0_wp
+      real(wp) :: interval(2) = 0.0_wp
       !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
@@ -234,8 +236,8 @@ contains
             //'contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
             //to_text(product)//' m3, or without volume or height')
       else if (room%corner_x + completed%length > plate%length*(1 + 1.0e-9_wp)) then
-         error = input_error('&room: corner_x + length = '//to_text(room%corner_x + completed%length)//' m lies beyond the ' &
-            //'floor; allowed: up to its length, '//to_text(plate%length)//' m')
+         error = input_error('&room: corner_x + length = '//to_text(room%corner_x + completed%length)//' m lies beyond ' &
+            //'the floor; allowed: up to its length, '//to_text(plate%length)//' m')
       else if (room%corner_y + completed%width > plate%width*(1 + 1.0e-9_wp)) then
          error = input_error('&room: corner_y + width = '//to_text(room%corner_y + completed%width)//' m lies beyond the ' &
             //'floor; allowed: up to its width, '//to_text(plate%width)//' m')

@@ -49,7 +49,8 @@ contains
          [character(len=6) :: 'simple', 'free', 'strip']), &
          real_field('strip_stiffness', screed%strip_stiffness, 'N/m2', &
          'stiffness of edge strips against vertical motion per length, for strip', '[0, 1e12]'), &
-         list_field('bridge_x', screed%bridge_x, 'm', 'positions along the length of bridges through the layer', '(0, 100)'), &
+         list_field('bridge_x', screed%bridge_x, 'm', 'positions along the length of bridges through the layer', &
+         '(0, 100)'), &
          list_field('bridge_y', screed%bridge_y, 'm', 'positions along the width of these bridges', '(0, 100)'), &
          real_field('bridge_stiffness', screed%bridge_stiffness, 'N/m', 'stiffness of one bridge', '[1e3, 1e12]')]
    end function get_screed_fields

@@ -108,7 +108,8 @@ def test_pressure_has_the_levels(room: thud.ModalRoom) -> None:
     spectrum = np.abs(np.fft.rfft(pressure)) ** 2
     frequency = np.fft.rfftfreq(len(pressure), 1 / room.sample_rate)
     exposures = [
-        10 * np.log10(spectrum[(frequency > f / 2 ** (1 / 6)) & (frequency < f * 2 ** (1 / 6))].sum())
+        10
+        * np.log10(spectrum[(frequency > f / 2 ** (1 / 6)) & (frequency < f * 2 ** (1 / 6))].sum())
         for f in room.frequency
     ]
     # Differences between bands are those of the Fast levels, up to their decays.

@@ -8,8 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from baffled_plate import SupportedPlate, band_radiation_factor
-from joists import JoistFloor, get_conductance, get_frequencies, get_joists, get_octaves
-from joists import get_radiated_energy as get_exact_energy
+from joists import (
+    JoistFloor,
+    get_conductance,
+    get_frequencies,
+    get_joists,
+    get_octaves,
+    get_radiated_energy as get_exact_energy,
+)
 from mindlin_plate import ThickPlate, get_supported_frequencies
 from modal_room_reference import get_maximum_levels, get_plate_velocity, get_pressure
 from plate_elements import (
@@ -109,9 +115,7 @@ def test_joists_have_the_mobility_of_an_exact_solution(
         source_on="position", source_x=point[0] / 4.0, source_y=point[1] / 5.0, loss_factor=0.05
     )
     edges = THIRDS[:, None] * 2 ** (np.array([-1.0, 1.0]) / 6)
-    found = [
-        thud.mobility(floor, np.linspace(low, high, 200)).real.mean() for low, high in edges
-    ]
+    found = [thud.mobility(floor, np.linspace(low, high, 200)).real.mean() for low, high in edges]
     oracle(
         f"Re Y {'on a joist' if on_joist else 'between joists'} in thirds by an exact solution",
         "independent code",

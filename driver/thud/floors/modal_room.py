@@ -114,7 +114,7 @@ class ModalRoom(Displayed):
         )
 
 
-def modal_room(
+def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in them
     source: ImpactResult,
     floor: FloorOptions | None = None,
     room: Room | None = None,
@@ -136,7 +136,8 @@ def modal_room(
     floor, room
         Floor and room; by default those of the impact's case.
     balls : array_like, shape (n_ball, 2), optional
-        Positions of the ball from the corner of the room, m; by default those of ``room.positions``.
+        Positions of the ball from the corner of the room, m; by default those of
+        ``room.positions``.
     microphones : array_like, shape (n_microphone, 3), optional
         Positions of the microphone, m; the third coordinate is the height.
     max_frequency : float, optional

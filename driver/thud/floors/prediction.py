@@ -17,12 +17,11 @@ from thud.impact.compute import compute
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
-from thud.level.levels import BANDWIDTHS, force_exposure_levels, get_bands
+from thud.level.levels import BANDWIDTHS, force_exposure_levels
 from thud.level.rating import (
     CLASSES,
     Rating,
     Requirement,
-    rated_bands,
     rating,
     standardized_level,
 )

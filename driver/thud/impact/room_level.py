@@ -64,7 +64,8 @@ class RoomLevel(Immutable):
         Sentences on conditions in which the model of the floor is not valid.
     modal_level, modal_spread : ndarray, shape (12,)
         Levels by the modes of floor and room, dB: energy mean and standard deviation of positions.
-        Above the first `n_modal` bands, where three modes of the room overlap, the statistical ones.
+        Above the first `n_modal` bands, where three modes of the room overlap, they are
+        statistical.
     simple_level, clamped_level : ndarray, shape (12,)
         The same levels if the floor is simply supported or clamped.
     n_modal : int

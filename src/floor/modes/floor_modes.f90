@@ -40,8 +40,8 @@ module thud_floor_modes
    end type cached_modes_type
 
    !> Modes of the last floors of each thread, because a case needs them several times, and the number of the oldest.
-   type(cached_modes_type), save :: cached(4)
-   integer, save :: oldest = 1
+   type(cached_modes_type) :: cached(4)
+   integer :: oldest = 1
    !$omp threadprivate(cached, oldest)
 
 contains

@@ -133,7 +133,8 @@ contains
       real(wp), intent(out) :: power, velocity, total
       type(transforms_type) :: transforms
       complex(wp), allocatable :: amplitude(:, :)
-      real(wp) :: ratio, edge(2), frequency
+      real(wp) :: ratio, frequency
+      real(wp) :: edge(2)
       integer :: j, l, n
 
       power = 0.0_wp
@@ -148,7 +149,8 @@ contains
             ! Geometric steps, whose widths are proportional to the frequency.
             frequency = edge(1)*ratio**((l - 0.5_wp)/n)
             associate (w => 2*pi*frequency)
-               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*omega*loss_factor, wp), 2, size(drive, 2))*drive
+               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*omega*loss_factor, wp), 2, &
+                  size(drive, 2))*drive
             end associate
             power = power + frequency*get_power(transforms, amplitude)
             velocity = velocity + frequency*get_square_velocity(modes, kept, amplitude)
@@ -172,7 +174,8 @@ contains
       real(wp), intent(out) :: power, velocity, total
       type(transforms_type) :: transforms
       real(wp) :: resistance(size(kept)), response(size(kept))
-      real(wp) :: ratio, edge(2), frequency
+      real(wp) :: ratio, frequency
+      real(wp) :: edge(2)
       integer :: j, l, n
 
       power = 0.0_wp

@@ -20,7 +20,8 @@ module thud_plate_stack
 
    !> Maximum number of functions of a stack, if all are coupled, if those of equal symmetry in one or in both directions
    !> are, if only those along the width are, and if none is. The first four take about as long.
-   integer, parameter :: max_coupled(0:2) = [700, 1100, 1700], max_half_coupled = 6000, max_uncoupled = 100000
+   integer, parameter :: max_coupled(0:2) = [700, 1100, 1700]
+   integer, parameter :: max_half_coupled = 6000, max_uncoupled = 100000
 
    !> Springs along an edge of a plate.
    type :: edge_type
@@ -207,7 +208,8 @@ contains
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency
       integer :: n(2)
-      real(wp) :: sides(2), half, stiffness(2), inertia
+      real(wp) :: sides(2), stiffness(2)
+      real(wp) :: half, inertia
       integer :: i
 
       sides = [stack%length, stack%width]
@@ -254,7 +256,8 @@ contains
       type(function_set_type) :: deflection(2), rotation(2)
       real(wp), allocatable :: lines(:)
       real(wp) :: sides(2)
-      integer :: n(2), i
+      integer :: n(2)
+      integer :: i
 
       n = get_counts(stack, plate, frequency)
       sides = [stack%length, stack%width]
@@ -264,7 +267,7 @@ contains
             rotation(i) = new_cosines(sides(i), n(i))
             cycle
          end if
-         lines = [real(wp) ::]
+         lines = [real(wp) :: ]
          if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
          if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
          associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])

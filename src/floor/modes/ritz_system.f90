@@ -183,8 +183,8 @@ contains
          column_scale = maxval(matrix, dim=1)
          do l = 1, size(matrix, 2)
             do k = 1, size(matrix, 1)
-               if (matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) call merge_functions(first(term%row) + k - 1, &
-                  first(term%column) + l - 1)
+               if (matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) &
+                  call merge_functions(first(term%row) + k - 1, first(term%column) + l - 1)
             end do
          end do
       end subroutine merge_terms
@@ -246,8 +246,8 @@ contains
             block%shape(p)%y = pack([(i, i=1, displacement(p)%y%count)], in_y(first_y(p):first_y(p + 1) - 1))
          end do
          first = get_first([(size(block%shape(p)%x)*size(block%shape(p)%y), p=1, n)])
-         dynamic = [integer ::]
-         static = [integer ::]
+         dynamic = [integer :: ]
+         static = [integer :: ]
          do p = 1, n
             if (displacement(p)%is_static) then
                static = [static, (i, i=first(p), first(p + 1) - 1)]

@@ -101,7 +101,8 @@ contains
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: room
       character(len=warning_length), allocatable :: warnings(:)
-      integer :: n(1), i
+      integer :: n(1)
+      integer :: i
 
       n = size(room%bands)
       call bundle%add_number('room.surface_mass', room%surface_mass)
