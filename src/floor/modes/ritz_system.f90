@@ -183,8 +183,9 @@ contains
          column_scale = maxval(matrix, dim=1)
          do l = 1, size(matrix, 2)
             do k = 1, size(matrix, 1)
-               if (matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) &
-                  call merge_functions(first(term%row) + k - 1, first(term%column) + l - 1)
+               if (matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) then
+                 call merge_functions(first(term%row) + k - 1, first(term%column) + l - 1)
+               end if
             end do
          end do
       end subroutine merge_terms

@@ -115,7 +115,8 @@ contains
       integer :: i
 
       text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
-         //to_text(get_rounded(prediction%rated))//' dB ('//fixed(prediction%interval(1), 0)//' to '//fixed(prediction%interval(2), 0)//'), statistical ' &
+         //to_text(get_rounded(prediction%rated))//' dB ('//fixed(prediction%interval(1), 0)//' to ' &
+         //fixed(prediction%interval(2), 0)//'), statistical ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, modal ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
       text = text//'  Contributions:'
