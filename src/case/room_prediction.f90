@@ -52,6 +52,7 @@ contains
       type(floor_modes_type) :: modes
       type(modal_radiation_type) :: radiation
       type(plate_type) :: plate
+      type(room_level_type) :: bare
       real(wp), allocatable :: level(:), conductance(:), radiation_factor(:)
 
       call get_room_bands(bands, error)
@@ -71,7 +72,9 @@ contains
             if (floor%has_modal_conductance()) conductance = radiation%conductance
          end if
          call get_room_level(plate, conductance, radiation_factor, case%room, bands, level, prediction)
-         call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, prediction, error)
+         call get_room_level(plate, conductance, radiation_factor, get_bare_room(case%room), bands, level, bare)
+         call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, prediction%level - bare%level, &
+            prediction, error)
          if (.not. allocated(error)) call add_contributions(case, plate, conductance, radiation_factor, level, prediction)
       end associate
    end subroutine predict_room
@@ -101,8 +104,19 @@ contains
       end associate
    end function get_box
 
-   !> Levels by the modes of floor and room: as the floor is supported, simply supported and clamped.
-   subroutine add_modal_levels(room, floor, plate, modes, force, sample_rate, prediction, error)
+   !> The room without walls and ceiling.
+   elemental function get_bare_room(room) result(bare)
+      type(room_type), intent(in) :: room
+      type(room_type) :: bare
+
+      bare = room
+      bare%ceiling%mass = 0.0_wp
+      bare%walls%lengths%count = 0
+   end function get_bare_room
+
+   !> Levels by the modes of floor and room: as the floor is supported, simply supported and clamped. Walls and a ceiling
+   !> change them as much as the statistical levels.
+   subroutine add_modal_levels(room, floor, plate, modes, force, sample_rate, change, prediction, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
       type(plate_type), intent(in) :: plate
@@ -110,6 +124,8 @@ contains
       type(floor_modes_type), intent(in) :: modes
       real(wp), intent(in) :: force(:)
       real(wp), intent(in) :: sample_rate
+      !> Change of the statistical levels by walls and ceiling, dB: [n_band].
+      real(wp), intent(in) :: change(:)
       type(room_level_type), intent(inout) :: prediction
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
@@ -129,7 +145,7 @@ contains
       allocate (prediction%modal_spread, source=prediction%spread)
       allocate (prediction%mean_spread, source=prediction%spread/sqrt(real(size(ball, 2), wp)))
       prediction%mean_spread(:modal%n_band) = modal%mean_spread
-      prediction%modal_level(:modal%n_band) = modal%mean
+      prediction%modal_level(:modal%n_band) = modal%mean + change(:modal%n_band)
       prediction%modal_spread(:modal%n_band) = modal%spread
       allocate (prediction%edge_level(size(prediction%level), 2), source=spread(prediction%modal_level, 2, 2))
       do i = 1, 2
@@ -137,7 +153,7 @@ contains
          call floor%get_room_modes(supports(i), other_plate, other_modes, error, get_highest_frequency(box))
          if (allocated(error)) return
          call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., modal)
-         prediction%edge_level(:modal%n_band, i) = modal%mean
+         prediction%edge_level(:modal%n_band, i) = modal%mean + change(:modal%n_band)
       end do
    end subroutine add_modal_levels
 

@@ -267,7 +267,7 @@ contains
             rotation(i) = new_cosines(sides(i), n(i))
             cycle
          end if
-         lines = [real(wp) :: ]
+         lines = spread(0.0_wp, 1, 0)
          if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
          if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
          associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])

@@ -247,8 +247,7 @@ contains
             block%shape(p)%y = pack([(i, i=1, displacement(p)%y%count)], in_y(first_y(p):first_y(p + 1) - 1))
          end do
          first = get_first([(size(block%shape(p)%x)*size(block%shape(p)%y), p=1, n)])
-         dynamic = [integer :: ]
-         static = [integer :: ]
+         allocate (dynamic(0), static(0))
          do p = 1, n
             if (displacement(p)%is_static) then
                static = [static, (i, i=first(p), first(p + 1) - 1)]
