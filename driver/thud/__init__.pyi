@@ -21,6 +21,12 @@ from .export.force_files import (
     BlockedForce as BlockedForce,
     blocked_force as blocked_force,
 )
+from .export.room_sound import (
+    FloorSound as FloorSound,
+    RoomSound as RoomSound,
+    SoundLevels as SoundLevels,
+    listen as listen,
+)
 from .floors.constructions import (
     Construction as Construction,
     Constructions as Constructions,

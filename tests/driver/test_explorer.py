@@ -565,6 +565,19 @@ def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None
     assert "<html" in client.post("/download/report.html", json=values).text
 
 
+def test_sound_in_the_room_is_that_of_the_case(client: TestClient) -> None:
+    values = SHELL | {"floor": {"name": "plate"}, "room": {"volume": 50.0}}
+    answer = client.post("/download/room.wav", json=values)
+    assert answer.headers["content-type"] == "audio/wav"
+    impact = thud.solve(floor=thud.Plate(), room=thud.Room(volume=50.0), model="hollow_sphere")
+    assert answer.content == thud.listen(thud.predict_level(impact)).wav()
+    answer = client.post("/download/room.wav", json=SHELL)
+    assert answer.status_code == 400
+    assert re.search(naming("floor"), answer.text)
+    # The page plays what it has downloaded with its token, and no other sound.
+    assert "media-src blob:;" in client.get("/").headers["content-security-policy"]
+
+
 def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> None:
     values = SHELL | {
         "ball": {"mass": 2.4},

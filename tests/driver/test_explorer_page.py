@@ -293,6 +293,41 @@ def test_construction_fills_floor_and_ceiling(browser: Browser, server: Served) 
     sync_api.expect(chosen).to_have_value("")
 
 
+def test_rooms_of_variants_are_played_at_one_scale(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    page.locator("#has_room").check()
+    buttons = page.locator("#sounds button")
+    sync_api.expect(buttons).to_have_count(1)
+    page.locator("#pin").click()
+    page.locator("#floor").select_option("joist_floor")
+    sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
+    sync_api.expect(buttons).to_have_count(2)
+    volume, address = [], []
+    player = page.locator("#player")
+    for i in (0, 1):
+        buttons.nth(i).click()
+        page.wait_for_function(
+            "([other]) => player.src && player.src !== other && player.currentTime > 0.1",
+            arg=[address[0] if i else ""],
+        )
+        volume.append(player.evaluate("(player) => player.volume"))
+        address.append(player.evaluate("(player) => player.src"))
+    prediction = {
+        floor: thud.predict_level(floor=floor(), room=thud.Room())
+        for floor in (thud.JoistFloor, thud.Plate)
+    }
+    scale = [thud.listen(one).full_scale for one in prediction.values()]
+    assert volume == pytest.approx([1.0, scale[1] / scale[0]])
+    # A removed variant has no sound, and the others are as loud as they were.
+    page.locator("#variants button").click()
+    sync_api.expect(buttons).to_have_count(1)
+    plays = (
+        "(address) => new Promise((done) => { const sound = new Audio(address);"
+        " sound.oncanplay = () => done(true); sound.onerror = () => done(false); })"
+    )
+    assert [page.evaluate(plays, one) for one in address] == [True, False]
+
+
 def test_files_are_downloaded(browser: Browser, server: Served, tmp_path: Path) -> None:
     page = new_page(browser, server[0])
     page.locator("button", has_text="Study").click()

@@ -36,6 +36,7 @@ class Writer(NamedTuple):
 
     words: list[str]
     inputs: dict[str, str | bytes]
+    output: str = "out"
 
 
 def _study(kind: str, text: str) -> Writer:
@@ -71,6 +72,7 @@ WRITERS = {
         {"levels.csv": (REPOSITORY / "inputs/floors/field_levels.csv").read_bytes()},
     ),
     "floor": Writer(["floor", "case.nml"], {"case.nml": FLOOR}),
+    "listen": Writer(["listen", "case.nml"], {"case.nml": FLOOR}, "out/listen.wav"),
     "mobility": Writer(["mobility", "table.csv"], {"table.csv": _mobility()}),
     "sweep": _study("sweep", "parameters.height.values = [0.9, 1.1]"),
     "sensitivity": _study("sensitivity", RANGES + "design.size = 8"),
@@ -123,7 +125,7 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     )
 
     def run(name: str, *more: str) -> int:
-        words = [*WRITERS[name].words, "-q", "-o", "out", *more]
+        words = [*WRITERS[name].words, "-q", "-o", WRITERS[name].output, *more]
         if words[0] != "thud":
             return cli.main(words)
         done = subprocess.run([executable, *words[1:]], check=False, timeout=PATIENCE)

@@ -113,6 +113,7 @@ def slow_calls(folder: Path) -> Calls:
             thud.solve_many({"height": [0.9, 1.0]}, model="finite_element", threads=2).peak_force
         ),
         "modal_room": lambda: str(thud.modal_room(impact, PLATE, ROOM)),
+        "listen": lambda: thud.listen(thud.predict_level(impact, PLATE, ROOM)).wav(),
         "compare": lambda: thud.compare([impact, thud.solve(model="modal_ball")]).rows(),
         "compare_floors": lambda: str(
             thud.compare_floors({"thin": thud.predict_level(impact, PLATE, ROOM)})

@@ -32,7 +32,7 @@ from thud.cli.command import (
     print_immediately,
 )
 from thud.cli.explore_command import EXPLORE
-from thud.cli.floor_commands import FLOOR, MOBILITY, RATE
+from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, RATE
 from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
 from thud.cli.study_commands import study_commands
 from thud.level.levels import FORCES, SOURCES
@@ -125,6 +125,7 @@ COMMANDS = {
     ),
     "rate": RATE,
     "floor": FLOOR,
+    "listen": LISTEN,
     "mobility": MOBILITY,
     **study_commands(),
     "examples": EXAMPLES,
@@ -148,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             after_interrupt = command.after_interrupt
             folder = getattr(options, "output", None)
             if folder is not None and not folder.strip():
-                message = "--output has no value; allowed: a directory"
+                message = "--output has no value; allowed: a path"
                 raise InputError(message)
             with print_immediately():
                 code = command.function(options)

@@ -52,16 +52,14 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(message) from error
 
 
+REPLACE = argument(
+    "--replace", action="store_true", help="also replace files that were not written by thud"
+)
+
+
 def output(meaning: str) -> tuple[Argument, Argument]:
     """Return the arguments of a command that writes results."""
-    return (
-        argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}"),
-        argument(
-            "--replace",
-            action="store_true",
-            help="also replace files that were not written by thud",
-        ),
-    )
+    return argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}"), REPLACE
 
 
 def results_of(

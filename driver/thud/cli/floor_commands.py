@@ -1,21 +1,25 @@
-"""Commands on floors and rooms: compare floors, rate levels, fit a mobility."""
+"""Commands on floors and rooms: compare floors, listen, rate levels, fit a mobility."""
 
 from __future__ import annotations
 
 import sys
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.base.errors import PlausibilityWarning
+from thud.base.files import Results
 from thud.base.tables import format_rows
 from thud.case.case import read_case
 from thud.cli.command import (
     NO_FIGURES,
     PAGE,
     QUIET,
+    REPLACE,
     Command,
     argument,
+    number,
     output,
     print_notes,
     results_of,
@@ -27,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.case.case import Case
+    from thud.floors.floor_comparison import FloorComparison
 
 
 def compare_floor_cases(options: argparse.Namespace) -> int:
@@ -35,7 +40,6 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     With ``--list`` print the constructions of the library instead.
     """
     from thud.floors.constructions import constructions
-    from thud.floors.floor_comparison import compare_floors
 
     if options.list is not None:
         print(format_rows(constructions(options.list).rows()))
@@ -43,16 +47,23 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     files = [name for name in options.construction if name.endswith(".toml")]
     results = results_of(options, "floors", [*options.cases, *files])
     results.require(f"floors{ending}" for ending in PAGE)
-    cases = _floor_cases(options.cases, options.construction)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PlausibilityWarning)
-        comparison = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
+    comparison = _compare(options)
     print_notes(comparison.warnings)
     paths = results.write(comparison.files())
     if not options.quiet:
         print(format_rows(comparison.rows()))
         print(f"Page: {paths[-1]}")
     return 0
+
+
+def _compare(options: argparse.Namespace) -> FloorComparison:
+    """Return the predictions of the cases and constructions of a command."""
+    from thud.floors.floor_comparison import compare_floors
+
+    cases = _floor_cases(options.cases, options.construction)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)
+        return compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
 
 
 def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
@@ -76,22 +87,28 @@ def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
         if chosen.note:
             print_notes([f"{chosen.name}: {chosen.note}"])
     if not cases:
-        refuse("no floor is stated", "case files, --construction NAME, or --list")
+        refuse(
+            "no floor is stated",
+            "case files, or --construction NAME; `thud-driver floor --list` lists the names",
+        )
     return cases
 
 
+FLOORS = (
+    argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
+    argument(
+        "--construction",
+        action="append",
+        default=[],
+        metavar="NAME|FILE.toml",
+        help="also a construction of the library or of a file, with ball, drop, model and room "
+        "of the first case (default: a ball that conforms); may be repeated",
+    ),
+)
 FLOOR = Command(
     "compare floors and rooms of several cases and constructions on one page",
     (
-        argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
-        argument(
-            "--construction",
-            action="append",
-            default=[],
-            metavar="NAME|FILE.toml",
-            help="also a construction of the library or of a file, with ball, drop, model and room "
-            "of the first case (default: a ball that conforms); may be repeated",
-        ),
+        *FLOORS,
         argument(
             "--list",
             nargs="?",
@@ -103,6 +120,72 @@ FLOOR = Command(
         QUIET,
     ),
     compare_floor_cases,
+    "nothing is written",
+)
+
+
+def listen_to_cases(options: argparse.Namespace) -> int:
+    """Write the sounds below the floors of cases, print their levels; return the exit code."""
+    from thud.export.room_sound import NOTE, listen
+
+    path = Path(options.output or Path("outputs", "listen", "listen.wav"))
+    if path.suffix.lower() != ".wav":
+        refuse(f"--output {path} is not a sound file", "a name that ends with .wav")
+    files = [name for name in options.construction if name.endswith(".toml")]
+    inputs = (*options.cases, *files)
+    results = Results(path.parent, options.name, inputs, replace=options.replace)
+    results.require([path.name])
+    sound = listen(
+        _compare(options).predictions,
+        position=options.position,
+        pause=options.pause,
+        repeat=options.repeat,
+        seed=options.seed,
+    )
+    print_notes(sound.warnings)
+    results.write({path.name: sound.wav()})
+    if not options.quiet:
+        print(format_rows(sound.rows()))
+        print(f"Sound: {path}, full scale {sound.full_scale:g} Pa\nThe sound is {NOTE}.")
+    return 0
+
+
+LISTEN = Command(
+    "sound of the impacts in the rooms below, as a calibrated WAV file",
+    (
+        *FLOORS,
+        argument(
+            "-o",
+            "--output",
+            metavar="FILE.wav",
+            help="the sound (default: outputs/listen/listen.wav)",
+        ),
+        REPLACE,
+        argument(
+            "--position",
+            nargs=2,
+            type=int,
+            metavar=("BALL", "MICROPHONE"),
+            help="numbers of positions, from 1 (default: levels nearest to the mean)",
+        ),
+        argument(
+            "--pause",
+            type=number,
+            default=1.0,
+            metavar="S",
+            help="time between the end of a sound and the next impact (default: 1 s)",
+        ),
+        argument(
+            "--repeat",
+            type=int,
+            default=1,
+            metavar="N",
+            help="repetitions of all floors in their order (default: 1)",
+        ),
+        argument("--seed", type=int, default=0, metavar="N", help="seed of the noise (default: 0)"),
+        QUIET,
+    ),
+    listen_to_cases,
     "nothing is written",
 )
 

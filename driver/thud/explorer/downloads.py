@@ -1,4 +1,4 @@
-"""Files to download from the page: case, force, report, and a study of changed keys."""
+"""Files for the page: case, force, report, sound, and a study of changed keys."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from thud.case.case import check_case
 from thud.case.keys import find_key, key_owners, known_keys
 from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
+from thud.export.room_sound import listen
+from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.plot.pages import comparison_html
 
@@ -61,6 +63,11 @@ def report(values: Values) -> bytes:
     return comparison_html(
         comparison.impacts, None, source, comparison.rows(), comparison.reasons
     ).encode()
+
+
+def sound(values: Values) -> bytes:
+    """Return the sound in the room below as a WAV file, whose comment states its full scale."""
+    return listen(predict_level(compute(new_case(values)))).wav()
 
 
 def study(values: Values) -> bytes:
@@ -120,5 +127,6 @@ DOWNLOADS: dict[str, tuple[Callable[[Values], bytes], str]] = {
     "case.nml": (namelist, "text/plain"),
     "force.csv": (force, "text/csv"),
     "report.html": (report, "text/html"),
+    "room.wav": (sound, "audio/wav"),
     "study.toml": (study, "application/toml"),
 }

@@ -49,9 +49,9 @@ QUICK_TIME_LIMIT = 1.0
 # Files of the page, by name.
 FILES = {file.name: file for file in (resources.files("thud.explorer") / "page").iterdir()}
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-# The page loads files of this server only.
+# The page loads files of this server only; it plays sounds that it has downloaded with its token.
 POLICY = (
-    "default-src 'self'; img-src 'self' data:; "
+    "default-src 'self'; img-src 'self' data:; media-src blob:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
 HEADERS = {

@@ -2,6 +2,7 @@
 import { addRoom, build, buildRecording, caseValues, describeChanges, fillConstruction, isCase, markField, startWith, state, titleOf } from "./form.js";
 import { byId, element } from "./page.js";
 import { listenToBall } from "./ball.js";
+import { showSounds } from "./listen.js";
 import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
 import { show } from "./results.js";
 
@@ -70,9 +71,10 @@ async function solve() {
   const thisJob = { controller: new AbortController(), slow: false, repeat: false, start: performance.now() };
   job = thisJob;
   try {
-    const answer = await runTask("Computing", "solve", JSON.stringify(caseValues()), thisJob.controller, { onReport: () => { thisJob.slow = true; } });
+    const values = caseValues();
+    const answer = await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; } });
     hideMessage();
-    current = { name: titleOf("model", state.model), short: titleOf("model", state.model), description: describeChanges(), answer, slow: thisJob.slow };
+    current = { name: titleOf("model", state.model), short: titleOf("model", state.model), description: describeChanges(), values, answer, slow: thisJob.slow };
     refresh();
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
@@ -131,7 +133,9 @@ async function download(name) {
 }
 
 function refresh() {
-  show(current ? [current, ...pinned] : pinned, (variant) => { pinned.splice(pinned.indexOf(variant), 1); refresh(); });
+  const variants = current ? [current, ...pinned] : pinned;
+  show(variants, (variant) => { pinned.splice(pinned.indexOf(variant), 1); refresh(); });
+  showSounds(variants, showError);
 }
 
 // ---- Events.

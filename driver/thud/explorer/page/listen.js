@@ -1,0 +1,56 @@
+// Sound in the room below: a button for each variant with a room, and a player.
+import { byId, element } from "./page.js";
+import { swatch } from "./plot.js";
+import { ask } from "./request.js";
+
+const NOTE = "Computed, not recorded: no measured room, no furniture, no listener's head; 50 to 630 Hz. The levels of all variants have the same scale: set the volume for the loudest.";
+// Address and full scale, Pa, of each downloaded sound by the text of its case.
+const sounds = new Map();
+
+/** Show the buttons of the variants with a room; the sounds of removed variants are discarded. */
+export function showSounds(variants, onError) {
+  const rooms = variants.filter((variant) => variant.answer.room);
+  const cases = rooms.map(caseOf);
+  for (const [text, { address }] of sounds) {
+    if (cases.includes(text)) continue;
+    URL.revokeObjectURL(address);
+    sounds.delete(text);
+  }
+  byId("sounds_text").textContent = NOTE;
+  byId("sounds").replaceChildren(...rooms.map((variant) => {
+    const button = element("button", { type: "button" }, swatch(variants.indexOf(variant)), ` Listen to ${variant.short}`);
+    button.addEventListener("click", () => play(variant, rooms).catch(onError));
+    return button;
+  }));
+}
+
+const caseOf = (variant) => JSON.stringify(variant.values);
+
+async function play(variant, rooms) {
+  byId("sounds_text").textContent = "Computing the sound …";
+  try {
+    // All sounds, since the loudest one determines the volume of the others.
+    await Promise.all(rooms.map(load));
+  } finally {
+    byId("sounds_text").textContent = NOTE;
+  }
+  const scales = rooms.map((room) => sounds.get(caseOf(room))?.fullScale ?? 0);
+  const sound = sounds.get(caseOf(variant));
+  // The variant was removed meanwhile.
+  if (!sound) return;
+  const player = byId("player");
+  player.hidden = false;
+  player.src = sound.address;
+  player.volume = sound.fullScale / Math.max(...scales);
+  // A browser may refuse to play long after the click; the player has a button of its own.
+  player.play().catch(() => {});
+}
+
+async function load(variant) {
+  const text = caseOf(variant);
+  if (sounds.has(text)) return;
+  const response = await ask("download/room.wav", { method: "POST", body: text });
+  const content = await response.blob();
+  const [, fullScale] = (await content.slice(0, 1000).text()).match(/full scale (\S+) Pa/);
+  sounds.set(text, { address: URL.createObjectURL(content), fullScale: Number(fullScale) });
+}

@@ -1,0 +1,282 @@
+"""The sound in the room below: levels by other instruments, decays, files, commands."""
+
+from __future__ import annotations
+
+import io
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyoctaveband
+import pytest
+import soundfile
+from conftest import MINIMAL, naming
+from scipy.signal import resample
+
+import thud
+from thud.cli import main
+from thud.export import room_sound
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+RATE = 48000
+ROOM = thud.Room(volume=50.0, reverberation_time=0.5)
+FLOORS = {"concrete": thud.Plate(thickness=0.18), "joists": thud.JoistFloor()}
+# IEC 61672-1 annex E: the A-weighting at the exact mid frequencies of the thirds 50 to 630 Hz.
+CENTER = 1000 * 10 ** (np.arange(-13, -1) / 10)
+
+
+def a_weighting(frequency: Array) -> Array:
+    """Return the factors of energy of the A-weighting."""
+    square = frequency**2
+    ratio = 12194.22**2 * square**2 / (square + 20.6**2) / (square + 12194.22**2)
+    ratio /= np.sqrt((square + 107.65**2) * (square + 737.86**2))
+    return np.asarray((ratio * 10 ** (2.0 / 20)) ** 2)
+
+
+def level(square: Array) -> Array:
+    return np.asarray(10 * np.log10(square.max(axis=-1) / 4e-10))
+
+
+def fast_history(pressure: Array) -> Array:
+    return np.asarray(pyoctaveband.time_weighting(pressure, RATE, "fast"))
+
+
+def library_histories(pressure: Array, fraction: int) -> Array:
+    """Return the Fast histories, Pa2, of octaves 63 to 500 Hz or thirds 50 to 630 Hz."""
+    limits = {1: [60, 600], 3: [48, 660]}[fraction]
+    bands = pyoctaveband.octavefilter(
+        pressure, RATE, fraction=fraction, limits=limits, sigbands=True
+    )[2]
+    return np.array([fast_history(band) for band in bands[-4 * fraction :]])
+
+
+def octave_sums(thirds: Array) -> Array:
+    return np.asarray(thirds.reshape(4, 3, -1).sum(axis=1))
+
+
+@pytest.fixture(scope="module")
+def predictions() -> dict[str, thud.RoomPrediction]:
+    return {name: thud.predict_level(floor=floor, room=ROOM) for name, floor in FLOORS.items()}
+
+
+@pytest.fixture(scope="module")
+def found(predictions: dict[str, thud.RoomPrediction]) -> thud.RoomSound:
+    return thud.listen(predictions)
+
+
+@pytest.mark.parametrize("name", FLOORS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_levels_by_another_instrument_are_those_predicted(
+    predictions: dict[str, thud.RoomPrediction], name: str, seed: int, oracle: Callable[..., None]
+) -> None:
+    """Octaves and A-weighted level of the file by PyOctaveBand, within 0.5 dB."""
+    prediction = predictions[name]
+    sound = thud.listen({name: prediction}, seed=seed)
+    samples, rate = soundfile.read(io.BytesIO(sound.wav()))
+    assert rate == RATE
+    pressure = samples * sound.full_scale
+    # What the bands should be: the modal pressure by the library, and the statistical histories.
+    (only,) = sound.sounds
+    n = prediction.n_modal
+    assert 0 < n == only.n_modal < 12
+    room = thud.modal_room(prediction.source, FLOORS[name], ROOM)
+    i, j = np.array(only.position) - 1
+    modal = room.pressure[i, j]
+    modal = resample(modal, round(len(modal) * RATE / room.sample_rate))
+    modal = np.append(modal, np.zeros(len(pressure)))[: len(pressure)]
+    time = np.arange(1, len(pressure) + 1) / RATE
+    bands = library_histories(modal, 3)
+    for k in range(n, 12):
+        history = 4e-10 * 10 ** (prediction.history[:, k] / 10)
+        bands[k] = np.interp(time, prediction.history_time, history, left=0.0, right=0.0)
+    octaves = level(octave_sums(bands))
+    oracle(
+        "octaves of the sound below a floor, by PyOctaveBand",
+        "independent code",
+        level(octave_sums(library_histories(pressure, 3))) - octaves,
+        0.5,
+        "dB",
+    )
+    # Filters of octaves also let through some of a louder octave beside theirs.
+    above = level(library_histories(pressure, 1)) - octaves
+    assert above.min() > -0.5
+    assert above.max() < 1.0
+    fast = fast_history(pyoctaveband.WeightingFilter(RATE, "A").filter(pressure))
+    oracle(
+        "L_AFmax of the sound below a floor, by PyOctaveBand",
+        "independent code",
+        level(fast) - level(a_weighting(CENTER) @ bands),
+        0.5,
+        "dB",
+    )
+    # Class 1 filters of thud and of the library differ by their skirts, beside loud bands.
+    assert only.reference.third[:n] == pytest.approx(room.level[i, j], abs=0.05)
+    assert only.reference.third[n:] == pytest.approx(prediction.level[n:], abs=0.01)
+    assert only.level.third[n:] == pytest.approx(prediction.level[n:], abs=0.1)
+    assert only.level.octave == pytest.approx(only.reference.octave, abs=0.25)
+    assert only.level.a_weighted == pytest.approx(level(fast), abs=0.1)
+
+
+def test_noise_decays_as_floor_and_room_do(predictions: dict[str, thud.RoomPrediction]) -> None:
+    """Two exponentials, with the rates omega eta of the floor and 6 ln 10/T of the room."""
+    prediction = predictions["concrete"]
+    square = room_sound._mean_square(prediction)  # noqa: SLF001
+    time = prediction.history_time - prediction.history_time[0] / 2
+    floor = 2 * np.pi * CENTER * prediction.loss_factor
+    room = 6 * np.log(10) / prediction.reverberation_time
+    # 20 dB below the maximum; the energy that flows back to the floor changes low bands.
+    shown = slice(2, 60)
+    closed = abs(np.exp(-np.outer(time, floor)) - np.exp(-np.outer(time, room)))[shown]
+    deviation = 10 * np.log10(square[shown] / closed)
+    deviation -= deviation.mean(axis=0)
+    assert abs(deviation).max() < 0.15
+    # The decay ends 60 dB below the maximum, also after long reverberation.
+    long = replace(prediction, history=prediction.history)
+    assert (room_sound._mean_square(long)[-1] <= 1.01e-6 * square.max(axis=0)).all()  # noqa: SLF001
+
+
+def test_decay_continues_beyond_the_history() -> None:
+    room = replace(ROOM, reverberation_time=4.0)
+    square = room_sound._mean_square(thud.predict_level(floor=FLOORS["concrete"], room=room))  # noqa: SLF001
+    step = 0.005
+    decay = 10 * np.log10(square[300:-50:50] / square[350::50][: len(square[300:-50:50])])
+    loud = square[350::50][: len(decay)] > 1e-5 * square.max(axis=0)
+    # 60 dB in 4 s; less in bands whose floor returns energy.
+    assert decay[loud] == pytest.approx(50 * step * 60 / 4.0, rel=0.03)
+    assert len(square) * step == pytest.approx(4.0, rel=0.15)
+
+
+def test_floors_follow_each_other_at_one_scale(
+    predictions: dict[str, thud.RoomPrediction], found: thud.RoomSound
+) -> None:
+    first, second = found.sounds
+    twice = thud.listen(predictions, pause=0.25, repeat=2)
+    assert twice.order == ("concrete", "joists", "concrete", "joists")
+    assert len(set(np.diff(twice.starts).round(6))) == 2
+    gap = RATE // 4
+    for start, sound in zip(twice.starts, (first, second) * 2, strict=True):
+        at = round(start * RATE)
+        end = at + len(sound.pressure)
+        assert (twice.pressure[at:end] == sound.pressure).all()
+        assert not twice.pressure[end : end + gap].any()
+    assert len(twice.pressure) == end
+    peak = abs(found.pressure).max()
+    assert peak < found.full_scale <= 2.5 * peak
+    assert thud.listen(predictions["concrete"]).full_scale < found.full_scale
+    assert found.rows()[1][:2] == ("0.000", "concrete")
+    assert all(name in repr(found) for name in FLOORS)
+    assert "concrete" in repr(first)
+    assert f"{first.level.a_weighted:.1f} dB" in repr(first.level)
+    assert [f.pressure.tolist() for f in thud.listen(predictions).sounds] == [
+        first.pressure.tolist(), second.pressure.tolist()
+    ]  # fmt: skip
+    other = thud.listen(predictions, seed=1).sounds[0]
+    assert (other.pressure != first.pressure).any()
+
+
+def test_file_states_scale_contents_and_limits(found: thud.RoomSound, tmp_path: Path) -> None:
+    path = tmp_path / "sound.wav"
+    found.write(path)
+    with soundfile.SoundFile(path) as file:
+        assert (file.subtype, file.channels, file.samplerate) == ("PCM_24", 1, RATE)
+        samples = file.read()
+        comment = file.comment
+        assert file.software.startswith(f"thud {thud.__version__}")
+    assert samples * found.full_scale == pytest.approx(
+        found.pressure, abs=0.51 * found.full_scale / 2**23
+    )
+    assert comment == found.comment
+    for words in (
+        f"full scale {found.full_scale:g} Pa", "0.000 s concrete",
+        f"{found.starts[1]:.3f} s joists", "50 to 630 Hz", "not recorded", "no furniture",
+        "no listener's head",
+    ):  # fmt: skip
+        assert words in comment
+
+
+def test_position_is_chosen(predictions: dict[str, thud.RoomPrediction]) -> None:
+    prediction = predictions["concrete"]
+    room = thud.modal_room(prediction.source, FLOORS["concrete"], ROOM)
+    (sound,) = thud.listen(prediction).sounds
+    distance = np.linalg.norm(room.level - room.mean, axis=2)
+    i, j = np.array(sound.position) - 1
+    assert distance[i, j] == pytest.approx(distance.min())
+    (sound,) = thud.listen(prediction, position=(1, 5)).sounds
+    assert sound.position == (1, 5)
+    n = sound.n_modal
+    assert sound.reference.third[:n] == pytest.approx(room.level[0, 4], abs=0.05)
+
+
+def test_ceiling_that_the_modes_lack_makes_noise_of_all_bands() -> None:
+    room = replace(ROOM, ceiling_mass=9.0, ceiling_depth=0.2)
+    prediction = thud.predict_level(floor=FLOORS["concrete"], room=room)
+    sound = thud.listen({"below": prediction})
+    (only,) = sound.sounds
+    assert (only.n_modal, only.position) == (0, None)
+    assert only.reference.third == pytest.approx(prediction.level, abs=0.01)
+    assert only.level.octave == pytest.approx(prediction.octave_level, abs=0.5)
+    assert "noise from 50 to 630 Hz" in sound.comment
+    assert any(re.search(naming("below", "ceiling", "noise"), one) for one in sound.warnings)
+
+
+def test_bands_that_cannot_be_reached_are_said(found: thud.RoomSound) -> None:
+    sound = found.sounds[0]
+    louder = replace(sound.reference, a_weighted=sound.level.a_weighted + 0.7)
+    (*_, last) = replace(sound, reference=louder).warnings
+    assert re.search(naming("concrete", "deviates", "0.7 dB"), last)
+    assert not any("deviates" in one for one in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"pause": -1.0}, naming("pause", -1.0, 0, 60)),
+        ({"pause": float("nan")}, naming("pause")),
+        ({"repeat": 0}, naming("repeat", 0, 1, 100)),
+        ({"repeat": 100, "pause": 60.0}, naming("sound", "600 s")),
+        ({"seed": -1}, naming("seed", -1)),
+        ({"position": (0, 1)}, naming("ball", 0, 1, 5)),
+        ({"position": (1, 6)}, naming("microphone", 6, 1, 5)),
+        ({"position": 3}, naming("position", 3)),
+        ({"predictions": []}, naming("predictions", "RoomPrediction")),
+        ({"predictions": [1]}, naming("floor 1", 1, "RoomPrediction")),
+        ({"predictions": 1}, naming("predictions", 1, "RoomPrediction")),
+    ],
+)
+def test_wrong_arguments_get_a_sentence(
+    predictions: dict[str, thud.RoomPrediction], settings: dict[str, object], words: str
+) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.listen(**{"predictions": predictions["concrete"]} | settings)  # type: ignore[arg-type]
+
+
+def test_command_writes_a_file_and_says_what_it_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    paths = []
+    for name, floor in (("slab", "plate"), ("joists", "joist_floor")):
+        paths.append(str(tmp_path / f"{name}.nml"))
+        (tmp_path / f"{name}.nml").write_text(
+            f"{MINIMAL}&floor name = '{floor}' / &room volume = 40 /"
+        )
+    target = str(tmp_path / "ab.wav")
+    assert main(["listen", *paths, "-o", target, "--pause", "0.5", "--position", "1", "2"]) == 0
+    shown = capsys.readouterr().out
+    for words in ("slab", "joists", "0.000", "1, 2", "full scale", "not recorded"):
+        assert words in shown
+    assert shown.count("not recorded") == 1
+    assert soundfile.info(target).samplerate == RATE
+    assert main(["listen", paths[0], "-o", str(tmp_path / "ab.mp3")]) == 1
+    assert re.search(naming("--output", "wav"), capsys.readouterr().err.partition(": ")[2])
+    assert main(["listen", paths[0], "-q", "-o", target, "--pause", "-1"]) == 1
+    construction = ["listen", "--construction", "no such floor", "-o", target]
+    assert main(construction) == 1
+    assert re.search(naming("no such floor"), capsys.readouterr().err.partition(": ")[2])
