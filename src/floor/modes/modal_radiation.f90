@@ -29,6 +29,13 @@ module thud_modal_radiation
    !> Modes up to this ratio of frequencies take part in a band, and all modes up to this angular frequency, rad/s.
    real(wp), parameter :: max_ratio = 2.5_wp, min_highest = 2*pi*500.0_wp
 
+   !> Number of modes above which only those within a ratio of frequencies to the band take part.
+   integer, parameter :: max_modes = 2000
+   real(wp), parameter :: near_ratio = 1.3_wp
+
+   !> Maximum number of directions of a quadrature: on large floors, the mean over many modes needs no more.
+   integer, parameter :: max_directions = 40
+
    !> Parity of a product of functions about the center: even or odd in x and in y.
    integer, parameter :: n_parity = 4
 
@@ -86,6 +93,9 @@ contains
       do i = 1, size(bands)
          kept = pack([(k, k=1, size(modes%omega))], &
             modes%omega < min(modes%limit, max(max_ratio*2*pi*bands(i)%upper, min_highest)))
+         ! Of so many modes, those far from the band matter little.
+         if (size(kept) > max_modes) kept = pack(kept, modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio &
+            .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
          omega = modes%omega(kept)
          loss_factor = modes%loss_factor(kept)
          if (allocated(all_drives)) then
@@ -245,7 +255,7 @@ contains
       integer :: i, j, k, p, n, n_wave, first
 
       ! A quadrant is enough: squares of the four parities add up. Products of two transforms are resolved.
-      n = 6 + int(wavenumber*max(area(2) - area(1), area(4) - area(3))/2)
+      n = min(6 + int(wavenumber*max(area(2) - area(1), area(4) - area(3))/2), max_directions)
       call get_quadrature(n, 0.0_wp, pi/2, theta, theta_weight)
       call get_quadrature(n, 0.0_wp, pi/2, phi, phi_weight)
       kx = [((wavenumber*sin(theta(i))*cos(phi(j)), i=1, n), j=1, n)]
