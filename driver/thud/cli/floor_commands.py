@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.case.case import Case
+    from thud.floors.constructions import Construction
 
 
 def compare_floor_cases(options: argparse.Namespace) -> int:
@@ -43,7 +46,7 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     files = [name for name in options.construction if name.endswith(".toml")]
     results = results_of(options, "floors", [*options.cases, *files])
     results.require(f"floors{ending}" for ending in PAGE)
-    cases = _floor_cases(options.cases, options.construction)
+    cases, _ = _floor_cases(options.cases, options.construction)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         comparison = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
@@ -55,11 +58,49 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     return 0
 
 
-def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
-    """Return the cases of files, and of constructions with the source and room of the first."""
+def predict(options: argparse.Namespace) -> int:
+    """Predict the levels below floors, print and save them; return the exit code."""
+    from thud.floors.floor_comparison import compare_floors
+    from thud.report.floor_files import contents, file_names, screen_text
+    from thud.report.predicted_floor import PredictedFloor
+
+    files = [name for name in options.construction if name.endswith(".toml")]
+    results = results_of(options, "prediction", [*options.cases, *files])
+    cases, chosen = _floor_cases(options.cases, options.construction)
+    # Names of files, whatever a case is named.
+    names = {name: re.sub(r"\W+", "_", case.name) for name, case in cases.items()}
+    for file, count in Counter(names.values()).items():
+        if count > 1:
+            refuse(f"{count} floors would have the file {file}.html", "different names")
+    results.require(file_names(names.values(), report=options.report))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)
+        comparison = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
+    floors = [
+        PredictedFloor(name.replace("_", " "), names[name], prediction, chosen.get(name))
+        for name, prediction in comparison.predictions.items()
+    ]
+    written = contents(floors, results.folder, report=options.report)
+    results.write(written, stale=file_names(names.values()))
+    if not options.quiet:
+        print("\n\n".join(map(screen_text, floors)))
+    print_notes(comparison.warnings)
+    if not options.quiet:
+        print(f"Results: {results.folder}")
+    return 0
+
+
+def _floor_cases(
+    paths: Iterable[str], names: Iterable[str]
+) -> tuple[dict[str, Case], dict[str, Construction]]:
+    """Return the cases of files, and of constructions with the source and room of the first.
+
+    Both are by their names; the constructions themselves are returned, too.
+    """
     from thud.floors.constructions import construction
 
     cases: dict[str, Case] = {}
+    chosen: dict[str, Construction] = {}
 
     def add(name: str, origin: str, case: Case) -> None:
         if name in cases:
@@ -71,27 +112,31 @@ def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
         add(case.name, path, case)
     first = next(iter(cases.values()), None)
     for name in names:
-        chosen = construction(name)
-        add(chosen.name, f"--construction {name}", chosen.case(first))
-        if chosen.note:
-            print_notes([f"{chosen.name}: {chosen.note}"])
+        entry = construction(name)
+        add(entry.name, f"--construction {name}", entry.case(first))
+        chosen[entry.name] = entry
+        if entry.note:
+            print_notes([f"{entry.name}: {entry.note}"])
     if not cases:
         refuse("no floor is stated", "case files, --construction NAME, or --list")
-    return cases
+    return cases, chosen
 
 
+_FLOORS = (
+    argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
+    argument(
+        "--construction",
+        action="append",
+        default=[],
+        metavar="NAME|FILE.toml",
+        help="also a construction of the library or of a file, with ball, drop, model and room "
+        "of the first case (default: a ball that conforms); may be repeated",
+    ),
+)
 FLOOR = Command(
     "compare floors and rooms of several cases and constructions on one page",
     (
-        argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
-        argument(
-            "--construction",
-            action="append",
-            default=[],
-            metavar="NAME|FILE.toml",
-            help="also a construction of the library or of a file, with ball, drop, model and room "
-            "of the first case (default: a ball that conforms); may be repeated",
-        ),
+        *_FLOORS,
         argument(
             "--list",
             nargs="?",
@@ -103,6 +148,23 @@ FLOOR = Command(
         QUIET,
     ),
     compare_floor_cases,
+    "nothing is written",
+)
+
+
+PREDICT = Command(
+    "level in the room below each floor, with its interval, tables and a report",
+    (
+        *_FLOORS,
+        argument(
+            "--report",
+            action="store_true",
+            help="also two pages for each floor (PDF, HTML), and what would change its rating",
+        ),
+        *output("the results (default: outputs/prediction)"),
+        QUIET,
+    ),
+    predict,
     "nothing is written",
 )
 
