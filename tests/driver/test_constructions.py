@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, names_in, naming
+from test_figure_look import assert_clean
 
 import thud
 from thud import cli
@@ -217,12 +218,22 @@ def test_rows_state_value_unit_and_source() -> None:
     assert rows["edges"][0] == "building"
 
 
-def test_section_has_a_bar_and_a_label_for_each_layer() -> None:
-    entry = thud.construction("joists, 3 boards, resilient subceiling")
-    (axes,) = entry.plot().axes
-    heights = [bar.get_height() for bar in axes.patches]  # type: ignore[attr-defined]
-    assert heights == pytest.approx([layer.thickness for layer in entry.layers])
-    assert [text.get_text() for text in axes.texts] == list(map(str, entry.layers))
+def test_section_is_to_scale_and_names_each_layer() -> None:
+    entry = thud.construction("joists, 3 boards, rigid subceiling")
+    figure = entry.plot()
+    assert_clean(figure)
+    (axes,) = figure.axes
+    boxes = [patch.get_window_extent() for patch in axes.patches]
+    # Two joists and two battens stand in the drawn piece of 0.8 m.
+    scale = boxes[0].width / 0.8
+    thicknesses = [0.0125, 0.0125, 0.022, 0.22, 0.22, 0.024, 0.024, 0.0125]
+    assert [box.height for box in boxes] == pytest.approx([scale * size for size in thicknesses])
+    assert boxes[3].width == pytest.approx(0.06 * scale)
+    assert boxes[4].x0 - boxes[3].x0 == pytest.approx(0.4 * scale)
+    shown = [" ".join(text.get_text().split()) for text in axes.texts]
+    assert shown == [entry.name, *map(str, entry.layers), "200 mm"]
+    bar = axes.lines[-1].get_window_extent()
+    assert bar.width == pytest.approx(0.2 * scale, rel=0.02)
 
 
 def test_file_of_a_user_is_a_construction(tmp_path: Path) -> None:

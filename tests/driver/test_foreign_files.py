@@ -73,6 +73,7 @@ WRITERS = {
     ),
     "floor": Writer(["floor", "case.nml"], {"case.nml": FLOOR}),
     "listen": Writer(["listen", "case.nml"], {"case.nml": FLOOR}, "out/listen.wav"),
+    "predict": Writer(["predict", "case.nml", "--report"], {"case.nml": FLOOR}),
     "mobility": Writer(["mobility", "table.csv"], {"table.csv": _mobility()}),
     "sweep": _study("sweep", "parameters.height.values = [0.9, 1.1]"),
     "sensitivity": _study("sensitivity", RANGES + "design.size = 8"),
@@ -122,6 +123,10 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
     monkeypatch.setattr(
         "thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"}
+    )
+    monkeypatch.setattr("thud.report.predicted_floor.PredictedFloor.changes", ())
+    monkeypatch.setattr(
+        "thud.report.floor_files.page_contents", lambda floor, _: {f"{floor.file}.html": b"page"}
     )
 
     def run(name: str, *more: str) -> int:

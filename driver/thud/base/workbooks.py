@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 from typing import TYPE_CHECKING, TypeGuard
 from xml.etree.ElementTree import ParseError
@@ -13,7 +14,7 @@ from thud.base.extras import require_extra
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -45,6 +46,29 @@ def read_workbook(
         if any(_is_number(cell) for row in rows for cell in row):
             return _split(f"{path}, sheet {name!r}", rows, allowed)
     return refuse(f"{path}: cannot be read (no numbers)", allowed)
+
+
+def workbook(sheets: Mapping[str, Iterable[Sequence[str | float]]]) -> bytes:
+    """Return a workbook of tables by the names of their sheets, each with a header row.
+
+    Raise InputError if openpyxl is not installed.
+    """
+    with require_extra("workbooks"):
+        import openpyxl
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(list(row))
+            for cell in sheet[sheet.max_row]:
+                # A text that begins with an equals sign is no formula.
+                if isinstance(cell.value, str):
+                    cell.data_type = "s"
+        sheet.freeze_panes = "B2"
+    content = io.BytesIO()
+    book.save(content)
+    return content.getvalue()
 
 
 def _split(

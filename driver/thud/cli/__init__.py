@@ -32,7 +32,7 @@ from thud.cli.command import (
     print_immediately,
 )
 from thud.cli.explore_command import EXPLORE
-from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, RATE
+from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
 from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
 from thud.cli.study_commands import study_commands
 from thud.level.levels import FORCES, SOURCES
@@ -126,6 +126,7 @@ COMMANDS = {
     "rate": RATE,
     "floor": FLOOR,
     "listen": LISTEN,
+    "predict": PREDICT,
     "mobility": MOBILITY,
     **study_commands(),
     "examples": EXAMPLES,

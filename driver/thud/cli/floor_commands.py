@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.case.case import Case
+    from thud.floors.constructions import Construction
     from thud.floors.floor_comparison import FloorComparison
 
 
@@ -47,7 +50,8 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     files = [name for name in options.construction if name.endswith(".toml")]
     results = results_of(options, "floors", [*options.cases, *files])
     results.require(f"floors{ending}" for ending in PAGE)
-    comparison = _compare(options)
+    cases, _ = _floor_cases(options.cases, options.construction)
+    comparison = _compare(cases, options)
     print_notes(comparison.warnings)
     paths = results.write(comparison.files())
     if not options.quiet:
@@ -56,21 +60,55 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     return 0
 
 
-def _compare(options: argparse.Namespace) -> FloorComparison:
-    """Return the predictions of the cases and constructions of a command."""
+def _compare(cases: dict[str, Case], options: argparse.Namespace) -> FloorComparison:
+    """Return the predictions of cases, with progress on a terminal."""
     from thud.floors.floor_comparison import compare_floors
 
-    cases = _floor_cases(options.cases, options.construction)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         return compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
 
 
-def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
-    """Return the cases of files, and of constructions with the source and room of the first."""
+def predict(options: argparse.Namespace) -> int:
+    """Predict the levels below floors, print and save them; return the exit code."""
+    from thud.report.floor_files import contents, file_names, screen_text
+    from thud.report.predicted_floor import PredictedFloor
+
+    files = [name for name in options.construction if name.endswith(".toml")]
+    results = results_of(options, "prediction", [*options.cases, *files])
+    cases, chosen = _floor_cases(options.cases, options.construction)
+    # Names of files, whatever a case is named.
+    names = {name: re.sub(r"\W+", "_", case.name) for name, case in cases.items()}
+    for file, count in Counter(names.values()).items():
+        if count > 1:
+            refuse(f"{count} floors would have the file {file}.html", "different names")
+    results.require(file_names(names.values(), report=options.report))
+    comparison = _compare(cases, options)
+    floors = [
+        PredictedFloor(name.replace("_", " "), names[name], prediction, chosen.get(name))
+        for name, prediction in comparison.predictions.items()
+    ]
+    written = contents(floors, results.folder, report=options.report)
+    results.write(written, stale=file_names(names.values()))
+    if not options.quiet:
+        print("\n\n".join(map(screen_text, floors)))
+    print_notes(comparison.warnings)
+    if not options.quiet:
+        print(f"Results: {results.folder}")
+    return 0
+
+
+def _floor_cases(
+    paths: Iterable[str], names: Iterable[str]
+) -> tuple[dict[str, Case], dict[str, Construction]]:
+    """Return the cases of files, and of constructions with the source and room of the first.
+
+    Both are by their names; the constructions themselves are returned, too.
+    """
     from thud.floors.constructions import construction
 
     cases: dict[str, Case] = {}
+    chosen: dict[str, Construction] = {}
 
     def add(name: str, origin: str, case: Case) -> None:
         if name in cases:
@@ -82,19 +120,20 @@ def _floor_cases(paths: Iterable[str], names: Iterable[str]) -> dict[str, Case]:
         add(case.name, path, case)
     first = next(iter(cases.values()), None)
     for name in names:
-        chosen = construction(name)
-        add(chosen.name, f"--construction {name}", chosen.case(first))
-        if chosen.note:
-            print_notes([f"{chosen.name}: {chosen.note}"])
+        entry = construction(name)
+        add(entry.name, f"--construction {name}", entry.case(first))
+        chosen[entry.name] = entry
+        if entry.note:
+            print_notes([f"{entry.name}: {entry.note}"])
     if not cases:
         refuse(
             "no floor is stated",
             "case files, or --construction NAME; `thud-driver floor --list` lists the names",
         )
-    return cases
+    return cases, chosen
 
 
-FLOORS = (
+_FLOORS = (
     argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
     argument(
         "--construction",
@@ -108,7 +147,7 @@ FLOORS = (
 FLOOR = Command(
     "compare floors and rooms of several cases and constructions on one page",
     (
-        *FLOORS,
+        *_FLOORS,
         argument(
             "--list",
             nargs="?",
@@ -135,8 +174,9 @@ def listen_to_cases(options: argparse.Namespace) -> int:
     inputs = (*options.cases, *files)
     results = Results(path.parent, options.name, inputs, replace=options.replace)
     results.require([path.name])
+    cases, _ = _floor_cases(options.cases, options.construction)
     sound = listen(
-        _compare(options).predictions,
+        _compare(cases, options).predictions,
         position=options.position,
         pause=options.pause,
         repeat=options.repeat,
@@ -153,7 +193,7 @@ def listen_to_cases(options: argparse.Namespace) -> int:
 LISTEN = Command(
     "sound of the impacts in the rooms below, as a calibrated WAV file",
     (
-        *FLOORS,
+        *_FLOORS,
         argument(
             "-o",
             "--output",
@@ -186,6 +226,21 @@ LISTEN = Command(
         QUIET,
     ),
     listen_to_cases,
+)
+
+PREDICT = Command(
+    "level in the room below each floor, with its interval, tables and a report",
+    (
+        *_FLOORS,
+        argument(
+            "--report",
+            action="store_true",
+            help="also two pages for each floor (PDF, HTML), and what would change its rating",
+        ),
+        *output("the results (default: outputs/prediction)"),
+        QUIET,
+    ),
+    predict,
     "nothing is written",
 )
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.colors import to_rgba
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from thud.base._schema import FloorOptions
@@ -31,18 +35,22 @@ from thud.plot.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.floors.constructions import Construction
+    from thud.floors.constructions import Construction, Layer
     from thud.floors.impedance import BallImpedance
     from thud.floors.mobility_fit import MobilityFit
     from thud.impact.floor_impact import FloorImpact
 
 
 THIRDS = BANDWIDTHS[1]
+# Length of the drawn piece of a section and of its scale bar, m; of the piece on paper, inch.
+_PIECE, _BAR, _DRAWN = 0.8, 0.2, 1.6
+# Height of a label beside a section, inch, and the maximum number of characters in one line.
+_LINE, _LABEL = 0.23, 30
 # Drawn time, as a multiple of the contact time.
 _SHOWN = 1.5
 # Maximum number of mode shapes, and points along a side of the plate.
@@ -51,29 +59,70 @@ MAX_SHAPES, POINTS = 30, 60
 _DENSITY = 400
 
 
-@own_style()
 def draw_construction(construction: Construction) -> Figure:
-    """Draw the section of a floor, with the thicknesses of its layers to scale."""
-    layers = construction.layers
+    """Draw the section of a floor to scale, with its layers."""
+    return draw_section(construction.layers, construction.name)
+
+
+@own_style()
+def draw_section(layers: Sequence[Layer], title: str = "") -> Figure:
+    """Draw the section through layers to scale: a piece of `_PIECE` m.
+
+    Members a distance apart, as joists, stand at this distance; layers of air are white.
+    """
     total = sum(layer.thickness for layer in layers)
-    figure, axes = empty_axes(max(1.2, 0.2 * len(layers), 4 * total))
-    materials = list(dict.fromkeys(layer.material for layer in layers))
-    top = 0.0
-    for i, layer in enumerate(layers):
-        color = COLORS[materials.index(layer.material) % len(COLORS)]
-        axes.bar(
-            0.5, layer.thickness, 1.0, top, color=color, alpha=0.5, edgecolor="black",
-            linewidth=0.6,
-        )  # fmt: skip
-        # Labels at equal distances do not overlap.
-        label = (i + 0.5) / len(layers) * total
-        axes.plot([1.0, 1.15], [top + layer.thickness / 2, label], color="black", linewidth=0.4)
-        axes.text(1.2, label, escape_label(str(layer)), va="center", fontsize="small")
-        top += layer.thickness
-    axes.set(xlim=(-0.01, 3.2), ylim=(1.01 * top, -0.01 * top))
-    axes.set_title(escape_label(construction.name), loc="left")
+    scale = _DRAWN / _PIECE
+    below = 0.17
+    labels = [escape_label(fill(str(layer), _LABEL)) for layer in layers]
+    # A label has room for two lines, or more if it needs them.
+    sizes = np.array([_LINE * -(-(label.count("\n") + 1) // 2) for label in labels])
+    height = max(total * scale, sizes.sum()) + below + 0.2 * bool(title)
+    figure = new_figure(height)
+    figure.set_layout_engine("none")
+    axes = figure.add_axes((0, 0, 1, 1))
+    # Both axes in inches.
+    axes.set(xlim=(-0.02, WIDTH - 0.02), ylim=(height - 0.2 * bool(title), -0.2 * bool(title)))
     axes.set_axis_off()
+    if title:
+        axes.text(0, -0.08, escape_label(title), va="center")
+    materials = list(dict.fromkeys(layer.material for layer in layers))
+    # The shorter of drawing and labels is in the middle of the other.
+    room = height - below - 0.2 * bool(title)
+    top = (room - total * scale) / 2 + 0.02
+    positions = (np.cumsum(sizes) - sizes / 2) * (room / sizes.sum())
+    for layer, label, position in zip(layers, labels, positions, strict=True):
+        color = COLORS[materials.index(layer.material) % len(COLORS)]
+        thickness = layer.thickness * scale
+        members = _members(layer.material)
+        for left, right in members:
+            axes.add_patch(
+                Rectangle(
+                    (scale * left, top), scale * (right - left), thickness, linewidth=0.5,
+                    facecolor="white" if "cavity" in layer.material else to_rgba(color, 0.5),
+                    edgecolor="black",
+                )
+            )  # fmt: skip
+        axes.plot(
+            [scale * members[-1][1], _DRAWN + 0.02, _DRAWN + 0.15],
+            [top + thickness / 2, top + thickness / 2, position],
+            color="black", linewidth=0.4,
+        )  # fmt: skip
+        axes.text(_DRAWN + 0.2, position, label, va="center", fontsize="small")
+        top += thickness
+    bar = top + 0.08
+    axes.plot([0, scale * _BAR], [bar, bar], color="black", linewidth=1.5, solid_capstyle="butt")
+    axes.text(scale * _BAR + 0.06, bar, f"{1e3 * _BAR:g} mm", va="center", fontsize="small")
     return figure
+
+
+def _members(material: str) -> list[tuple[float, float]]:
+    """Return the ends of the parts of a layer along the drawn piece, m."""
+    found = re.search(r"([\d.]+) mm wide, ([\d.]+) m apart", material)
+    if found is None:
+        return [(0.0, _PIECE)]
+    width, spacing = float(found[1]) / 1e3, float(found[2])
+    axes = np.arange(_PIECE / 4 % spacing, _PIECE, spacing)
+    return [(max(x - width / 2, 0.0), min(x + width / 2, _PIECE)) for x in axes]
 
 
 @own_style()

@@ -114,6 +114,37 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
 
 
 @own_style()
+def draw_ranges(prediction: RoomPrediction) -> Figure:
+    """Draw the levels of both predictions with their ranges."""
+    figure, axes = empty_axes(2.5)
+    x = np.arange(len(prediction.frequency))
+    level, spread = prediction.level, prediction.spread
+    axes.fill_between(
+        x, level - spread, level + spread, color=GRAY, linewidth=0,
+        label="± expected spread of single positions",
+    )  # fmt: skip
+    axes.plot(
+        x, level, color=COLORS[0], marker="o", markersize=3.5,
+        label=f"statistical: {prediction.rating.rounded} dB",
+    )  # fmt: skip
+    modal = slice(0, prediction.n_modal)
+    if prediction.n_modal:
+        edges = np.array([prediction.simple_level, prediction.clamped_level])[:, modal]
+        axes.fill_between(
+            x[modal], edges.min(axis=0), edges.max(axis=0), color=COLORS[4], alpha=0.4,
+            linewidth=0, label="simply supported to clamped",
+        )  # fmt: skip
+        axes.plot(
+            x[modal], prediction.modal_level[modal], color=COLORS[1], marker="s", markersize=3.5,
+            linestyle="--", label=f"by modes: {prediction.modal_rating.rounded} dB",
+        )  # fmt: skip
+    band_axis(axes, prediction.frequency, "third")
+    axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
+    legend_above(axes)
+    return figure
+
+
+@own_style()
 def draw_decay(prediction: RoomPrediction) -> Figure:
     """Draw the reading of the Fast detector against time, in the middle band of each octave."""
     figure, axes = empty_axes(2.6)

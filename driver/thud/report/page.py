@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import base64
-import html
 import math
-import re
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +12,15 @@ from thud.level.assessment import VERDICTS
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.fonts import FAMILY
+from thud.report.markup import (
+    css_string,
+    escaped,
+    inline_svg,
+    labeled,
+    notes,
+    pair_rows,
+    plain,
+)
 from thud.report.notes import group_by_kind, shorten
 from thud.report.rows import (
     COUNT,
@@ -33,10 +40,10 @@ from thud.report.rows import (
 from thud.report.template import BODY, PAGE
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
-# Maximum length of the list of files, and of each list of notes.
-MAX_FILES, MAX_NOTES = 60, 40
+# Maximum length of the list of files.
+MAX_FILES = 60
 # Maximum number of characters of the name at the foot of each page.
 MAX_IDENTITY = 70
 # Title of the levels, which are the first criteria.
@@ -82,40 +89,41 @@ def report_page(
     report = data["report"]
     body = BODY.substitute(
         mark=_mark(mark),
-        number=_text(report["number"]),
-        source=_text(source),
-        verdict=_text(data["verdict"]),
-        reason=_text(_reason(data["criteria"])),
-        about=_pairs(_about(data)),
-        measured=_pairs(_measured(data)),
-        head="".join(f"<th>{_text(name)}</th>" for name in _with_picture(HEAD, "")),
-        level=_text(LEVEL),
+        number=escaped(report["number"]),
+        source=escaped(source),
+        verdict=escaped(data["verdict"]),
+        reason=escaped(_reason(data["criteria"])),
+        about=pair_rows(_about(data)),
+        measured=pair_rows(_measured(data)),
+        head="".join(f"<th>{escaped(name)}</th>" for name in _with_picture(HEAD, "")),
+        level=escaped(LEVEL),
         rows="\n".join(map(_row, data["criteria"])),
-        rule="<br>".join(map(_text, _rules(data))),
-        figures="\n".join(f"<td>{_on_page(svg, f'f{i}')}</td>" for i, svg in enumerate(figures)),
+        rule="<br>".join(map(escaped, _rules(data))),
+        figures="\n".join(f"<td>{inline_svg(svg, f'f{i}')}</td>" for i, svg in enumerate(figures)),
         budget_head="".join(f"<th>{name}</th>" for name in BUDGET_HEAD),
         budgets="\n".join(map(_budget, data["criteria"])),
-        budget_rule=_text(_budget_rule(data)),
-        drops=_notes("Drops and methods", _drops_and_methods(data)),
-        properties=_notes("Properties of the ball, as stated", _properties(data["properties"])),
-        processing=_notes("Signal processing", _messages(data, "steps") or ["nothing"]),
-        warnings=_notes("Warnings", _warnings(data) or ["none"]),
+        budget_rule=escaped(_budget_rule(data)),
+        drops=notes("Drops and methods", _drops_and_methods(data)),
+        properties=notes("Properties of the ball, as stated", _properties(data["properties"])),
+        processing=notes("Signal processing", _messages(data, "steps") or ["nothing"]),
+        warnings=notes("Warnings", _warnings(data) or ["none"]),
         files=_files(data["files"]),
-        statement=_text(
+        statement=escaped(
             "The results relate only to the item tested. This report shall not be reproduced "
             "except in full without the approval of the laboratory."
         ),
         signature=_signature(data),
-        footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum} · end of report"),
+        footer=escaped(f"thud {data['thud']} · report.json: SHA-256 {checksum} · end of report"),
     )
     name = data["serial"] or data["name"]
     identity = f"Report {report['number'] or f'of {name}'}"
     if len(identity) > MAX_IDENTITY or not report["number"]:
         identity = f"{identity[:MAX_IDENTITY]}, SHA-256 {checksum[:16]}…"
     return PAGE.substitute(
-        title=_text(f"Calibration report: {report['number'] or name}"),
+        title=escaped(f"Calibration report: {report['number'] or name}"),
         family=FAMILY,
-        identity=_css_string(identity),
+        identity=css_string(identity),
+        style="",
         body=body,
     )
 
@@ -128,24 +136,7 @@ def laboratory_text(data: dict[str, Any]) -> str:
     tables = [data["report"], data["properties"], *data["instruments"]]
     for value in (value for table in tables for value in table.values()):
         texts += value if isinstance(value, tuple) else [value] if isinstance(value, str) else []
-    return _plain("".join(texts))
-
-
-def _plain(text: str) -> str:
-    """Return a text as one line of printable characters."""
-    line = " ".join(text.split())
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
-
-
-def _text(text: str) -> str:
-    return html.escape(_plain(text))
-
-
-def _css_string(text: str) -> str:
-    """Return a text for a string of CSS, with an escape for all but letters and digits."""
-    return "".join(
-        c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in _plain(text)
-    )
+    return plain("".join(texts))
 
 
 def _mark(mark: tuple[str, bytes] | None) -> str:
@@ -263,14 +254,6 @@ def _properties(properties: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
-    rows = []
-    for label, value in pairs:
-        shown = "<br>".join(map(_text, value.split("\n"))) if value else NOT_KNOWN
-        rows.append(f'<tr><th>{_text(label)}</th><td dir="auto">{shown}</td></tr>')
-    return "\n".join(rows)
-
-
 def _with_picture(row: Sequence[str], picture: str) -> list[str]:
     """Insert a picture before the verdict, the last cell of a row."""
     return [*row[:-1], picture, row[-1]]
@@ -278,18 +261,10 @@ def _with_picture(row: Sequence[str], picture: str) -> list[str]:
 
 def _row(criterion: dict[str, Any]) -> str:
     cells = _with_picture(
-        [_text(cell) for cell in criterion_row(criterion)], _range_picture(criterion)
+        [escaped(cell) for cell in criterion_row(criterion)], _range_picture(criterion)
     )
     style = criterion["verdict"].replace(" ", "-")
-    return f'<tr class="{style}">{_labeled(cells, _with_picture(HEAD, ""))}</tr>'
-
-
-def _labeled(cells: Sequence[str], head: Sequence[str]) -> str:
-    """Return cells of a table with the titles of their columns, shown on narrow screens."""
-    return "".join(
-        f'<td data-label="{_text(title)}">{cell}</td>'
-        for cell, title in zip(cells, head, strict=True)
-    )
+    return f'<tr class="{style}">{labeled(cells, _with_picture(HEAD, ""))}</tr>'
 
 
 def _budget(criterion: dict[str, Any]) -> str:
@@ -312,7 +287,7 @@ def _budget(criterion: dict[str, Any]) -> str:
             f"k = {number(criterion['coverage_factor'], 2)}",
         ]
     )
-    rows = [f'<tr><th colspan="{len(BUDGET_HEAD)}">{_text(summary)}</th></tr>']
+    rows = [f'<tr><th colspan="{len(BUDGET_HEAD)}">{escaped(summary)}</th></tr>']
     for part in parts:
         share = f"{100 * (part['uncertainty'] / combined) ** 2:.1f} %"
         size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] / style.unit, unit), "1"
@@ -325,7 +300,7 @@ def _budget(criterion: dict[str, Any]) -> str:
             with_unit(part["uncertainty"] / style.unit, unit), freedom_text(part["freedom"]),
             share if part["counted"] else "included",
         )  # fmt: skip
-        rows.append(f"<tr>{_labeled([_text(cell) for cell in cells], BUDGET_HEAD)}</tr>")
+        rows.append(f"<tr>{labeled([escaped(cell) for cell in cells], BUDGET_HEAD)}</tr>")
     return f"<tbody>{''.join(rows)}</tbody>"
 
 
@@ -487,49 +462,23 @@ def _grouped(data: dict[str, Any], kind: str) -> list[str]:
     )
 
 
-def _notes(title: str, messages: Sequence[str]) -> str:
-    items = "".join(f"<li>{_text(message)}</li>" for message in shorten(messages, MAX_NOTES))
-    return f"<h2>{_text(title)}</h2><ul>{items}</ul>" if messages else ""
-
-
 def _signature(data: dict[str, Any]) -> str:
     report = data["report"]
     issued = ", ".join(filter(None, [report["place"], report["issued"]]))
     cells = {"Place and date": issued, "Authorized by": report["authorized_by"], "Signature": ""}
-    return "".join(f"<td>{_text(text)}<span>{name}</span></td>" for name, text in cells.items())
+    return "".join(f"<td>{escaped(text)}<span>{name}</span></td>" for name, text in cells.items())
 
 
 def _files(files: Sequence[dict[str, Any]]) -> str:
-    names = shorten([_plain(file["name"]) for file in files], MAX_FILES)
+    names = shorten([plain(file["name"]) for file in files], MAX_FILES)
     # If there are more files, the last text says how many and has no checksum.
     listed = files if len(files) <= MAX_FILES else files[: MAX_FILES - 1]
     checksums = [file["sha256"] for file in listed]
     return "\n".join(
-        f"<tr><td>{_text(name)}</td><td>{checksum}</td></tr>"
+        f"<tr><td>{escaped(name)}</td><td>{checksum}</td></tr>"
         for name, checksum in zip_longest(names, checksums, fillvalue="")
     )
 
 
 def _count(number_of: int, noun: str) -> str:
     return f"{number_of} {noun}{'s' * (number_of != 1)}"
-
-
-def _on_page(svg: str, prefix: str) -> str:
-    """Return a figure as inline SVG; the prefix makes its identifiers unique on the page.
-
-    Styles become attributes, which WeasyPrint reads in less than half the time.
-    """
-    text = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", text)
-    text = re.sub(r' style="([^"]*)"', _attributes, text)
-    text = re.sub(r"(\.\d\d)\d+", r"\1", text)
-    box = re.search(r'viewBox="[^"]*"', text)
-    assert box  # noqa: S101 - matplotlib writes it
-    head = f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax"'
-    return f'{head} font-family="{FAMILY}">{text[text.index(">") + 1 :]}'
-
-
-def _attributes(style: re.Match[str]) -> str:
-    """Return the properties of a style as attributes; all texts have the font of the page."""
-    pairs = (entry.split(": ", 1) for entry in style[1].split("; ") if entry)
-    return "".join(f' {name}="{value}"' for name, value in pairs if name != "font-family")

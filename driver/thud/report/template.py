@@ -1,10 +1,10 @@
-"""HTML and style sheet of a calibration report."""
+"""HTML and style sheet of reports."""
 
 from __future__ import annotations
 
 from string import Template
 
-# Body of the page.
+# Body of a calibration report.
 BODY = Template("""<header>
 $mark<div class="verdict"><b>$verdict</b><br>$reason</div>
 <h1>Calibration report $number</h1>
@@ -44,7 +44,8 @@ $budgets
 </div>
 """)
 
-# The page around the body. On screens narrower than a table, each of its rows becomes a card.
+# The page around the body of any report, which may have further styles. On screens narrower than a
+# table, each of its rows becomes a card.
 PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -145,7 +146,7 @@ footer { margin-top: 0.8em; color: #444; font-size: 0.85em; }
   .files td, .signature td { display: block; text-align: left !important; }
   .signature td { padding: 1.5em 0 0; }
 }
-</style>
+$style</style>
 </head>
 <body>
 $body

@@ -85,9 +85,8 @@ def page_contents(
     `drawings` are the figures as SVG. Warn if there is no PDF, or no font for some characters;
     `folder` is named in the warning.
     """
-    from thud.report.fonts import missing_characters
     from thud.report.page import laboratory_text, report_page
-    from thud.report.pdf import NEEDED, html_to_pdf
+    from thud.report.pdf import pdf_file
 
     mark = recording.config.report.accreditation_mark
     page = report_page(
@@ -96,22 +95,7 @@ def page_contents(
         hashlib.sha256(json_bytes(data)).hexdigest(),
         read_picture(Path(mark)) if mark else None,
     )
-    contents = {HTML: page.encode()}
-    try:
-        contents[PDF] = html_to_pdf(page)
-    except ImportError as error:
-        cause = " ".join(str(error).split())
-        message = f"{folder}: {PDF} is not written ({cause}); allowed: {NEEDED}"
-        warnings.warn(message, ReportWarning, stacklevel=3)
-        return contents
-    missing = missing_characters(laboratory_text(data))
-    if missing:
-        message = (
-            f"{folder}: no installed font has {missing}, used in {PDF}; allowed: "
-            "a font that has them, such as that of Debian's fonts-noto-cjk"
-        )
-        warnings.warn(message, ReportWarning, stacklevel=3)
-    return contents
+    return {HTML: page.encode(), **pdf_file(page, PDF, folder, laboratory_text(data))}
 
 
 def write_files(

@@ -1,0 +1,100 @@
+"""Files of predicted floors: every number as CSV and workbook, and a page for each floor."""
+
+from __future__ import annotations
+
+import csv
+import io
+from functools import partial
+from importlib.util import find_spec
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from thud.base.bridge import version
+from thud.base.display import draw_all
+from thud.base.workbooks import workbook
+from thud.report.predicted_floor import contribution_title, deviation_text, tables
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
+    from thud.report.predicted_floor import PredictedFloor
+
+WORKBOOK = "predictions.xlsx"
+# Names of the tables; the last is part of the report.
+_TABLES = ("bands", "ratings", "contributions", "changes")
+# Maximum number of characters in a line on the screen.
+_WIDTH = 80
+
+
+def screen_text(floor: PredictedFloor) -> str:
+    """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
+    required = floor.prediction.requirement
+    lines = [
+        floor.name,
+        f"  L_iA,Fmax {floor.rated_text}, ISO 717-2",
+        *(f"    {text:>6}  {title}" for title, _, _, text in floor.ratings[1:-1]),
+        f"  Octaves, KS F 2863-2: {floor.ratings[-1][3]}",
+        *([f"  {required}"] if required else []),
+        "  Contributions to the interval, dB:",
+        *(
+            f"    {deviation_text(ends):<13} {contribution_title(name)}"
+            for name, ends in floor.contributions.items()
+        ),
+    ]
+    return "\n".join(
+        fill(line, _WIDTH, subsequent_indent="    ") if len(line) > _WIDTH else line
+        for line in lines
+    )
+
+
+def file_names(files: Iterable[str], *, report: bool = True) -> list[str]:
+    """Return the names of the files that `contents` may have; `files` are those of floors."""
+    if not report:
+        return [*(f"{name}.csv" for name in _TABLES[:-1]), WORKBOOK]
+    pages = [f"{file}{ending}" for file in files for ending in (".html", ".pdf")]
+    return [*(f"{name}.csv" for name in _TABLES), WORKBOOK, *pages]
+
+
+def contents(floors: Sequence[PredictedFloor], folder: Path, *, report: bool) -> dict[str, bytes]:
+    """Return the contents of files by name; with `report` also a page for each floor.
+
+    The workbook needs openpyxl. Warn if a page cannot be drawn or printed; `folder` is named in the
+    warning.
+    """
+    rows = tables(floors, changes=report)
+    result = {f"{name}.csv": _csv(table) for name, table in rows.items()}
+    if find_spec("openpyxl"):
+        result[WORKBOOK] = workbook(rows)
+    if report:
+        for floor in floors:
+            result |= page_contents(floor, folder)
+    return result
+
+
+def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
+    """Return the page of a floor as HTML and, if possible, PDF, by file name."""
+    # Matplotlib is slow to import.
+    from thud.plot.floor_figures import draw_section
+    from thud.plot.room_figures import draw_ranges
+    from thud.plot.save_figures import figure_files
+    from thud.report.floor_page import floor_page, page_texts
+    from thud.report.pdf import pdf_file
+
+    figures = figure_files(
+        draw_all({
+            "section": partial(draw_section, floor.layers),
+            "levels": partial(draw_ranges, floor.prediction),
+        })
+    )  # fmt: skip
+    section, levels = (figures.get(f"{name}.svg", b"").decode() for name in ("section", "levels"))
+    page = floor_page(floor, section, levels)
+    printed = pdf_file(page, f"{floor.file}.pdf", folder, page_texts(floor))
+    return {f"{floor.file}.html": page.encode(), **printed}
+
+
+def _csv(rows: Iterable[Iterable[object]]) -> bytes:
+    text = io.StringIO()
+    text.write(f"# thud {version()}; levels in the room in dB re 20 uPa\n")
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue().encode()

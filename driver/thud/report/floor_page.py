@@ -1,0 +1,296 @@
+"""The page of a predicted floor: two sheets of A4, in one HTML file with its figures."""
+
+from __future__ import annotations
+
+from string import Template
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.bridge import version
+from thud.case.keys import humanize
+from thud.report.fonts import FAMILY
+from thud.report.markup import css_string, escaped, inline_svg, labeled, notes, pair_rows
+from thud.report.predicted_floor import (
+    band_rows,
+    contribution_title,
+    deviation_text,
+    difference_text,
+)
+from thud.report.template import PAGE
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from thud.report.predicted_floor import PredictedFloor
+
+BODY = Template("""<header>
+<div class="verdict"><b>$rating</b><br>$box</div>
+<h1>Predicted impact sound</h1>
+<p>$name</p>
+</header>
+<table class="columns"><tr>
+<td><h2>Construction, to scale</h2>$section</td>
+<td><h2>Room and source</h2><table class="pairs">$about</table></td>
+</tr></table>
+<h2>Ratings, L<sub>iA,Fmax</sub></h2>
+$ratings
+<h2>Assumptions and their sources</h2>
+$assumptions
+<p class="rule">$assumed</p>
+<div class="sheet"></div>
+<h2>Maximum Fast levels in the room below, one-third octaves</h2>
+<table class="columns"><tr>
+<td>$figure</td>
+<td><h2>What makes the rating uncertain</h2>
+$contributions
+<p class="rule">$interval</p>
+<h2>What would change it</h2>
+$changes
+<p class="rule">Each change is predicted again, all else unchanged.</p></td>
+</tr></table>
+$bands
+<p class="rule">$columns</p>
+<h2>How certain the computation is</h2>
+<p class="rule">$computation</p>
+<h2>How certain the model is</h2>
+<p class="rule">$model</p>
+$warnings
+<footer>$footer</footer>
+""")
+
+STYLE = """
+.verdict b { text-transform: none; }
+.whole { white-space: nowrap; }
+sub { line-height: 0; font-size: 0.8em; vertical-align: -0.2em; }
+.sheet { break-after: page; }
+.figure { height: auto; }
+.named td:last-child, .named th:last-child { text-align: left; white-space: normal;
+  padding-left: 1.2em; overflow-wrap: anywhere; }
+.named td { vertical-align: top; }
+.texts td, .texts th { text-align: left; white-space: normal; }
+.bands thead th { white-space: normal; overflow-wrap: normal; vertical-align: bottom; }
+.cards { margin-top: 0.2em; }
+.columns h2:first-child { margin-top: 0; }
+@media print {
+  .figure { height: auto; }
+  .cards th, .cards td { padding-top: 0.25mm; padding-bottom: 0.25mm; }
+  .narrow td:last-child, .narrow th:last-child { width: 22mm; }
+  .values th:first-child { width: 64mm; }
+  .values th:nth-child(2) { width: 28mm; }
+  .bands th:first-child, .bands th:nth-child(6) { width: 10mm; }
+  .bands th:nth-child(5), .bands th:nth-child(8) { width: 13mm; }
+  .bands th:last-child { width: 22mm; }
+  .bands td, .bands th { padding-left: 0.5mm; }
+}
+@media print, (min-width: 60.01em) {
+  .verdict { width: 52%; }
+  .values td:nth-child(2) { min-width: 8em; }
+}
+@media screen { .figure { max-width: 40em; } }
+@media screen and (max-width: 60em) {
+  .named tr { grid-template-columns: 7em 1fr; }
+  .narrow tr { grid-template-columns: 1fr auto; }
+  .narrow td:first-child { grid-column: auto; font-weight: normal; }
+  .cards.narrow td:last-child::before { display: none; }
+  .bands td:first-child::after { content: " Hz"; }
+}
+"""
+ABOUT_COLUMNS = (
+    "The force level is the force exposure level of the force on the floor; the energy is what "
+    "this force transfers to the floor. Spread: expected standard deviation of the statistical "
+    "level at one position of source and microphone. Above {last} Hz, where modes of the room "
+    "overlap, there is no prediction by modes, and its rating uses the statistical levels."
+)
+ABOUT_INTERVAL = (
+    "Deviations from {rated:.1f} dB. They count as independent: the root sums of squares of both "
+    "sides give the interval, {low:.1f} to {high:.1f} dB."
+)
+ABOUT_MODEL = (
+    "The interval, {interval}, is an estimate of what the model leaves open: {largest} contributes "
+    "most. {predictions} The interval has no stated probability: no measured floor has been "
+    "compared with these predictions. It excludes mistakes in the assumed values above, "
+    "workmanship, paths that are not described, and furniture."
+)
+ABOUT_BOTH = (
+    "The statistical prediction is a mean over many floors and rooms of this kind, that by modes "
+    "describes one ideal rectangular floor and room; they give {statistical} and {modal} dB."
+)
+ABOUT_ONE = (
+    "The only prediction is the statistical one, a mean over many floors and rooms of this kind: "
+    "in all bands the modes of the room overlap."
+)
+
+
+def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
+    """Return the page as self-contained HTML, with the section and the levels as SVG."""
+    prediction = floor.prediction
+    low, high = prediction.interval
+    body = BODY.substitute(
+        rating=escaped(floor.rated_text),
+        box="<br>".join(map(_with_index, _box(floor))),
+        name=escaped(floor.name),
+        section=_figure(section, "s"),
+        about=pair_rows(_about(floor)),
+        ratings=_table(
+            [
+                ("Rating", "Standard", "Value"),
+                *((title, standard, text) for title, standard, _, text in floor.ratings),
+            ],
+            "named values texts",
+        ),
+        assumptions=_table(floor.assumptions, "named values texts"),
+        assumed=_assumed(floor),
+        figure=_figure(figure, "l"),
+        contributions=_table(
+            [
+                ("Contribution", "dB"),
+                *(
+                    (contribution_title(name), deviation_text(ends))
+                    for name, ends in floor.contributions.items()
+                ),
+            ],
+            "narrow",
+        ),
+        interval=escaped(ABOUT_INTERVAL.format(rated=prediction.rated, low=low, high=high)),
+        changes=_table(
+            [
+                ("Change", "dB"),
+                *((change.text, difference_text(change)) for change in floor.changes),
+            ],
+            "narrow",
+        ),
+        bands=_table(band_rows(floor), "bands"),
+        columns=escaped(_about_columns(floor)),
+        computation=escaped(_about_computation(floor)),
+        model=escaped(_about_model(floor)),
+        warnings=notes("Warnings", prediction.warnings or ["none"]),
+        footer=escaped(f"thud {version()} · predicted, not measured · end of report"),
+    )
+    return PAGE.substitute(
+        title=escaped(f"Predicted impact sound: {floor.name}"),
+        family=FAMILY,
+        identity=css_string(f"Predicted impact sound: {floor.name}"),
+        style=STYLE,
+        body=body,
+    )
+
+
+def page_texts(floor: PredictedFloor) -> str:
+    """Return the texts of a page that users have stated, in any script."""
+    texts = [floor.name, *(layer.material for layer in floor.layers)]
+    texts += [text for row in floor.assumptions for text in row]
+    return "".join(texts + ([floor.construction.note] if floor.construction else []))
+
+
+def _box(floor: PredictedFloor) -> list[str]:
+    """Return the lines below the rating."""
+    *_, (_, _, _, octaves) = floor.ratings
+    lines = [
+        "L_iA,Fmax in the room below, 50 to 630 Hz (ISO 717-2)",
+        f"KS F 2863-2, of octaves: {octaves}",
+    ]
+    required = floor.prediction.requirement
+    return [*lines, f"{required}"] if required else lines
+
+
+def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
+    """Return room and source."""
+    prediction = floor.prediction
+    length, width, height = prediction.size
+    times = np.unique(np.round(prediction.reverberation_time, 2))
+    time = " to ".join(f"{value:g}" for value in dict.fromkeys((times[0], times[-1])))
+    source, room = prediction.source, prediction.room
+    case = source.case
+    kind = humanize(source.limits_source or "source that is not stated")
+    model = humanize(case.model.name) if case.model else "recording or measured modes"
+    forces = {
+        "contact": "on the mobile floor",
+        "blocked": "on a rigid floor",
+    }
+    conforms = not prediction.source_warnings
+    pairs = [
+        ("Room", f"{length:.3g} × {width:.3g} × {height:.3g} m, {prediction.volume:.5g} m³"),  # noqa: RUF001
+        ("Reverberation", f"T = {time} s, of the {humanize(room.reverberation_of)} room"),
+        (
+            "Flanking walls",
+            f"{len(room.wall_lengths)} described" if room.wall_lengths else "none described",
+        ),
+        ("Ceiling", f"{room.ceiling_mass:g} kg/m²" if room.ceiling_mass else "none described"),
+        ("Source", f"{source.mass:.3g} kg, {source.impact_velocity:.3g} m/s; limits of the {kind}"),
+        (
+            "Source levels",
+            "conform to the standards" if conforms else "do not conform: see warnings",
+        ),
+        ("Source model", f"{model}; force {forces[prediction.force]}"),
+    ]
+    if floor.construction and floor.construction.note:
+        pairs.append(("Note", floor.construction.note))
+    return pairs
+
+
+def _assumed(floor: PredictedFloor) -> str:
+    """Return the values that are not listed, as HTML."""
+    drawn = " Thicknesses marked as assumed are for the drawing only." * (
+        floor.construction is None
+    )
+    # A value is not separated from its unit.
+    values = (f'<span class="whole">{escaped(text)}</span>' for text in floor.defaults)
+    return f"Default values – {'; '.join(values)}.{drawn}"
+
+
+def _about_columns(floor: PredictedFloor) -> str:
+    modal = floor.prediction.n_modal
+    if not modal:
+        return ABOUT_COLUMNS.partition(" Above")[0]
+    return ABOUT_COLUMNS.format(last=f"{floor.prediction.frequency[modal - 1]:g}")
+
+
+def _about_computation(floor: PredictedFloor) -> str:
+    """Return the error of solving the equations, as stated for the source."""
+    errors = getattr(floor.prediction.source, "numerical_error", None)
+    solved = (
+        "The equations of floor and room are solved without random numbers: the same input gives "
+        "the same result. The error of leaving out their higher modes is not stated."
+    )
+    if errors is None or not np.isfinite(errors.level).all():
+        return f"{solved} The numerical error of the force is not known."
+    return (
+        f"{solved} The numerical error of the force, estimated from a coarser computation, is at "
+        f"most {errors.level.max():.2g} dB in its octaves. This says nothing on whether the "
+        "equations describe the building."
+    )
+
+
+def _about_model(floor: PredictedFloor) -> str:
+    """Return what the interval contains, and what it does not."""
+    prediction = floor.prediction
+    both = ABOUT_BOTH.format(
+        statistical=prediction.rating.rounded, modal=prediction.modal_rating.rounded
+    )
+    return ABOUT_MODEL.format(
+        interval=floor.rated_text,
+        largest=floor.largest,
+        predictions=both if prediction.n_modal else ABOUT_ONE,
+    )
+
+
+def _with_index(text: str) -> str:
+    """Return a text as HTML with the index of the rating below its line."""
+    return escaped(text).replace("L_iA,Fmax", "L<sub>iA,Fmax</sub>")
+
+
+def _figure(svg: str, prefix: str) -> str:
+    """Return a figure as inline SVG; a note if it could not be drawn."""
+    return inline_svg(svg, prefix) if svg else "<p>not drawn</p>"
+
+
+def _table(rows: Iterable[Sequence[str]], kind: str) -> str:
+    """Return rows of text, the header first, as a table."""
+    head, *body = rows
+    titles = "".join(f"<th>{escaped(title)}</th>" for title in head)
+    lines = "\n".join(f"<tr>{labeled([_with_index(c) for c in row], head)}</tr>" for row in body)
+    return (
+        f'<table class="cards {kind}"><thead><tr>{titles}</tr></thead>\n'
+        f"<tbody>{lines}</tbody></table>"
+    )

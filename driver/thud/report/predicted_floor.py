@@ -1,0 +1,373 @@
+"""A predicted floor for consultants: assumptions, changes, and every number in tables."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from thud.base._schema import KEYS, JoistFloor, LaminateFloor, Plate, Room
+from thud.base.errors import ThudError
+from thud.base.units import display_unit
+from thud.case.keys import humanize
+from thud.floors.constructions import Layer
+from thud.floors.prediction import BANDS, predict_level
+from thud.level.levels import get_bands
+from thud.level.rating import class_text, rating
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from thud.base._schema import FloorOptions
+    from thud.base.key import Key
+    from thud.floors.constructions import Construction
+    from thud.floors.prediction import RoomPrediction
+
+    Cells = tuple[str | float, ...]
+
+# Contributions to the interval of the rating, in words.
+CONTRIBUTIONS = {
+    "source": "another source that conforms",
+    "edges": "support of the edges",
+    "reverberation_time": "reverberation time, ±20 %",
+    "positions": "positions of ball and microphone",
+    "model": "difference of both predictions",
+}
+# Beginnings of the names of keys without effect if another key has a value.
+_WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
+    ("screed_thickness", 0.0): ("screed_", "layer_stiffness", "layer_loss_factor", "strip_"),
+    ("screed_edges", "simple"): ("strip_",),
+    ("screed_edges", "free"): ("strip_",),
+    ("bridge_x", ()): ("bridge_",),
+    ("covering_stiffness", 0.0): ("covering_",),
+    ("ceiling_mass", 0.0): ("ceiling_",),
+    ("wall_lengths", ()): ("wall_", "junction_"),
+    ("wall_junction", "cross"): ("junction_",),
+    ("wall_junction", "t"): ("junction_",),
+}
+# Keys that are listed even if they have their default value.
+_MAIN = (
+    "length", "width", "thickness", "sheathing_thickness", "joist_height", "density",
+    "screed_thickness", "layer_stiffness", "loss_factor", "support", "reverberation_time",
+)  # fmt: skip
+# Added to a thickness, m.
+_ADDED = 0.01
+_THICKNESSES = {
+    "screed_thickness": "floating plate",
+    "thickness": "bearing plate",
+    "sheathing_thickness": "sheathing",
+    "joist_height": "joists",
+}
+# Thicknesses that a case does not state, for its drawing, m.
+_LAYER, _BOARD = 0.02, 0.0125
+_ASSUMED = "(thickness assumed)"
+# Key that is the requirement, not an assumption.
+_REQUIRED = "required"
+
+
+class Change(NamedTuple):
+    """A change of floor or room, and the change of the rating, dB; NaN if it is not allowed."""
+
+    text: str
+    difference: float
+
+
+@dataclass(frozen=True)
+class PredictedFloor:
+    """A prediction with what is known of its floor.
+
+    Attributes
+    ----------
+    name, file : str
+        Title of the floor, and beginning of the names of its files.
+    prediction : RoomPrediction
+        Level in the room below.
+    construction : Construction or None
+        Construction, with sources of its values; None for the floor of a case.
+    """
+
+    name: str
+    file: str
+    prediction: RoomPrediction
+    construction: Construction | None = None
+
+    @property
+    def layers(self) -> tuple[Layer, ...]:
+        """Layers from top to bottom; of a case, those that its keys describe."""
+        if self.construction:
+            return self.construction.layers
+        return tuple(_case_layers(self.prediction))
+
+    @property
+    def rated_text(self) -> str:
+        """Rating with its interval, such as ``"57 dB (55 to 60)"``."""
+        low, high = self.prediction.interval
+        return f"{self.prediction.rated:.0f} dB ({low:.0f} to {high:.0f})"
+
+    @property
+    def contributions(self) -> dict[str, tuple[float, float]]:
+        """Lower and upper deviation from the rating, dB, the largest contribution first."""
+        entries = self.prediction.contributions.items()
+        return dict(sorted(entries, key=lambda entry: -max(map(abs, entry[1]))))
+
+    @property
+    def largest(self) -> str:
+        """Name of the largest contribution, in words."""
+        return contribution_title(next(iter(self.contributions)))
+
+    @property
+    def ratings(self) -> list[tuple[str, str, float, str]]:
+        """Title, standard, value, dB, and text of each rating."""
+        prediction = self.prediction
+        predictions = "mean of both predictions" if prediction.n_modal else "prediction"
+        mean = f"{predictions}, with interval"
+        octaves = prediction.octave_rating
+        result = [
+            (mean, "ISO 717-2", prediction.rated, self.rated_text),
+            _rating_entry("statistical prediction", "ISO 717-2", prediction.level),
+        ]
+        if prediction.n_modal:
+            result += [
+                _rating_entry("prediction by modes", "ISO 717-2", prediction.modal_level),
+                _rating_entry("by modes, simply supported", "ISO 717-2", prediction.simple_level),
+                _rating_entry("by modes, clamped", "ISO 717-2", prediction.clamped_level),
+            ]
+        known = class_text(octaves.korean_class or 0)
+        result += [
+            _rating_entry("statistical, standardized", "ISO 16283-2", prediction.standardized),
+            (
+                "statistical, of octaves", "KS F 2863-2", octaves.a_weighted,
+                f"{octaves.rounded} dB, {known}",
+            ),
+        ]  # fmt: skip
+        return result
+
+    @property
+    def assumptions(self) -> list[tuple[str, str, str]]:
+        """Quantity, value with unit, and source of the main and the stated values."""
+        rows = [(meaning, value, source) for _, meaning, value, source in self._values() if source]
+        return [("Quantity", "Value", "Source"), *rows]
+
+    @property
+    def defaults(self) -> list[str]:
+        """Names and values of the other keys that have an effect."""
+        return [f"{name}: {value}" for name, _, value, source in self._values() if not source]
+
+    def _values(self) -> Iterator[tuple[str, str, str, str]]:
+        """Yield name, meaning, value and source of each key with an effect.
+
+        The source is empty for default values of keys that are not main ones.
+        """
+        construction = self.construction
+        prediction, ceiling = self.prediction, construction.room if construction else {}
+        sources = construction.sources if construction else {}
+        for group, owner, known in (
+            (prediction.floor, prediction.floor.name, sources),
+            (prediction.room, "room", {key: sources[key] for key in ceiling}),
+        ):
+            for key, value, is_default in _effective_values(group, owner):
+                source = known.get(key.name, "" if is_default else "stated in the case")
+                if not source and key.name in _MAIN:
+                    source = "default value"
+                meaning = re.split("[;:(]|, 0", key.meaning)[0].strip()
+                yield humanize(key.name), meaning, _value_text(key, value), source
+
+    @cached_property
+    def changes(self) -> tuple[Change, ...]:
+        """Changes of the rating by changes of floor and room, each predicted again."""
+        source, floor = self.prediction.source, self.prediction.floor
+        result = []
+        for text, changed_floor, changed_room in _variants(floor, self.prediction.room):
+            try:
+                difference = predict_level(source, changed_floor, changed_room).rated
+                difference -= self.prediction.rated
+            except ThudError:
+                difference = np.nan
+            result.append(Change(text, difference))
+        return tuple(result)
+
+    @property
+    def force_levels(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """Force exposure levels of the used force, dB re 1 N, shape (12,)."""
+        levels = self.prediction.source.levels(BANDS, force="floor")
+        return np.asarray(levels[np.isin(get_bands(BANDS).nominal, self.prediction.frequency)])
+
+
+# Title with unit, decimals or significant digits on the page, and value of each column of bands.
+COLUMNS: dict[str, tuple[str, Callable[[PredictedFloor], Iterable[float]]]] = {
+    "force level, dB re 1 N": (".1f", lambda floor: floor.force_levels),
+    "energy, mJ": ("#.3g", lambda floor: 1e3 * floor.prediction.energy),
+    "radiation factor": ("#.3g", lambda floor: floor.prediction.radiation_factor),
+    "loss factor": (".3f", lambda floor: floor.prediction.loss_factor),
+    "T, s": (".2f", lambda floor: floor.prediction.reverberation_time),
+    "statistical, dB": (".1f", lambda floor: floor.prediction.level),
+    "spread, dB": (".1f", lambda floor: floor.prediction.spread),
+    "modal, dB": (".1f", lambda floor: floor.prediction.modal_level),
+    "simply supported, dB": (".1f", lambda floor: floor.prediction.simple_level),
+    "clamped, dB": (".1f", lambda floor: floor.prediction.clamped_level),
+    "standardized, dB": (".1f", lambda floor: floor.prediction.standardized),
+}
+
+# Columns that are statistical above the modal bands.
+_MODAL = ("modal, dB", "simply supported, dB", "clamped, dB")
+
+
+def contribution_title(name: str) -> str:
+    """Return a contribution in words."""
+    return CONTRIBUTIONS.get(name, name.replace("_", " "))
+
+
+def deviation_text(ends: tuple[float, float]) -> str:
+    """Return lower and upper deviation, dB.
+
+    >>> deviation_text((-1.5, 1.5)), deviation_text((-1.26, 0.0))
+    ('±1.5', '−1.3 to 0.0')
+    """
+    low, high = (f"{end:z.1f}".replace("-", "−") for end in ends)
+    return f"±{high}" if low == f"−{high}" else f"{low} to {high}"
+
+
+def difference_text(change: Change) -> str:
+    """Return the change of a rating, dB, with its sign."""
+    if np.isnan(change.difference):
+        return "not allowed"
+    return f"{change.difference:+z.1f}".replace("-", "−")
+
+
+def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
+    """Return the bands as rows of text, the header first; modal levels only of modal bands."""
+    cells = [
+        [f"{value:z{form}}".replace("-", "−") for value in values(floor)]
+        for form, values in COLUMNS.values()
+    ]
+    for title, column in zip(COLUMNS, cells, strict=True):
+        if title in _MODAL:
+            column[floor.prediction.n_modal :] = "–" * (len(column) - floor.prediction.n_modal)
+    bands = (f"{frequency:g}" for frequency in floor.prediction.frequency)
+    return [("band, Hz", *COLUMNS), *zip(bands, *cells, strict=True)]
+
+
+def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list[Cells]]:
+    """Return every number of floors in tables by name, each with a header."""
+    bands: list[Cells] = [("floor", "band, Hz", *COLUMNS, "floor modes", "room modes", "modal")]
+    ratings: list[Cells] = [("floor", "rating", "standard", "value, dB", "text")]
+    head = ("floor", "contribution", "lower, dB", "upper, dB")
+    contributions: list[Cells] = [head]
+    changed: list[Cells] = [("floor", "change", "difference, dB")]
+    for floor in floors:
+        prediction = floor.prediction
+        columns = [
+            prediction.frequency, *(values(floor) for _, values in COLUMNS.values()),
+            prediction.floor_modes, prediction.room_modes,
+            np.arange(len(prediction.frequency)) < prediction.n_modal,
+        ]  # fmt: skip
+        rows = zip(*(map(float, column) for column in columns), strict=True)
+        bands += [(floor.name, *row) for row in rows]
+        ratings += [(floor.name, *entry) for entry in floor.ratings]
+        for end, value in zip(("lower", "upper"), prediction.interval, strict=True):
+            ratings.append((floor.name, f"{end} end of the interval", "ISO 717-2", value, ""))
+        required = prediction.requirement
+        if required:
+            ratings.append((floor.name, "required", "", required.required, str(required)))
+        contributions += [(floor.name, name, *ends) for name, ends in floor.contributions.items()]
+        if changes:
+            changed += [(floor.name, *change) for change in floor.changes]
+    result = {"bands": bands, "ratings": ratings, "contributions": contributions}
+    return {**result, "changes": changed} if changes else result
+
+
+def _rating_entry(
+    title: str, standard: str, levels: np.ndarray[tuple[int], np.dtype[np.float64]]
+) -> tuple[str, str, float, str]:
+    value = rating(levels, BANDS)
+    return title, standard, value.a_weighted, f"{value.rounded} dB"
+
+
+def _effective_values(group: FloorOptions | Room, owner: str) -> Iterator[tuple[Key, object, bool]]:
+    """Yield the keys of a group that have an effect, their values, and whether by default."""
+    off = [
+        prefix
+        for (switch, value), prefixes in _WITHOUT_EFFECT.items()
+        if getattr(group, switch, None) == value
+        for prefix in prefixes
+    ]
+    for key in KEYS:
+        if key.owner != owner or not hasattr(group, key.name):
+            continue
+        value = getattr(group, key.name)
+        is_default = value == getattr(type(group)(), key.name)
+        if key.name.startswith(("point_", _REQUIRED, *off)) or (is_default and value in (0.0, ())):
+            continue
+        yield key, value, is_default
+
+
+def _value_text(key: Key, value: object) -> str:
+    """Return the value of a key with its unit."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    if not all(isinstance(number, float) for number in numbers):
+        return ", ".join(humanize(str(entry)) for entry in numbers)
+    unit, size = display_unit(key.unit, max(map(abs, numbers), default=0.0))
+    text = ", ".join(f"{number / size:.5g}" for number in numbers)
+    return f"{text} {unit.replace('m2', 'm²').replace('m3', 'm³')}".strip()
+
+
+def _variants(
+    floor: Any,  # noqa: ANN401 - the keys of floors differ
+    room: Room,
+) -> list[tuple[str, FloorOptions, Room]]:
+    """Return changes of floor and room in words, with the changed floor and room."""
+    variants: list[tuple[str, FloorOptions, Room]] = []
+
+    def add(text: str, floor: FloorOptions = floor, room: Room = room) -> None:
+        variants.append((text, floor, room))
+
+    for key, title in _THICKNESSES.items():
+        value = getattr(floor, key, 0.0)
+        if value:
+            add(f"{title} +{1e3 * _ADDED:g} mm", replace(floor, **{key: value + _ADDED}))
+    if isinstance(floor, LaminateFloor) and floor.layer_thickness:
+        top, *others = floor.layer_thickness
+        layers = (top + _ADDED, *others)
+        add(f"top lamella +{1e3 * _ADDED:g} mm", replace(floor, layer_thickness=layers))
+    if getattr(floor, "screed_thickness", 0.0):
+        stiffness = floor.layer_stiffness / 2
+        add("stiffness of the resilient layer halved", replace(floor, layer_stiffness=stiffness))
+    if room.ceiling_mass:
+        add("mass of the ceiling doubled", room=replace(room, ceiling_mass=2 * room.ceiling_mass))
+    time = room.reverberation_time
+    times = tuple(2 * value for value in (time if isinstance(time, tuple) else (time,)))
+    add("reverberation time doubled", room=replace(room, reverberation_time=times))
+    return variants
+
+
+def _case_layers(prediction: RoomPrediction) -> list[Layer]:
+    """Return the layers that the keys of floor and room describe."""
+    floor, room = prediction.floor, prediction.room
+    layers: list[Layer] = []
+
+    def add(material: str, thickness: float) -> None:
+        layers.append(Layer(material, round(thickness, 6), 0.0))
+
+    assert isinstance(floor, Plate | LaminateFloor | JoistFloor)  # noqa: S101 - it radiates
+    if floor.screed_thickness:
+        add(f"floating plate, {floor.screed_density:g} kg/m³", floor.screed_thickness)
+        add(f"resilient layer {_ASSUMED}", _LAYER)
+    cavity = room.ceiling_depth if room.ceiling_mass else 0.0
+    if isinstance(floor, Plate):
+        add(f"plate, {floor.density:g} kg/m³", floor.thickness)
+    elif isinstance(floor, LaminateFloor):
+        mass = prediction.mass_per_area - floor.added_mass
+        add(f"laminate, {floor.density:g} kg/m³", mass / floor.density)
+    else:
+        add(f"sheathing, {floor.sheathing_density:g} kg/m³", floor.sheathing_thickness)
+        apart = f"{1e3 * floor.joist_width:g} mm wide, {floor.spacing:g} m apart"
+        add(f"joists, {apart}", floor.joist_height)
+        cavity -= floor.joist_height
+    if cavity > 0:
+        add("cavity", cavity)
+    if room.ceiling_mass:
+        add(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)
+    return layers

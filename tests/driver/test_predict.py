@@ -1,0 +1,296 @@
+"""The command ``predict``: its tables and pages state what the prediction states."""
+
+from __future__ import annotations
+
+import csv
+import html
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import MINIMAL, names_in
+from test_figure_look import assert_clean
+
+import thud
+from thud import cli
+from thud.plot.room_figures import draw_ranges
+from thud.report.floor_files import contents, page_contents, screen_text
+from thud.report.floor_page import floor_page
+from thud.report.predicted_floor import (
+    COLUMNS,
+    PredictedFloor,
+    band_rows,
+    deviation_text,
+    difference_text,
+)
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import ErrorsOf
+
+TABLES = ["bands.csv", "contributions.csv", "ratings.csv"]
+DECK = "concrete 180, screed on 15 MN/m3, ceiling"
+
+
+def predicted(name: str = DECK, **room: float) -> PredictedFloor:
+    """Return a construction and its prediction."""
+    entry = thud.construction(name)
+    case = entry.case(thud.Case(room=thud.Room(**room)))  # type: ignore[arg-type]
+    return PredictedFloor(name, case.name, thud.predict_level(thud.solve(case)), entry)
+
+
+@pytest.fixture(scope="module")
+def floor() -> PredictedFloor:
+    """Return the prediction of a construction with all kinds of layers, and a requirement."""
+    return predicted(volume=40.0, required=49.0)
+
+
+@pytest.fixture(scope="module")
+def page(floor: PredictedFloor, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the directory of a page."""
+    folder = tmp_path_factory.mktemp("predict")
+    for name, content in page_contents(floor, folder).items():
+        (folder / name).write_bytes(content)
+    return folder
+
+
+def text_of(page: Path, floor: PredictedFloor) -> str:
+    """Return the text of the HTML without figures."""
+    text = (page / f"{floor.file}.html").read_text(encoding="utf-8")
+    text = re.sub(r"<(style|svg).*?</\1>", "", text, flags=re.DOTALL)
+    return html.unescape(re.sub(r"<[^>]*>", " ", text))
+
+
+def read_table(content: bytes) -> list[dict[str, str]]:
+    comment, _, rows = content.decode().partition("\n")
+    assert comment.startswith("# thud ")
+    return list(csv.DictReader(rows.splitlines()))
+
+
+def test_tables_have_the_numbers_of_the_prediction(floor: PredictedFloor, tmp_path: Path) -> None:
+    prediction = floor.prediction
+    files = contents([floor], tmp_path, report=False)
+    bands = read_table(files["bands.csv"])
+    assert [float(row["band, Hz"]) for row in bands] == prediction.frequency.tolist()
+    expected = {
+        "energy, mJ": 1e3 * prediction.energy,
+        "radiation factor": prediction.radiation_factor,
+        "loss factor": prediction.loss_factor,
+        "T, s": prediction.reverberation_time,
+        "statistical, dB": prediction.level,
+        "spread, dB": prediction.spread,
+        "modal, dB": prediction.modal_level,
+        "simply supported, dB": prediction.simple_level,
+        "clamped, dB": prediction.clamped_level,
+        "standardized, dB": prediction.standardized,
+        "room modes": prediction.room_modes,
+    }
+    for title, values in expected.items():
+        assert [float(row[title]) for row in bands] == values.tolist(), title
+    assert {*COLUMNS} - {*expected} == {"force level, dB re 1 N"}
+    # The energy in a band is its force exposure times the conductance.
+    force = np.array([float(row["force level, dB re 1 N"]) for row in bands])
+    assert 10 ** (force / 10) * prediction.conductance == pytest.approx(prediction.energy, rel=1e-9)
+    ratings = {row["rating"]: row for row in read_table(files["ratings.csv"])}
+    assert float(ratings["statistical prediction"]["value, dB"]) == prediction.rating.a_weighted
+    assert float(ratings["prediction by modes"]["value, dB"]) == prediction.modal_rating.a_weighted
+    octaves = ratings["statistical, of octaves"]
+    assert float(octaves["value, dB"]) == prediction.octave_rating.a_weighted
+    assert ratings["required"]["text"] == str(prediction.requirement)
+
+
+def test_interval_is_that_of_the_listed_contributions(
+    floor: PredictedFloor, tmp_path: Path
+) -> None:
+    """No interval is stated without what it consists of."""
+    rows = read_table(contents([floor], tmp_path, report=False)["contributions.csv"])
+    assert {row["contribution"] for row in rows} == floor.prediction.contributions.keys()
+    ends = [[float(row[f"{end}, dB"]) for row in rows] for end in ("lower", "upper")]
+    distances = [np.hypot.reduce(values) for values in ends]
+    low, high = floor.prediction.interval
+    rated = floor.prediction.rated
+    assert [rated - low, high - rated] == pytest.approx(distances)
+    sizes = np.abs(ends).max(axis=0)
+    assert (np.diff(sizes) <= 0).all()
+    assert f"{rated:.0f} dB ({low:.0f} to {high:.0f})" == floor.rated_text
+
+
+def test_page_states_ratings_contributions_and_sources(floor: PredictedFloor, page: Path) -> None:
+    text = text_of(page, floor)
+    # The index of the rating is in an element of its own.
+    plain = text.replace("L iA,Fmax ", "L_iA,Fmax")
+    assert floor.rated_text in text
+    assert f"{floor.prediction.octave_rating.rounded} dB, no class" in text
+    assert str(floor.prediction.requirement) in plain
+    for ends in floor.prediction.contributions.values():
+        assert deviation_text(ends) in text
+    assert floor.construction
+    for source in floor.construction.sources.values():
+        assert source in text
+    for words in ("5 × 4 × 2 m, 40 m³", "T = 0.5 s", "stated in the case", "15 MN/m³"):  # noqa: RUF001
+        assert words in text
+    for words in floor.prediction.warnings:
+        assert words in text
+    for row in band_rows(floor):
+        assert all(cell in text for cell in row)
+
+
+def test_levels_by_modes_end_with_the_modal_bands(floor: PredictedFloor) -> None:
+    modal = [row[band_rows(floor)[0].index("modal, dB")] for row in band_rows(floor)[1:]]
+    count = floor.prediction.n_modal
+    assert 0 < count < len(modal)
+    assert {*modal[count:]} == {"–"}
+    assert [float(cell.replace("−", "-")) for cell in modal[:count]] == pytest.approx(
+        floor.prediction.modal_level[:count], abs=0.051
+    )
+
+
+def test_pdf_has_two_pages_with_the_rating(floor: PredictedFloor, page: Path) -> None:
+    pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
+    document = pdfium.PdfDocument(page / f"{floor.file}.pdf")
+    first, second = (sheet.get_textpage().get_text_bounded() for sheet in document)
+    assert floor.rated_text in " ".join(first.split())
+    assert "Assumptions" in first
+    assert "What would change it" in second
+    assert "end of report" in second
+    for sheet in document:
+        assert (round(sheet.get_width()), round(sheet.get_height())) == (595, 842)
+
+
+def test_changes_are_predictions_of_the_changed_floor(floor: PredictedFloor) -> None:
+    changes = {change.text: change.difference for change in floor.changes}
+    prediction = floor.prediction
+    deck, room = prediction.floor, prediction.room
+    assert isinstance(deck, thud.Plate)
+    thick = thud.predict_level(floor=replace(deck, thickness=0.19), room=room)
+    assert changes["bearing plate +10 mm"] == pytest.approx(thick.rated - prediction.rated)
+    long = thud.predict_level(floor=deck, room=replace(room, reverberation_time=1.0))
+    assert changes["reverberation time doubled"] == pytest.approx(long.rated - prediction.rated)
+    assert {"floating plate +10 mm", "mass of the ceiling doubled"} < changes.keys()
+
+
+def test_changes_out_of_range_are_not_allowed() -> None:
+    room = thud.Room(ceiling_mass=150.0)
+    floor = PredictedFloor("a", "a", thud.predict_level(floor=thud.Plate(), room=room))
+    changes = {change.text: change for change in floor.changes}
+    assert difference_text(changes["mass of the ceiling doubled"]) == "not allowed"
+    assert changes["bearing plate +10 mm"].difference < 0
+
+
+@pytest.mark.parametrize(
+    ("plate", "materials"),
+    [
+        (thud.Plate(screed_thickness=0.05), ["floating plate", "resilient layer", "plate"]),
+        (thud.JoistFloor(), ["sheathing", "joists, 60 mm wide, 0.4 m apart"]),
+        (thud.LaminateFloor(added_mass=90.0), ["laminate"]),
+    ],
+)
+def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: list[str]) -> None:
+    room = thud.Room(ceiling_mass=9.0, ceiling_depth=0.25)
+    floor = PredictedFloor("a", "a", thud.predict_level(floor=plate, room=room))
+    layers = floor.layers
+    for layer, material in zip(layers, [*materials, "cavity", "ceiling"], strict=True):
+        assert layer.material.startswith(material)
+    depth = 0.03 if "joists" in materials[-1] else 0.25
+    assert layers[-2].thickness == pytest.approx(depth)
+    if isinstance(plate, thud.LaminateFloor):
+        assert layers[0].thickness == pytest.approx(0.16)
+    rows = {meaning: (value, source) for meaning, value, source in floor.assumptions}
+    assert rows["mass per unit area of a suspended ceiling"] == ("9 kg/m²", "stated in the case")
+    assert "width of the floor" in " ".join(rows)
+    assert_clean(draw_ranges(floor.prediction))
+
+
+def test_large_room_has_no_prediction_by_modes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PredictedFloor, "changes", ())
+    floor = PredictedFloor(
+        "hall", "hall",
+        thud.predict_level(floor=thud.Plate(length=20.0, width=20.0), room=thud.Room(height=5.0)),
+    )  # fmt: skip
+    assert floor.prediction.n_modal == 0
+    titles = [title for title, *_ in floor.ratings]
+    assert not any("modes" in title or "both" in title for title in titles)
+    page = floor_page(floor, "", "")
+    assert "only prediction is the statistical one" in page
+    assert "2000 m³" in page
+    assert_clean(draw_ranges(floor.prediction))
+
+
+def test_hostile_names_are_text(floor: PredictedFloor, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PredictedFloor, "changes", ())
+    name = '<script>alert("a&b")</script>'
+    page = floor_page(replace(floor, name=name), "", "")
+    assert "<script>" not in page
+    assert html.escape(name) in page
+    assert "not drawn" in page
+
+
+def test_workbook_has_every_table(floor: PredictedFloor, tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    files = contents([replace(floor, name="=1+1")], tmp_path, report=False)
+    (tmp_path / "a.xlsx").write_bytes(files["predictions.xlsx"])
+    book = openpyxl.load_workbook(tmp_path / "a.xlsx")
+    assert [f"{name}.csv" for name in book.sheetnames] == [
+        "bands.csv",
+        "ratings.csv",
+        "contributions.csv",
+    ]
+    rows = list(book["bands"].iter_rows(values_only=True))
+    column = rows[0].index("statistical, dB")
+    assert [row[column] for row in rows[1:]] == pytest.approx(floor.prediction.level)
+    assert book["bands"]["A2"].data_type == "s"
+
+
+def test_command_prints_and_writes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "thud.report.floor_files.page_contents", lambda floor, _: {f"{floor.file}.html": b"page"}
+    )
+    case = thud.Case(name="my floor", floor=thud.Plate(), room=thud.Room(required=60.0))
+    thud.write_case(case, tmp_path / "case.nml")
+    out = tmp_path / "out"
+    words = [
+        "predict",
+        str(tmp_path / "case.nml"),
+        "--construction",
+        "concrete 140",
+        "-o",
+        str(out),
+    ]
+    assert cli.main([*words, "--report"]) == 0
+    printed = capsys.readouterr().out
+    assert max(map(len, printed.partition("Results:")[0].splitlines())) <= 80
+    prediction = thud.predict_level(floor=case.floor, room=case.room)
+    floor = PredictedFloor("my floor", "my_floor", prediction)
+    assert screen_text(floor) in printed
+    assert str(prediction.requirement) in printed
+    pages = ["my_floor.html", "concrete_140.html"]
+    assert {*TABLES, "changes.csv", *pages} <= {*names_in(out)}
+    # What belongs to a report is removed with it.
+    assert cli.main([*words, "-q"]) == 0
+    assert {*names_in(out)} - {".thud", "predictions.xlsx"} == {*TABLES}
+
+
+@pytest.mark.parametrize("name", ["../evil", "a/b", ".hidden"])
+def test_names_of_cases_stay_in_the_directory(name: str, tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text(
+        f"&case name = '{name}' /\n{MINIMAL}&floor name = 'plate' /\n&plate /\n&room /\n"
+    )
+    before = {*tmp_path.iterdir()}
+    out = tmp_path / "out"
+    cli.main(["predict", str(tmp_path / "case.nml"), "-q", "-o", str(out)])
+    assert {*tmp_path.iterdir()} <= {*before, out}
+
+
+def test_bad_input_is_one_sentence(tmp_path: Path, errors_of: ErrorsOf) -> None:
+    assert "--construction" in errors_of("predict")
+    assert "'concrete 180'" in errors_of("predict", "--construction", "conrete 180")
+    (tmp_path / "bare.nml").write_text(MINIMAL, encoding="utf-8")
+    message = errors_of("predict", tmp_path / "bare.nml", "-o", tmp_path / "out")
+    assert "bare" in message
+    assert "&floor" in message
+    assert not (tmp_path / "out").exists()
