@@ -78,7 +78,7 @@ def test_edges_have_the_frequencies_of_finite_elements(
     expected = get_modes(elements_of(edge), 20)[0]  # type: ignore[arg-type]
     found = frequencies_of(replace(CONCRETE, **keys), 1000.0)[:20]  # type: ignore[arg-type]
     oracle(
-        f"20 natural frequencies, edges {keys.get('support', 'simple')}, by finite elements",
+        "20 natural frequencies of a slab by finite elements",
         "independent code",
         found / expected - 1,
         2e-3,
@@ -117,7 +117,7 @@ def test_joists_have_the_mobility_of_an_exact_solution(
     edges = THIRDS[:, None] * 2 ** (np.array([-1.0, 1.0]) / 6)
     found = [thud.mobility(floor, np.linspace(low, high, 200)).real.mean() for low, high in edges]
     oracle(
-        f"Re Y {'on a joist' if on_joist else 'between joists'} in thirds by an exact solution",
+        "Re Y of a joist floor in one-third octaves by an exact solution",
         "independent code",
         10 * np.log10(found / expected),
         1.0,
@@ -139,7 +139,7 @@ def test_joists_radiate_as_an_exact_solution(
     )
     # The exact solution has no losses by radiation, and those of thud are the same.
     oracle(
-        f"energy radiated {'from a joist' if on_joist else 'between joists'}, octaves, exactly",
+        "energy radiated by a joist floor in octaves by an exact solution",
         "independent code",
         10 * np.log10(get_octaves(answer["radiated"]) / expected),
         2.0,
@@ -204,7 +204,7 @@ def test_two_bays_have_the_mobility_of_finite_elements(oracle: Callable[..., Non
         "mobility of a slab of two bays by finite elements",
         "independent code",
         20 * np.log10(abs(found / np.ravel(expected))),
-        0.5,
+        1.0,
         "dB",
     )
 
@@ -255,7 +255,7 @@ def test_energies_given_are_those_that_are_lost(oracle: Callable[..., None]) -> 
         room = thud.modal_room(impact, floor, thud.Room())
         for name, energy in (("floor", room.floor_energy), ("room", room.room_energy)):
             oracle(
-                f"modal room below {type(floor).__name__}: energy into the {name} − lost",
+                "modal room: energy into floor and room − energy lost",
                 "balance",
                 energy[:, 0] / energy[:, 1] - 1,
                 1e-9,

@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
-from thud.base.checks import refuse_value, require_kind, require_whole
+from thud.base.checks import refuse, refuse_value, require_kind, require_whole
 from thud.case.case import Case, case_text
 from thud.impact.mobility import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, low_pass
@@ -197,6 +197,8 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
     case = case_text(Case(floor=floor))
     modes = ask("floor_modes", case=case, highest=1e6)
     frequency = modes["frequency"][:count]
+    if not len(frequency):
+        refuse(f"floor: no mode lies below {modes['limit']:.0f} Hz", "a floor with modes")
     count = len(frequency)
     x, y = np.linspace(0, modes["length"], POINTS), np.linspace(0, modes["width"], POINTS)
     points = [coordinate.ravel() for coordinate in np.meshgrid(x, y)]
