@@ -253,7 +253,7 @@ def test_energies_given_are_those_that_are_lost(oracle: Callable[..., None]) -> 
     impact = thud.solve()
     for floor in (thud.Plate(support="clamped"), thud.JoistFloor(), thud.LaminateFloor()):
         room = thud.modal_room(impact, floor, thud.Room())
-        for name, energy in (("floor", room.floor_energy), ("room", room.room_energy)):
+        for _name, energy in (("floor", room.floor_energy), ("room", room.room_energy)):
             oracle(
                 "modal room: energy into floor and room − energy lost",
                 "balance",
