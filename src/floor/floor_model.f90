@@ -33,7 +33,6 @@ module thud_floor_model
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
-      procedure, pass(options) :: has_modes
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
       procedure, pass(options) :: has_modal_conductance
@@ -148,14 +147,6 @@ contains
       highest = huge(highest)
       reason = ''
    end subroutine get_validity
-
-   !> Whether the floor has modes that radiate; by default it has none.
-   pure function has_modes(options) result(yes)
-      class(floor_model_type), intent(in) :: options
-      logical :: yes
-
-      yes = .false.
-   end function has_modes
 
    !> Modes of the floor, with its own support or another one; floors without modes return an error.
    subroutine get_room_modes(options, support, plate, modes, error, max_frequency)

@@ -46,7 +46,6 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_source
       procedure, pass(options) :: get_modes
       procedure, pass(options) :: get_validity
-      procedure, pass(options) :: has_modes
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
       procedure(get_base), deferred, pass(options) :: get_base
@@ -281,14 +280,6 @@ contains
       stack%radiator = size(stack%plate)
       call get_floor_modes(trim(group), stack, plate, modes, error, max_frequency)
    end subroutine get_modes
-
-   !> Rectangular floors have modes.
-   pure function has_modes(options) result(yes)
-      class(rectangular_floor_type), intent(in) :: options
-      logical :: yes
-
-      yes = .true.
-   end function has_modes
 
    !> Modes of the floor with a support of its edges.
    subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
