@@ -224,7 +224,12 @@ contains
       integer :: i
 
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_room_modes(floor%get_support(), plate, modes, error)
+         ! Without shapes, all modes; for shapes, no more than needed, because a large floor has many.
+         if (size(request%get_array('x')) == 0) then
+            call floor%get_room_modes(floor%get_support(), plate, modes, error)
+         else
+            call floor%get_room_modes(floor%get_support(), plate, modes, error, 2*request%get_number('highest'))
+         end if
       end associate
       if (allocated(error)) return
       order = pack([(i, i=1, size(modes%omega))], modes%omega < min(2*pi*request%get_number('highest'), modes%limit))

@@ -61,6 +61,7 @@ contains
       call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
       if (allocated(error)) return
       associate (floor => case%floors(get_floor_number(case))%model)
+         level = level - floor%get_improvement(size(bands))
          call floor%get_radiator(bands%center, plate, conductance, error)
          if (.not. allocated(error)) call check_below(plate, case%room, error)
          if (.not. allocated(error)) call floor%get_room_modes(floor%get_support(), plate, modes, error)
@@ -73,8 +74,8 @@ contains
          end if
          call get_room_level(plate, conductance, radiation_factor, case%room, bands, level, prediction)
          call get_room_level(plate, conductance, radiation_factor, get_bare_room(case%room), bands, level, bare)
-         call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, prediction%level - bare%level, &
-            prediction, error)
+         call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, &
+            prediction%level - bare%level - floor%get_improvement(size(bands)), prediction, error)
          if (.not. allocated(error)) call add_contributions(case, plate, conductance, radiation_factor, level, prediction)
       end associate
    end subroutine predict_room

@@ -35,6 +35,7 @@ module thud_floor_model
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
+      procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
    end type floor_model_type
 
@@ -171,6 +172,16 @@ contains
 
       support = ''
    end function get_support
+
+   !> Reduction of the levels in the room by a covering whose improvement is stated, dB; by default none.
+   pure function get_improvement(options, n_band) result(improvement)
+      class(floor_model_type), intent(in) :: options
+      !> Number of one-third-octave bands from 50 Hz on.
+      integer, intent(in) :: n_band
+      real(wp) :: improvement(n_band)
+
+      improvement = 0.0_wp
+   end function get_improvement
 
    !> Whether the mean power into the floor follows from its modes, because no homogeneous plate represents it.
    pure function has_modal_conductance(options) result(yes)

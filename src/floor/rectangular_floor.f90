@@ -20,6 +20,9 @@ module thud_rectangular_floor
    !> Supports of the edges.
    character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic']
 
+   !> Numbers of octaves and one-third-octave bands of a rating.
+   integer, parameter :: octave_bands = 4, third_bands = 12
+
    !> The floor; all plates have the same length and width.
    type, abstract, extends(floor_model_type) :: rectangular_floor_type
       !> Relative position of the source along length and width.
@@ -35,6 +38,8 @@ module thud_rectangular_floor
       type(screed_type) :: screed
       !> Stiffness of a covering under the source, N/m (0: none), and its loss factor.
       real(wp) :: covering_stiffness = 0.0_wp, covering_loss_factor = 0.2_wp
+      !> Reduction of the heavy impact sound by a covering, dB: one for each octave or one-third-octave band; empty: none.
+      type(list_type) :: covering_improvement
    contains
       procedure, pass(options) :: get_source_fields
       procedure, pass(options) :: get_build_up_fields
@@ -48,6 +53,7 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
+      procedure, pass(options) :: get_improvement
       procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
 
@@ -98,7 +104,9 @@ contains
          real_field('covering_stiffness', options%covering_stiffness, 'N/m', &
          'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
          real_field('covering_loss_factor', options%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
-         '[0.01, 2]')]
+         '[0.01, 2]'), &
+         list_field('covering_improvement', options%covering_improvement, 'dB', 'measured reduction of heavy impact sound ' &
+         //'by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz', '[-30, 60]')]
    end function get_build_up_fields
 
    !> Checks supports and positions.
@@ -125,7 +133,13 @@ contains
       call check_positions(options%screed%bridge_x, 'bridge_x', plate%length)
       call check_positions(options%screed%bridge_y, 'bridge_y', plate%width)
       if (allocated(error)) return
-      if (options%support == 'free' .and. options%line_x%count + options%line_y%count == 0) then
+      if (all(options%covering_improvement%count /= [0, octave_bands, third_bands])) then
+         error = input_error('&'//trim(group)//': covering_improvement has '//to_text(options%covering_improvement%count) &
+            //' values; allowed: 4, one for each octave from 63 to 500 Hz, or 12, one for each one-third-octave band')
+      else if (options%covering_improvement%count > 0 .and. options%covering_stiffness > 0.0_wp) then
+         error = input_error('&'//trim(group)//': covering_stiffness and covering_improvement describe the same covering ' &
+            //'twice; allowed: one of them')
+      else if (options%support == 'free' .and. options%line_x%count + options%line_y%count == 0) then
          error = input_error('&'//trim(group)//': support = free needs supports at line_x or line_y; allowed: at least one')
       else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
          error = input_error('&'//trim(group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
@@ -301,6 +315,19 @@ contains
 
       support = options%support
    end function get_support
+
+   !> Reduction of the levels in the room by a covering, dB: [n_band].
+   pure function get_improvement(options, n_band) result(improvement)
+      class(rectangular_floor_type), intent(in) :: options
+      integer, intent(in) :: n_band
+      real(wp) :: improvement(n_band)
+      integer :: i
+
+      improvement = 0.0_wp
+      associate (stated => options%covering_improvement)
+         if (stated%count > 0) improvement = [(stated%values(1 + (i - 1)*stated%count/n_band), i=1, n_band)]
+      end associate
+   end function get_improvement
 
    !> Supports of the edges: [4].
    pure function get_edges(options, support) result(edge)

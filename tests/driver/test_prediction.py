@@ -252,9 +252,8 @@ def test_positions_are_drawn_unless_modes_are_none_or_too_many(
 
     plate, room = thud.Plate(), thud.Room()
     assert "room_positions" in drawn(plate, room)
-    # A stiff plate without modes where those of the room do not overlap.
-    small = thud.Plate(length=1, width=1, thickness=0.5)
-    assert "room_positions" not in drawn(small, thud.Room(volume=4, reverberation_time=0.3))
+    # A hall, whose modes overlap in all bands.
+    assert "room_positions" not in drawn(thud.Plate(length=12, width=10), thud.Room(height=8))
 
     def refuse(*_: object, **_more: object) -> None:
         message = "balls have another shape"
@@ -576,3 +575,26 @@ def test_paths_share_the_energy_that_enters_the_room(
     table = np.genfromtxt(path, delimiter=",", names=True)
     columns = [table[name] for name in ("direct_share", "wall_1_share", "wall_2_share")]
     assert pytest.approx(found.path_shares[:, :3], abs=1e-9) == np.array(columns).T
+
+
+def test_covering_lowers_both_predictions_by_its_improvement(shell: thud.Impact) -> None:
+    bare = thud.predict_level(shell, thud.Plate(), thud.Room())
+    octaves = (1.0, 3.0, 6.0, 10.0)
+    covered = thud.predict_level(shell, thud.Plate(covering_improvement=octaves), thud.Room())
+    expected = np.repeat(octaves, 3)
+    assert bare.level - covered.level == pytest.approx(expected, abs=1e-6)
+    assert bare.modal_level - covered.modal_level == pytest.approx(expected, abs=1e-6)
+    assert bare.clamped_level - covered.clamped_level == pytest.approx(expected, abs=1e-6)
+    with pytest.raises(thud.InputError, match=naming("covering_improvement", 3, 4, 12)):
+        thud.predict_level(shell, thud.Plate(covering_improvement=(1, 2, 3)), thud.Room())
+    both = thud.Plate(covering_improvement=octaves, covering_stiffness=1e6)
+    with pytest.raises(thud.InputError, match=naming("covering_stiffness", "covering_improvement")):
+        thud.predict_level(shell, both, thud.Room())
+
+
+def test_soft_covering_is_a_spring_under_the_source() -> None:
+    """Far below the floor's stiffness, the mobility is i omega over the spring with its loss."""
+    stiff = thud.Plate(thickness=1.0)
+    covered = thud.Plate(thickness=1.0, covering_stiffness=2e5, covering_loss_factor=0.3)
+    added = thud.mobility(covered, [50.0]) - thud.mobility(stiff, [50.0])
+    assert added == pytest.approx(2j * np.pi * 50 / (2e5 * (1 + 0.3j)), rel=1e-9)

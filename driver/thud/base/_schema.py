@@ -702,6 +702,9 @@ class Plate(Group):
         Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
     covering_loss_factor : float
         Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
+    covering_improvement : sequence of float
+        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
+        third oct, dB; -30 <= covering_improvement <= 60.
     point_x : sequence of float
         Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -739,6 +742,7 @@ class Plate(Group):
     bridge_stiffness: float = 100000000.0
     covering_stiffness: float = 0.0
     covering_loss_factor: float = 0.2
+    covering_improvement: Sequence[float] = ()
     point_x: Sequence[float] = ()
     point_y: Sequence[float] = ()
 
@@ -821,6 +825,9 @@ class LaminateFloor(Group):
         Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
     covering_loss_factor : float
         Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
+    covering_improvement : sequence of float
+        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
+        third oct, dB; -30 <= covering_improvement <= 60.
     point_x : sequence of float
         Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -860,6 +867,7 @@ class LaminateFloor(Group):
     bridge_stiffness: float = 100000000.0
     covering_stiffness: float = 0.0
     covering_loss_factor: float = 0.2
+    covering_improvement: Sequence[float] = ()
     point_x: Sequence[float] = ()
     point_y: Sequence[float] = ()
 
@@ -943,6 +951,9 @@ class JoistFloor(Group):
         Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
     covering_loss_factor : float
         Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
+    covering_improvement : sequence of float
+        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
+        third oct, dB; -30 <= covering_improvement <= 60.
     point_x : sequence of float
         Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -983,6 +994,7 @@ class JoistFloor(Group):
     bridge_stiffness: float = 100000000.0
     covering_stiffness: float = 0.0
     covering_loss_factor: float = 0.2
+    covering_improvement: Sequence[float] = ()
     point_x: Sequence[float] = ()
     point_y: Sequence[float] = ()
 
@@ -1341,6 +1353,7 @@ KEYS = (
     Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("plate", "plate", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("plate", "plate", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
+    Key("plate", "plate", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third oct", (), -30.0, 60.0),
     Key("plate", "plate", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("plate", "plate", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("laminate_floor", "laminate_floor", "length", "real", "m", "length of the floor, along layers of 0 degrees", (), 0.5, 100.0),
@@ -1375,6 +1388,7 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
+    Key("laminate_floor", "laminate_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third oct", (), -30.0, 60.0),
     Key("laminate_floor", "laminate_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("laminate_floor", "laminate_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
@@ -1410,6 +1424,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
+    Key("joist_floor", "joist_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third oct", (), -30.0, 60.0),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "limit of the mobility at high frequencies", (), 0.0, 1000.0),

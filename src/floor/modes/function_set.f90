@@ -120,10 +120,11 @@ contains
       integer, intent(in) :: order
       !> Values, 1/m**(order + 1/2).
       real(wp) :: value(size(position), set%count)
-      real(wp) :: legendre(0:size(set%coefficient, 1) - 1, 0:2)
+      real(wp), allocatable :: legendre(:, :)
       integer :: i, j
 
       if (set%kind == polynomials) then
+         allocate (legendre(0:size(set%coefficient, 1) - 1, 0:2))
          do i = 1, size(position)
             call get_legendre(2*position(i)/set%length - 1, legendre(:, 0), legendre(:, 1), legendre(:, 2))
             do j = 0, ubound(legendre, 1)
