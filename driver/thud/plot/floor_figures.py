@@ -59,6 +59,7 @@ MAX_SHAPES, POINTS = 30, 60
 _DENSITY = 400
 
 
+@own_style()
 def draw_construction(construction: Construction) -> Figure:
     """Draw the section of a floor to scale, with its layers."""
     return draw_section(construction.layers, construction.name)
