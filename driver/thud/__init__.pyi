@@ -164,6 +164,7 @@ from .base._schema import (
     Modes as Modes,
     Oscillator as Oscillator,
     Plate as Plate,
+    RectangularFloor as RectangularFloor,
     Rigid as Rigid,
     Room as Room,
     Sampling as Sampling,
