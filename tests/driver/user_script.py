@@ -69,7 +69,8 @@ tables = (
 )
 floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
 floors += [thud.Plate(screed_thickness=0.05), thud.JoistFloor(), thud.MeasuredMobility()]
-floors += [thud.LaminateFloor()]
+plates: list[thud.RectangularFloor] = [thud.LaminateFloor()]
+assert all(isinstance(plate, thud.RectangularFloor) for plate in plates)
 light: thud.Impact = thud.solve(ball, floor=floors[1])
 point: thud.MobilityFit = thud.fit_mobility(([10.0, 20.0, 40.0], [1e-5, 2e-5, 1e-5]), order=1)
 moved: thud.FloorImpact | None = light.on_floor
