@@ -17,15 +17,19 @@ from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
 )
+from .export.floor_sound import (
+    FloorSound as FloorSound,
+)
 from .export.force_files import (
     BlockedForce as BlockedForce,
     blocked_force as blocked_force,
 )
 from .export.room_sound import (
-    FloorSound as FloorSound,
     RoomSound as RoomSound,
-    SoundLevels as SoundLevels,
     listen as listen,
+)
+from .export.sound_levels import (
+    SoundLevels as SoundLevels,
 )
 from .floors.constructions import (
     Construction as Construction,
