@@ -147,8 +147,7 @@ def _required(prediction: RoomPrediction) -> str:
     required = prediction.requirement
     if required is None:
         return ""
-    verdict = "met" if required.met else "not met"
-    return f"{required.required:g} ({required.rating}): {verdict}"
+    return f"{required.required:g} ({required.rating}): {required.verdict}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:

@@ -108,8 +108,11 @@ class RoomPrediction(RoomLevel, Displayed):
         room = self.room
         if not room.required:
             return None
-        level = self.ratings[room.required_rating].rounded
-        return Requirement(room.required_rating, room.required, level)
+        statistical = self.ratings[room.required_rating].a_weighted
+        level, low, high = np.add(
+            [self.rated, *self.interval], statistical - self.rating.a_weighted
+        )
+        return Requirement(room.required_rating, room.required, level, (low, high))
 
     @property
     def standardized(self) -> Array:
