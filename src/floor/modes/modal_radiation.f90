@@ -158,13 +158,13 @@ contains
             frequency = edge(1)*ratio**((l - 0.5_wp)/n)
             w = 2*pi*frequency
             if (present(drive)) then
-               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*omega*loss_factor, wp), 2, &
+               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, omega**2*loss_factor, wp), 2, &
                   size(drive, 2))*drive
                power = power + frequency*get_power(transforms, amplitude)
                velocity = velocity + frequency*get_square_velocity(modes, kept, amplitude)
                total = total + frequency*size(drive, 2)
             else
-               response = square*w**2/((omega**2 - w**2)**2 + (w*omega*loss_factor)**2)
+               response = square*w**2/((omega**2 - w**2)**2 + (omega**2*loss_factor)**2)
                power = power + frequency*sum(response*resistance)
                velocity = velocity + frequency*sum(response*square)
                total = total + frequency*modes%stack%length*modes%stack%width
