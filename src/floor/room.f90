@@ -471,6 +471,12 @@ contains
    pure function get_path_shares(energies, n_path) result(share)
       type(band_energies_type), intent(in) :: energies
       !> Number of paths: the floor and the walls. What else radiates, a ceiling's cavity, belongs to the floor.
+         ! The decay of a finished room contains what it loses to floor and walls.
+         if (room%reverberation_of == finished_room) then
+            associate (leaving => flow%rate(:, at_room))
+               leaving = leaving*min(1.0_wp, decay/max(sum(leaving), tiny(decay)))
+            end associate
+         end if
       integer, intent(in) :: n_path
       real(wp) :: share(n_path)
       real(wp) :: matrix(size(energies%initial_energy), size(energies%initial_energy))

@@ -604,3 +604,28 @@ def test_soft_covering_is_a_spring_under_the_source() -> None:
     covered = thud.Plate(thickness=1.0, covering_stiffness=2e5, covering_loss_factor=0.3)
     added = thud.mobility(covered, [50.0]) - thud.mobility(stiff, [50.0])
     assert added == pytest.approx(2j * np.pi * 50 / (2e5 * (1 + 0.3j)), rel=1e-9)
+
+
+@pytest.mark.parametrize(("floor", "n_modal"), [(thud.JoistFloor(), 6), (thud.LaminateFloor(), 7)])
+def test_bands_beyond_the_modes_are_those_of_the_simply_supported_floor(
+    shell: thud.Impact, floor: thud.JoistFloor | thud.LaminateFloor, n_modal: int
+) -> None:
+    """Polynomials resolve few waves of light floors: levels fell by up to 27 dB without a word."""
+    room = thud.Room(volume=50.0)
+    simple = thud.predict_level(shell, floor, room)
+    clamped = thud.predict_level(shell, replace(floor, support="clamped"), room)
+    assert clamped.level[-4:] == pytest.approx(simple.level[-4:], abs=1.0)
+    # Modes of clamped joists end below the band of 200 Hz.
+    assert (simple.n_modal, clamped.n_modal) == (7, n_modal)
+    assert abs(clamped.level[0] - simple.level[0]) > 1
+
+
+def test_finished_room_decays_as_stated_below_a_light_floor(shell: thud.Impact) -> None:
+    """What it loses to floor and ceiling is a part of its reverberation time."""
+    floor = thud.LaminateFloor(length=3.0, width=2.0, subceiling_thickness=0.0125, cavity_depth=0.2)
+    short, long = (
+        thud.predict_level(shell, floor, thud.Room(reverberation_time=(time,)))
+        for time in (0.3, 1.2)
+    )
+    # The floor alone absorbed so much at 50 Hz that both times gave one level.
+    assert long.level[0] > short.level[0] + 1.5
