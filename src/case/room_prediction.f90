@@ -3,6 +3,7 @@
 module thud_room_prediction
    use thud_band, only: band_type, octave_count
    use thud_case, only: case_type, get_floor_number
+   use thud_constants, only: pi
    use thud_error, only: error_type
    use thud_floor_model, only: floor_model_type
    use thud_floor_modes, only: floor_modes_type
@@ -68,7 +69,8 @@ contains
          if (allocated(error)) return
          radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)
          if (case%room%radiation == modal_radiation .or. floor%has_modal_conductance()) then
-            call get_modal_radiation(modes, plate, case%room%air, bands, get_area(case%room, plate), radiation)
+            call get_radiation(case%room, floor, plate, modes, bands, radiation, error)
+            if (allocated(error)) return
             if (case%room%radiation == modal_radiation) radiation_factor = radiation%radiation_factor
             if (floor%has_modal_conductance()) conductance = radiation%conductance
          end if
@@ -79,6 +81,34 @@ contains
          if (.not. allocated(error)) call add_contributions(case, plate, conductance, radiation_factor, level, prediction)
       end associate
    end subroutine predict_room
+
+   !> Radiation of a floor in bands. Those that its modes do not reach, because polynomials resolve few waves, have that of
+   !> the simply supported floor: its waves are so short that edges matter little.
+   subroutine get_radiation(room, floor, plate, modes, bands, radiation, error)
+      type(room_type), intent(in) :: room
+      class(floor_model_type), intent(in) :: floor
+      type(plate_type), intent(in) :: plate
+      !> Modes of the floor as it is supported.
+      type(floor_modes_type), intent(in) :: modes
+      !> The bands: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      type(modal_radiation_type), intent(out) :: radiation
+      !> Set if the modes cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(floor_modes_type) :: simple_modes
+      type(modal_radiation_type) :: beyond
+      type(plate_type) :: simple_plate
+      integer :: n
+
+      n = count(bands%upper <= modes%limit/(2*pi))
+      call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
+      if (n == size(bands)) return
+      call floor%get_room_modes('simple', simple_plate, simple_modes, error)
+      if (allocated(error)) return
+      call get_modal_radiation(simple_modes, plate, room%air, bands(n + 1:), get_area(room, plate), beyond)
+      radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor]
+      radiation%conductance = [radiation%conductance, beyond%conductance]
+   end subroutine get_radiation
 
    !> Part of a floor above a room: its ends along length and width, m.
    pure function get_area(room, plate) result(area)
