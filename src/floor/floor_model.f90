@@ -37,6 +37,7 @@ module thud_floor_model
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
+      procedure, pass(options) :: has_subceiling
    end type floor_model_type
 
    abstract interface
@@ -190,5 +191,13 @@ contains
 
       yes = .false.
    end function has_modal_conductance
+
+   !> Whether a subceiling is a part of the floor; by default not.
+   pure function has_subceiling(options) result(yes)
+      class(floor_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_subceiling
 
 end module thud_floor_model

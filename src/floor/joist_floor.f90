@@ -69,7 +69,7 @@ contains
          choice_field('source_on', options%source_on, &
          'impact location: midway between the next joists, on the next joist, or exactly the position', &
          [character(len=9) :: 'sheathing', 'joist', 'position']), &
-         options%get_build_up_fields(), options%get_point_fields()]
+         options%get_build_up_fields(on_joists=.true.), options%get_point_fields()]
    end function get_fields
 
    !> The smeared plate, and the sheathing with its joists.
@@ -210,6 +210,7 @@ contains
       lowest = 0.0_wp
       highest = (2*pi/(6*options%sheathing_thickness))**2*sqrt(base%stiffness%along/base%stiffness%mass)/(2*pi)
       reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
+      call options%limit_by_subceiling(base%plate, highest, reason)
    end subroutine get_validity
 
 end module thud_joist_floor

@@ -11,6 +11,8 @@ module thud_rectangular_floor
    use thud_receiver, only: receiver_type
    use thud_screed, only: get_screed_edge, get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, &
       screed_type
+   use thud_subceiling, only: get_cavity_limit, get_spaced_positions, get_subceiling_fields, get_subceiling_layer, &
+      get_subceiling_plate, subceiling_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -23,11 +25,11 @@ module thud_rectangular_floor
    !> Numbers of octaves and one-third-octave bands of a rating.
    integer, parameter :: octave_bands = 4, third_bands = 12
 
-   !> A floor without supports and floating plate.
+   !> A floor without supports, floating plate and subceiling.
    type :: base_floor_type
       !> Namelist group of the floor.
       character(len=key_length) :: group = ''
-      !> The plate with homogeneous stiffness that radiates into the room.
+      !> The plate with homogeneous stiffness.
       type(plate_type) :: plate
       !> Stiffnesses, masses and ribs.
       type(orthotropic_type) :: stiffness
@@ -48,6 +50,8 @@ module thud_rectangular_floor
       type(list_type) :: line_x, line_y
       !> Floating plate; no thickness: none.
       type(screed_type) :: screed
+      !> Subceiling, which radiates into the room; no thickness: none.
+      type(subceiling_type) :: subceiling
       !> Stiffness of a covering under the source, N/m (0: none), and its loss factor.
       real(wp) :: covering_stiffness = 0.0_wp, covering_loss_factor = 0.2_wp
       !> Reduction of the heavy impact sound by a covering, dB: one for each octave or one-third-octave band; empty: none.
@@ -64,15 +68,17 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_modes
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: limit_by_subceiling
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
+      procedure, pass(options) :: has_subceiling
       procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
 
    abstract interface
-      !> The floor without supports and floating plate.
+      !> The floor without supports, floating plate and subceiling.
       function get_base(options) result(base)
          import :: base_floor_type, rectangular_floor_type
          implicit none (type, external)
@@ -94,10 +100,16 @@ contains
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
-   !> Fields of supports, floating plate and covering.
-   function get_build_up_fields(options) result(fields)
+   !> Fields of supports, floating plate, subceiling and covering.
+   function get_build_up_fields(options, on_joists) result(fields)
       class(rectangular_floor_type), intent(in), target :: options
+      !> The subceiling hangs on joists (default: on the plate).
+      logical, intent(in), optional :: on_joists
       type(field_type), allocatable :: fields(:)
+      logical :: has_joists
+
+      has_joists = .false.
+      if (present(on_joists)) has_joists = on_joists
 
       fields = [ &
          choice_field('support', options%support, 'support of the edges', supports), &
@@ -110,6 +122,7 @@ contains
          list_field('line_y', options%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
          '(0, 100)'), &
          get_screed_fields(options%screed), &
+         get_subceiling_fields(options%subceiling, has_joists), &
          real_field('covering_stiffness', options%covering_stiffness, 'N/m', &
          'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
          real_field('covering_loss_factor', options%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
@@ -268,7 +281,7 @@ contains
       class(rectangular_floor_type), intent(in) :: options
       !> Namelist group of the floor.
       character(len=key_length), intent(out) :: group
-      !> The plate that radiates.
+      !> The bearing plate with homogeneous stiffness.
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       !> Set if they cannot be computed.
@@ -302,9 +315,35 @@ contains
          stack%plate = [base%stiffness]
          allocate (stack%layer(0))
       end if
+      stack%bearing = size(stack%plate)
+      if (options%has_subceiling()) then
+         stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(options%subceiling, plate))]
+         stack%layer = [stack%layer, get_subceiling_layer(options%subceiling, get_channels(options, base))]
+      end if
       stack%radiator = size(stack%plate)
       call get_floor_modes(trim(group), stack, plate, modes, error, max_frequency)
    end subroutine get_modes
+
+   !> Whether a subceiling radiates into the room.
+   pure function has_subceiling(options) result(yes)
+      class(rectangular_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = options%subceiling%thickness > 0.0_wp
+   end function has_subceiling
+
+   !> Positions of the lines along the length that hold the subceiling: those of the joists, or as stated, m: [n_line].
+   pure function get_channels(options, base) result(position)
+      class(rectangular_floor_type), intent(in) :: options
+      type(base_floor_type), intent(in) :: base
+      real(wp), allocatable :: position(:)
+
+      if (allocated(base%stiffness%ribs)) then
+         position = base%stiffness%ribs(1)%position
+      else
+         position = get_spaced_positions(base%plate%width, options%subceiling%channel_spacing)
+      end if
+   end function get_channels
 
    !> Modes of the floor with a support of its edges.
    subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
@@ -411,6 +450,25 @@ contains
          highest = min(highest, get_thin_limit(get_screed_plate(options%screed, base%plate)))
       end if
       reason = 'bending waves are shorter than six thicknesses, and a plate is not thin'
+      call options%limit_by_subceiling(base%plate, highest, reason)
    end subroutine get_validity
+
+   !> Lowers a limit of validity to that of the subceiling and its cavity.
+   pure subroutine limit_by_subceiling(options, above, highest, reason)
+      class(rectangular_floor_type), intent(in) :: options
+      !> The plate above the subceiling.
+      type(plate_type), intent(in) :: above
+      real(wp), intent(inout) :: highest
+      character(len=reason_length), intent(inout) :: reason
+
+      if (.not. options%has_subceiling()) return
+      associate (cavity => get_cavity_limit(options%subceiling), &
+         thin => get_thin_limit(get_subceiling_plate(options%subceiling, above)))
+         if (min(cavity, thin) >= highest) return
+         highest = min(cavity, thin)
+         reason = 'the cavity above the subceiling is deeper than a quarter of a wavelength, and no mere stiffness'
+         if (thin < cavity) reason = 'bending waves are shorter than six thicknesses of the subceiling, and it is not thin'
+      end associate
+   end subroutine limit_by_subceiling
 
 end module thud_rectangular_floor

@@ -20,9 +20,9 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: check_below, check_room, few_modes, get_completed_room, get_reverberation_times, get_room_bands
-   public :: get_required_interval, get_room_fields, get_room_level, judge_requirement, modal_radiation, room_level_type
-   public :: room_type, standard_positions
+   public :: check_below, check_below_subceiling, check_room, few_modes, get_completed_room, get_reverberation_times
+   public :: get_required_interval, get_room_bands, get_room_fields, get_room_level, judge_requirement, modal_radiation
+   public :: room_level_type, room_type, standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
@@ -253,6 +253,21 @@ contains
       end if
    end subroutine check_below
 
+   !> Checks that a room below a subceiling describes nothing that contradicts it.
+   subroutine check_below_subceiling(room, error)
+      type(room_type), intent(in) :: room
+      !> Set if the room has a ceiling of its own, or the radiation factor of one plate.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (room%ceiling%mass > 0.0_wp) then
+         error = input_error('&room: ceiling_mass and subceiling_thickness of the floor describe the same ceiling twice; ' &
+            //'allowed: one of them')
+      else if (room%radiation /= modal_radiation) then
+         error = input_error('&room: radiation = iso_12354 is that of free waves, and a subceiling follows the floor; ' &
+            //'allowed: modes')
+      end if
+   end subroutine check_below_subceiling
+
    !> One-third-octave bands of a prediction: those of the rating.
    subroutine get_room_bands(bands, error)
       !> The one-third-octave bands: [n_band].
@@ -456,6 +471,12 @@ contains
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
+         ! The decay of a finished room contains what it loses to floor and walls.
+         if (room%reverberation_of == finished_room) then
+            associate (leaving => flow%rate(:, at_room))
+               leaving = leaving*min(1.0_wp, decay/max(sum(leaving), tiny(decay)))
+            end associate
+         end if
          allocate (energies%loss_matrix, source=get_loss_matrix(flow))
          allocate (energies%initial_energy(size(flow%internal_loss)), energies%weight(size(flow%internal_loss)), &
             source=0.0_wp)
@@ -471,12 +492,6 @@ contains
    pure function get_path_shares(energies, n_path) result(share)
       type(band_energies_type), intent(in) :: energies
       !> Number of paths: the floor and the walls. What else radiates, a ceiling's cavity, belongs to the floor.
-         ! The decay of a finished room contains what it loses to floor and walls.
-         if (room%reverberation_of == finished_room) then
-            associate (leaving => flow%rate(:, at_room))
-               leaving = leaving*min(1.0_wp, decay/max(sum(leaving), tiny(decay)))
-            end associate
-         end if
       integer, intent(in) :: n_path
       real(wp) :: share(n_path)
       real(wp) :: matrix(size(energies%initial_energy), size(energies%initial_energy))

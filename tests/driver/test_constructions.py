@@ -86,6 +86,7 @@ def test_mass_of_the_layers_is_that_of_the_keys(entry: thud.Construction) -> Non
         assert isinstance(floor, thud.Plate)
         mass = floor.thickness * floor.density
     mass += floor.screed_thickness * floor.screed_density
+    mass += floor.subceiling_thickness * floor.subceiling_density
     mass += entry.room.get("ceiling_mass", 0.0)
     # Neither the resilient layer nor the air is in the keys.
     light = ("mineral wool", "polystyrene", "wood fiber", "cavity")

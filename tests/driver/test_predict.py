@@ -204,6 +204,25 @@ def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: li
     assert_clean(draw_ranges(floor.prediction))
 
 
+def test_subceiling_is_in_the_section_the_changes_and_the_page(shell: thud.Impact) -> None:
+    joists = thud.JoistFloor(length=2.5, width=2.0)
+    # With few modes in the room.
+    room = thud.Room(height=2.5, reverberation_time=(0.06,))
+    hung = replace(joists, subceiling_thickness=0.0125, cavity_depth=0.25)
+    floor = PredictedFloor("a", "a", thud.predict_level(shell, hung, room))
+    materials = [(layer.material.split(",")[0], layer.thickness) for layer in floor.layers]
+    assert materials[-2:] == [("cavity", 0.03), ("subceiling", 0.0125)]
+    changes = {change.text: change.difference for change in floor.changes}
+    assert changes["mass of the subceiling doubled"] < -3
+    assert changes["stiffness of the channels halved"] < 0
+    meanings = [meaning for meaning, *_ in floor.assumptions]
+    assert any("depth of the air between floor and subceiling" in text for text in meanings)
+    bare = PredictedFloor("b", "b", thud.predict_level(shell, joists, room))
+    assert not any("subceiling" in meaning for meaning, *_ in bare.assumptions)
+    assert "9 kg/m²" in floor_page(floor, "", "")
+    assert "none described" in floor_page(bare, "", "")
+
+
 def test_large_room_has_no_prediction_by_modes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PredictedFloor, "changes", ())
     floor = PredictedFloor(

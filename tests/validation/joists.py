@@ -30,6 +30,9 @@ from plate_elements import (
     FREE,
     SUPPORTED,
     Edge,
+    Layer,
+    LineSpring,
+    Plate,
     Rib,
     System,
     assemble,
@@ -88,6 +91,16 @@ class JoistFloor:
         return self.sheathing_density * self.sheathing_thickness
 
 
+@dataclass(frozen=True)
+class Subceiling:
+    """A plate below the joists, on springs along them, N/m2, and on the air between."""
+
+    plate: Plate
+    air: Layer
+    channel: float
+    channel_loss: float
+
+
 def get_joists(floor: JoistFloor) -> Array:
     """Return the positions of the joists across, m: as many as fit, in the middle of the width."""
     if floor.joists is not None:
@@ -137,14 +150,26 @@ def to_elements(
     size: float = 0.1,
     ends: tuple[Edge, Edge] = (SUPPORTED, SUPPORTED),
     points: Sequence[tuple[float, float]] = (),
+    below: Subceiling | None = None,
 ) -> System:
-    """Return the floor in finite elements; `points` become nodes, where a force is met best."""
+    """Return the floor in finite elements; `points` become nodes, where a force is met best.
+
+    A subceiling is the second plate.
+    """
     plate = isotropic_plate(
         floor.stiffness, floor.poisson_ratio, floor.mass, (*ends, *floor.sides), floor.loss_factor
     )
     x = get_grid(floor.length, size, [point[0] for point in points])
     y = get_grid(floor.width, size, [*get_joists(floor), *(point[1] for point in points)])
-    return assemble(x, y, [plate], ribs=get_ribs(floor))
+    if below is None:
+        return assemble(x, y, [plate], ribs=get_ribs(floor))
+    channels = [
+        LineSpring("x", y, below.channel, loss_factor=below.channel_loss, other=1)
+        for y in get_joists(floor).tolist()
+    ]
+    return assemble(
+        x, y, [plate, below.plate], ribs=get_ribs(floor), lines=channels, layer=below.air
+    )
 
 
 def _rib_dynamics(rib: Rib, k: Array, omega: Array, *, damped: bool) -> tuple[Array, Array]:

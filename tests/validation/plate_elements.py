@@ -126,7 +126,10 @@ class Rib:
 
 @dataclass(frozen=True)
 class LineSpring:
-    """A support along a grid line: stiffness per length against w, N/m2, and slope across, N."""
+    """A spring along a grid line: stiffness per length against w, N/m2, and slope across, N.
+
+    It stands between a plate and the ground, or the same line of another plate.
+    """
 
     along: str
     at: float
@@ -134,6 +137,7 @@ class LineSpring:
     rotation: float = 0.0
     loss_factor: float = 0.0
     plate: int = 0
+    other: int | None = None
 
 
 @dataclass(frozen=True)
@@ -250,11 +254,20 @@ class _Assembly:
     def n_rotation(self, rib: Rib) -> int:
         return 2 * len(self.nodes[rib.along]) - 1
 
-    def place(self, matrix: Any, plate: int = 0) -> Any:  # noqa: ANN401 - sparse
-        """Return a matrix of a plate, or of the plates from one on, among all unknowns."""
-        entries, first = matrix.tocoo(), plate * self.n_plate
+    def place(self, matrix: Any, plate: int = 0, other: int | None = None) -> Any:  # noqa: ANN401 - sparse
+        """Return a matrix of a plate, or of the plates from one on, among all unknowns.
+
+        With another plate, return that of the difference of both.
+        """
+        entries, rows, columns, values = matrix.tocoo(), [], [], []
+        plates = [plate] if other is None else [plate, other]
+        for row, column in itertools.product(plates, plates):
+            rows.append(entries.row + row * self.n_plate)
+            columns.append(entries.col + column * self.n_plate)
+            values.append(entries.data if row == column else -entries.data)
         return sparse.csr_array(
-            (entries.data, (entries.row + first, entries.col + first)), shape=(self.total,) * 2
+            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
+            shape=(self.total,) * 2,
         )
 
     def on_line(self, line: Rib | LineSpring, order: int, matrix: Any) -> Any:  # noqa: ANN401
@@ -262,7 +275,7 @@ class _Assembly:
         row = hermite_row(self.nodes["y" if line.along == "x" else "x"], line.at, order)
         across = row.T @ row
         pair = (matrix, across) if line.along == "x" else (across, matrix)
-        return self.place(sparse.kron(*pair), line.plate)
+        return self.place(sparse.kron(*pair), line.plate, getattr(line, "other", None))
 
     def row(self, x: ArrayLike, y: ArrayLike, plate: int, orders: tuple[int, int] = (0, 0)) -> Any:  # noqa: ANN401
         """Return the values at points, shape (n_point, n)."""
@@ -355,8 +368,7 @@ class _Assembly:
 
     def add_layer(self, layer: Layer) -> None:
         area = sparse.kron(self.products["x"][0, 0], self.products["y"][0, 0])
-        both = sparse.block_array([[area, -area], [-area, area]])
-        self.stiffness += layer.stiffness * (1 + 1j * layer.loss_factor) * self.place(both)
+        self.stiffness += layer.stiffness * (1 + 1j * layer.loss_factor) * self.place(area, 0, 1)
 
 
 def assemble(  # noqa: PLR0913 - a grid, and the kinds of components

@@ -631,6 +631,25 @@ class RectangularFloor(Group):
         Positions along the width of these bridges, m; 0 < bridge_y < 100.
     bridge_stiffness : float
         Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
+    subceiling_thickness : float
+        Thickness of a subceiling that radiates instead of the floor; 0: none, m; 0 <=
+        subceiling_thickness <= 0.2.
+    subceiling_density : float
+        Density of the subceiling, kg/m3; 10 <= subceiling_density <= 20000.
+    subceiling_modulus : float
+        Modulus of elasticity of the subceiling in bending, Pa; 1e+07 <= subceiling_modulus <=
+        1e+12.
+    subceiling_loss_factor : float
+        Loss factor of the subceiling; 0 <= subceiling_loss_factor <= 1.
+    channel_stiffness : float
+        Stiffness per length of each line that holds the subceiling (channels, battens, hangers),
+        N/m2; 0 <= channel_stiffness <= 1e+12.
+    channel_loss_factor : float
+        Loss factor of these lines; 0 <= channel_loss_factor <= 1.
+    cavity_depth : float
+        Depth of the air between floor and subceiling, m; 0.005 <= cavity_depth <= 2.
+    cavity_loss_factor : float
+        Loss factor of this air, high with absorber in it; 0 <= cavity_loss_factor <= 1.
     covering_stiffness : float
         Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
     covering_loss_factor : float
@@ -662,6 +681,14 @@ class RectangularFloor(Group):
     bridge_x: Sequence[float] = ()
     bridge_y: Sequence[float] = ()
     bridge_stiffness: float = 100000000.0
+    subceiling_thickness: float = 0.0
+    subceiling_density: float = 720.0
+    subceiling_modulus: float = 2500000000.0
+    subceiling_loss_factor: float = 0.02
+    channel_stiffness: float = 100000.0
+    channel_loss_factor: float = 0.1
+    cavity_depth: float = 0.1
+    cavity_loss_factor: float = 0.3
     covering_stiffness: float = 0.0
     covering_loss_factor: float = 0.2
     covering_improvement: Sequence[float] = ()
@@ -739,6 +766,9 @@ class Plate(RectangularFloor):
     edge_absorption : float
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
+    channel_spacing : float
+        Distance of the lines that hold the subceiling, which run along the length, m; 0.05 <=
+        channel_spacing <= 100.
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -752,6 +782,7 @@ class Plate(RectangularFloor):
     loss_factor: float = 0.005
     edges: PlateEdges = "building"
     edge_absorption: float = 0.0
+    channel_spacing: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -787,6 +818,9 @@ class LaminateFloor(RectangularFloor):
         Mass without stiffness on the plate, as gravel, kg/m2; 0 <= added_mass <= 1000.
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
+    channel_spacing : float
+        Distance of the lines that hold the subceiling, which run along the length, m; 0.05 <=
+        channel_spacing <= 100.
     """
 
     name: ClassVar[FloorName] = "laminate_floor"
@@ -802,6 +836,7 @@ class LaminateFloor(RectangularFloor):
     density: float = 470.0
     added_mass: float = 0.0
     loss_factor: float = 0.03
+    channel_spacing: float = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -1208,6 +1243,15 @@ KEYS = (
     Key("plate", "plate", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("plate", "plate", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
+    Key("plate", "plate", "subceiling_thickness", "real", "m", "thickness of a subceiling that radiates instead of the floor; 0: none", (), 0.0, 0.2),
+    Key("plate", "plate", "subceiling_density", "real", "kg/m3", "density of the subceiling", (), 10.0, 20000.0),
+    Key("plate", "plate", "subceiling_modulus", "real", "Pa", "modulus of elasticity of the subceiling in bending", (), 10000000.0, 1000000000000.0),
+    Key("plate", "plate", "subceiling_loss_factor", "real", "", "loss factor of the subceiling", (), 0.0, 1.0),
+    Key("plate", "plate", "channel_stiffness", "real", "N/m2", "stiffness per length of each line that holds the subceiling (channels, battens, hangers)", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "channel_loss_factor", "real", "", "loss factor of these lines", (), 0.0, 1.0),
+    Key("plate", "plate", "cavity_depth", "real", "m", "depth of the air between floor and subceiling", (), 0.005, 2.0),
+    Key("plate", "plate", "cavity_loss_factor", "real", "", "loss factor of this air, high with absorber in it", (), 0.0, 1.0),
+    Key("plate", "plate", "channel_spacing", "real", "m", "distance of the lines that hold the subceiling, which run along the length", (), 0.05, 100.0),
     Key("plate", "plate", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("plate", "plate", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
     Key("plate", "plate", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),
@@ -1243,6 +1287,15 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "subceiling_thickness", "real", "m", "thickness of a subceiling that radiates instead of the floor; 0: none", (), 0.0, 0.2),
+    Key("laminate_floor", "laminate_floor", "subceiling_density", "real", "kg/m3", "density of the subceiling", (), 10.0, 20000.0),
+    Key("laminate_floor", "laminate_floor", "subceiling_modulus", "real", "Pa", "modulus of elasticity of the subceiling in bending", (), 10000000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "subceiling_loss_factor", "real", "", "loss factor of the subceiling", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "channel_stiffness", "real", "N/m2", "stiffness per length of each line that holds the subceiling (channels, battens, hangers)", (), 0.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "channel_loss_factor", "real", "", "loss factor of these lines", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "cavity_depth", "real", "m", "depth of the air between floor and subceiling", (), 0.005, 2.0),
+    Key("laminate_floor", "laminate_floor", "cavity_loss_factor", "real", "", "loss factor of this air, high with absorber in it", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "channel_spacing", "real", "m", "distance of the lines that hold the subceiling, which run along the length", (), 0.05, 100.0),
     Key("laminate_floor", "laminate_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
     Key("laminate_floor", "laminate_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),
@@ -1279,6 +1332,14 @@ KEYS = (
     Key("joist_floor", "joist_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "subceiling_thickness", "real", "m", "thickness of a subceiling that radiates instead of the floor; 0: none", (), 0.0, 0.2),
+    Key("joist_floor", "joist_floor", "subceiling_density", "real", "kg/m3", "density of the subceiling", (), 10.0, 20000.0),
+    Key("joist_floor", "joist_floor", "subceiling_modulus", "real", "Pa", "modulus of elasticity of the subceiling in bending", (), 10000000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "subceiling_loss_factor", "real", "", "loss factor of the subceiling", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "channel_stiffness", "real", "N/m2", "stiffness per length of each line that holds the subceiling (channels, battens, hangers)", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "channel_loss_factor", "real", "", "loss factor of these lines", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "cavity_depth", "real", "m", "depth of the air between floor and subceiling", (), 0.005, 2.0),
+    Key("joist_floor", "joist_floor", "cavity_loss_factor", "real", "", "loss factor of this air, high with absorber in it", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
     Key("joist_floor", "joist_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),

@@ -22,6 +22,7 @@ from thud.report.template import PAGE
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from thud.floors.prediction import RoomPrediction
     from thud.report.predicted_floor import PredictedFloor
 
 BODY = Template("""<header>
@@ -216,7 +217,7 @@ def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
             "Flanking walls",
             f"{len(room.wall_lengths)} described" if room.wall_lengths else "none described",
         ),
-        ("Ceiling", f"{room.ceiling_mass:g} kg/m²" if room.ceiling_mass else "none described"),
+        ("Ceiling", _ceiling(prediction)),
         ("Source", f"{source.mass:.3g} kg, {source.impact_velocity:.3g} m/s; limits of the {kind}"),
         (
             "Source levels",
@@ -227,6 +228,14 @@ def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
     if floor.construction and floor.construction.note:
         pairs.append(("Note", floor.construction.note))
     return pairs
+
+
+def _ceiling(prediction: RoomPrediction) -> str:
+    """Return the mass of the ceiling of floor or room."""
+    floor, room = prediction.floor, prediction.room
+    hung = getattr(floor, "subceiling_thickness", 0.0) * getattr(floor, "subceiling_density", 0.0)
+    mass = hung or room.ceiling_mass
+    return f"{mass:g} kg/m²" if mass else "none described"
 
 
 def _assumed(floor: PredictedFloor) -> str:

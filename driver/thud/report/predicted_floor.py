@@ -42,6 +42,7 @@ _WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
     ("screed_edges", "simple"): ("strip_",),
     ("screed_edges", "free"): ("strip_",),
     ("bridge_x", ()): ("bridge_",),
+    ("subceiling_thickness", 0.0): ("subceiling_", "channel_", "cavity_"),
     ("covering_stiffness", 0.0): ("covering_",),
     ("ceiling_mass", 0.0): ("ceiling_",),
     ("wall_lengths", ()): ("wall_", "junction_"),
@@ -329,6 +330,11 @@ def _variants(
     if getattr(floor, "screed_thickness", 0.0):
         stiffness = floor.layer_stiffness / 2
         add("stiffness of the resilient layer halved", replace(floor, layer_stiffness=stiffness))
+    if getattr(floor, "subceiling_thickness", 0.0):
+        stiffness = floor.channel_stiffness / 2
+        add("stiffness of the channels halved", replace(floor, channel_stiffness=stiffness))
+        density = 2 * floor.subceiling_density
+        add("mass of the subceiling doubled", replace(floor, subceiling_density=density))
     if room.ceiling_mass:
         add("mass of the ceiling doubled", room=replace(room, ceiling_mass=2 * room.ceiling_mass))
     time = room.reverberation_time
@@ -349,7 +355,8 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     if floor.screed_thickness:
         add(f"floating plate, {floor.screed_density:g} kg/m³", floor.screed_thickness)
         add(f"resilient layer {_ASSUMED}", _LAYER)
-    cavity = room.ceiling_depth if room.ceiling_mass else 0.0
+    below = floor.subceiling_thickness
+    cavity = room.ceiling_depth if room.ceiling_mass else floor.cavity_depth * (below > 0)
     if isinstance(floor, Plate):
         add(f"plate, {floor.density:g} kg/m³", floor.thickness)
     elif isinstance(floor, LaminateFloor):
@@ -362,6 +369,8 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
         cavity -= floor.joist_height
     if cavity > 0:
         add("cavity", cavity)
+    if below:
+        add(f"subceiling, {floor.subceiling_density:g} kg/m³", below)
     if room.ceiling_mass:
         add(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)
     return layers

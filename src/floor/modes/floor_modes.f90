@@ -46,14 +46,14 @@ module thud_floor_modes
 
 contains
 
-   !> Modes of a stack of plates. To the losses of its parts those of the radiating plate at its edges and by radiation are
+   !> Modes of a stack of plates. To the losses of its parts those of the bearing plate at its edges and by radiation are
    !> added, in proportion to its part of the energy.
-   subroutine get_floor_modes(group, stack, radiator, modes, error, max_frequency)
+   subroutine get_floor_modes(group, stack, bearing, modes, error, max_frequency)
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_stack_type), intent(in) :: stack
-      !> The radiating plate, with its total losses.
-      type(plate_type), intent(in) :: radiator
+      !> The bearing plate, with its total losses.
+      type(plate_type), intent(in) :: bearing
       type(floor_modes_type), intent(out) :: modes
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
@@ -67,7 +67,7 @@ contains
       wanted = mode_limit*resolution
       if (is_uncoupled(stack) .and. .not. has_shear(stack)) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
-      key = [wanted, get_key(stack, radiator)]
+      key = [wanted, get_key(stack, bearing)]
       do i = 1, size(cached)
          if (.not. allocated(cached(i)%key)) exit
          if (size(key) /= size(cached(i)%key)) cycle
@@ -87,11 +87,11 @@ contains
       associate (block => modes%modes%block)
          modes%omega = [(block(i)%omega, i=1, size(block))]
          modes%loss_factor = [(block(i)%loss_factor, i=1, size(block))]
-         share = [(block(i)%radiator_share, i=1, size(block))]
+         share = [(block(i)%bearing_share, i=1, size(block))]
       end associate
       frequency = max(modes%omega/(2*pi), 1.0_wp)
-      where (share > 0.0_wp) modes%loss_factor = modes%loss_factor + share*(get_total_loss(radiator, air_type(), frequency) &
-         - radiator%loss_factor)
+      where (share > 0.0_wp) modes%loss_factor = modes%loss_factor + share*(get_total_loss(bearing, air_type(), frequency) &
+         - bearing%loss_factor)
       cached(oldest)%modes = modes
       call move_alloc(key, cached(oldest)%key)
       oldest = 1 + mod(oldest, size(cached))
@@ -107,15 +107,15 @@ contains
    end function has_shear
 
    !> All numbers that determine the modes.
-   pure function get_key(stack, radiator) result(key)
+   pure function get_key(stack, bearing) result(key)
       type(plate_stack_type), intent(in) :: stack
-      type(plate_type), intent(in) :: radiator
+      type(plate_type), intent(in) :: bearing
       real(wp), allocatable :: key(:)
       integer :: i, j
 
-      key = [stack%length, stack%width, real(stack%radiator, wp), radiator%thickness, radiator%density, &
-         radiator%wave_speed, radiator%stiffness_ratio, radiator%torsion_ratio, radiator%loss_factor, &
-         radiator%edge_absorption, real(iachar([(radiator%edges(i:i), i=1, len(radiator%edges))]), wp)]
+      key = [stack%length, stack%width, real([stack%radiator, stack%bearing], wp), bearing%thickness, bearing%density, &
+         bearing%wave_speed, bearing%stiffness_ratio, bearing%torsion_ratio, bearing%loss_factor, &
+         bearing%edge_absorption, real(iachar([(bearing%edges(i:i), i=1, len(bearing%edges))]), wp)]
       do i = 1, size(stack%plate)
          associate (plate => stack%plate(i))
             key = [key, plate%along, plate%across, plate%coupling, plate%torsion, plate%shear, plate%mass, plate%inertia, &

@@ -43,7 +43,7 @@ module thud_modal_radiation
    type :: modal_radiation_type
       !> Radiation factor: power over rho0 c0 times area times mean-square velocity: [n_band].
       real(wp), allocatable :: radiation_factor(:)
-      !> Power that the radiating plate dissipates per mean-square force, m/(N s): [n_band].
+      !> Power that the bearing plate dissipates per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
       !> Power that it radiates to one side per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: radiated(:)
@@ -65,7 +65,7 @@ contains
    !> without ribs has orthogonal modes: averaged over all strike points, their cross terms vanish.
    subroutine get_modal_radiation(modes, plate, air, bands, area, radiation, stated_strike)
       type(floor_modes_type), intent(in) :: modes
-      !> The radiating plate, with its mass and total losses.
+      !> The bearing plate, with its mass and total losses.
       type(plate_type), intent(in) :: plate
       type(air_type), intent(in) :: air
       !> The bands: [n_band].
@@ -329,7 +329,7 @@ contains
       in_block = kept(n_before + 1:n) - first
    end function get_in_block
 
-   !> Integral of the squared velocity of the radiating plate, summed over the strike points, m4/s2.
+   !> Integral of the squared velocity of the bearing plate, summed over the strike points, m4/s2.
    function get_square_velocity(modes, kept, amplitude) result(total)
       type(floor_modes_type), intent(in) :: modes
       integer, intent(in) :: kept(:)
@@ -348,7 +348,7 @@ contains
             first = first + size(block%omega)
             if (size(in_block) == 0) cycle
             ! The functions are orthonormal.
-            associate (shape => block%shape(modes%stack%radiator)%coefficient(:, in_block), &
+            associate (shape => block%shape(modes%stack%bearing)%coefficient(:, in_block), &
                part => amplitude(n + 1:n + size(in_block), :))
                total = total + sum(get_matrix_product(shape, real(part, wp))**2 + get_matrix_product(shape, aimag(part))**2)
             end associate

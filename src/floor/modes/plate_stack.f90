@@ -83,8 +83,8 @@ module thud_plate_stack
       type(orthotropic_type), allocatable :: plate(:)
       !> The layers between them: [n_plate - 1].
       type(layer_type), allocatable :: layer(:)
-      !> Number of the plate that radiates into the room.
-      integer :: radiator = 1
+      !> Number of the plate that radiates into the room, and of the one that bears, which has losses at its edges.
+      integer :: radiator = 1, bearing = 1
    end type plate_stack_type
 
    !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
@@ -115,7 +115,7 @@ contains
          call add_displacement(system, motion(i)%deflection, motion(i)%w)
       end do
       do i = 1, size(stack%plate)
-         system%is_radiator = i == stack%radiator
+         system%is_bearing = i == stack%bearing
          if (maxval(stack%plate(i)%shear) > 0.0_wp) then
             call add_displacement(system, motion(i)%rotation_x, motion(i)%a)
             call add_displacement(system, motion(i)%rotation_y, motion(i)%b)
@@ -126,7 +126,7 @@ contains
          call add_edges(system, stack%plate(i), motion(i))
          call add_ribs(system, stack%plate(i), motion(i))
       end do
-      system%is_radiator = .false.
+      system%is_bearing = .false.
       do i = 1, size(stack%plate) - 1
          call add_layer(system, stack%layer(i), motion(i), motion(i + 1))
       end do

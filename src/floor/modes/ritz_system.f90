@@ -31,16 +31,16 @@ module thud_ritz_system
       real(wp), allocatable :: x(:, :), y(:, :)
       !> Loss factor, of stiffnesses.
       real(wp) :: loss_factor = 0.0_wp
-      !> The energy belongs to the radiating plate.
-      logical :: in_radiator = .false.
+      !> The energy belongs to the bearing plate.
+      logical :: in_bearing = .false.
    end type term_type
 
    !> Displacements and their energies.
    type :: ritz_system_type
       type(product_type), allocatable :: displacement(:)
       type(term_type), allocatable :: stiffness(:), mass(:)
-      !> The stiffnesses that are added now belong to the radiating plate.
-      logical :: is_radiator = .false.
+      !> The stiffnesses that are added now belong to the bearing plate.
+      logical :: is_bearing = .false.
    end type ritz_system_type
 
    !> One displacement in the modes of a block.
@@ -53,8 +53,8 @@ module thud_ritz_system
 
    !> Modes of a block, normalized to a modal mass of 1 kg.
    type :: mode_block_type
-      !> Angular frequencies, ascending, rad/s, loss factors, and fractions of the energy in the radiating plate: [n_mode].
-      real(wp), allocatable :: omega(:), loss_factor(:), radiator_share(:)
+      !> Angular frequencies, ascending, rad/s, loss factors, and fractions of the energy in the bearing plate: [n_mode].
+      real(wp), allocatable :: omega(:), loss_factor(:), bearing_share(:)
       !> Shapes of the displacements; not allocated for static ones: [n_displacement].
       type(shape_type), allocatable :: shape(:)
    end type mode_block_type
@@ -90,7 +90,7 @@ contains
 
       if (.not. allocated(system%stiffness)) allocate (system%stiffness(0))
       if (.not. abs(stiffness) > 0.0_wp) return
-      system%stiffness = [system%stiffness, term_type(row, column, stiffness*x, y, loss_factor, system%is_radiator)]
+      system%stiffness = [system%stiffness, term_type(row, column, stiffness*x, y, loss_factor, system%is_bearing)]
    end subroutine add_stiffness
 
    !> Adds a mass; as `add_stiffness`.
@@ -232,7 +232,7 @@ contains
       logical, intent(in) :: in_x(:), in_y(:)
       type(mode_block_type), intent(out) :: block
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), loss(:, :), radiator(:, :), mass(:, :), omega(:)
+      real(wp), allocatable :: stiffness(:, :), loss(:, :), bearing(:, :), mass(:, :), omega(:)
       integer, allocatable :: first(:), first_x(:), first_y(:), dynamic(:), static(:)
       integer :: i, p, n
 
@@ -257,23 +257,23 @@ contains
          end do
       end associate
       if (size(dynamic) == 0) then
-         allocate (block%omega(0), block%loss_factor(0), block%radiator_share(0))
+         allocate (block%omega(0), block%loss_factor(0), block%bearing_share(0))
          return
       end if
       associate (terms => system%stiffness)
          call assemble(terms, spread(1.0_wp, 1, size(terms)), block, first, stiffness)
          call assemble(terms, terms%loss_factor, block, first, loss)
-         call assemble(terms, merge(1.0_wp, 0.0_wp, terms%in_radiator), block, first, radiator)
+         call assemble(terms, merge(1.0_wp, 0.0_wp, terms%in_bearing), block, first, bearing)
       end associate
       call assemble(system%mass, spread(1.0_wp, 1, size(system%mass)), block, first, mass)
-      if (size(static) > 0) call condense(dynamic, static, stiffness, loss, radiator, mass, failed)
+      if (size(static) > 0) call condense(dynamic, static, stiffness, loss, bearing, mass, failed)
       if (failed) return
       call get_eigenmodes(stiffness, mass, omega, failed)
       if (failed) return
       ! `stiffness` contains the shapes now. Without stiffness and losses, a mode moves as a rigid body.
       block%omega = omega
       block%loss_factor = get_share(loss)
-      block%radiator_share = get_share(radiator)
+      block%bearing_share = get_share(bearing)
       i = 0
       do p = 1, n
          if (system%displacement(p)%is_static) cycle
@@ -332,11 +332,11 @@ contains
    end subroutine assemble
 
    !> Eliminates the static coefficients: they take the values of least energy.
-   subroutine condense(dynamic, static, stiffness, loss, radiator, mass, failed)
+   subroutine condense(dynamic, static, stiffness, loss, bearing, mass, failed)
       !> Numbers of the coefficients.
       integer, intent(in) :: dynamic(:), static(:)
       !> Matrices of all coefficients, then of the dynamic ones: [n, n].
-      real(wp), allocatable, intent(inout) :: stiffness(:, :), loss(:, :), radiator(:, :), mass(:, :)
+      real(wp), allocatable, intent(inout) :: stiffness(:, :), loss(:, :), bearing(:, :), mass(:, :)
       !> The stiffness of the static coefficients is not positive.
       logical, intent(out) :: failed
       real(wp), allocatable :: followed(:, :), static_stiffness(:, :), transformation(:, :)
@@ -356,7 +356,7 @@ contains
       transformation(stiff, :) = followed
       call transform(stiffness)
       call transform(loss)
-      call transform(radiator)
+      call transform(bearing)
       call transform(mass)
    contains
 

@@ -1,0 +1,103 @@
+!> A subceiling below any plate, on channels, battens or hangers, with the air between: its keys, and what it adds to a stack
+!> of plates.
+module thud_subceiling
+   use thud_field, only: field_type
+   use thud_kinds, only: wp
+   use thud_new_field, only: real_field
+   use thud_plate, only: air_type, plate_type
+   use thud_plate_stack, only: layer_type
+   implicit none (type, external)
+   private
+
+   public :: get_cavity_limit, get_spaced_positions, get_subceiling_fields, get_subceiling_layer, get_subceiling_plate
+   public :: subceiling_type
+
+   !> The subceiling; no thickness means none. The other defaults are those of a gypsum board on resilient channels.
+   type :: subceiling_type
+      !> Thickness, m; density, kg/m3; modulus of elasticity, Pa; loss factor.
+      real(wp) :: thickness = 0.0_wp, density = 720.0_wp, modulus = 2.5e9_wp, loss_factor = 0.02_wp
+      !> Lines that hold it: stiffness per length, N/m2, loss factor, and distance, m, of floors without joists.
+      real(wp) :: channel_stiffness = 1.0e5_wp, channel_loss_factor = 0.1_wp, channel_spacing = 0.5_wp
+      !> Depth of the air above it, m, and its loss factor.
+      real(wp) :: cavity_depth = 0.1_wp, cavity_loss_factor = 0.3_wp
+   end type subceiling_type
+
+contains
+
+   !> Keys and allowed ranges.
+   function get_subceiling_fields(subceiling, on_joists) result(fields)
+      !> The subceiling that the fields read and set.
+      type(subceiling_type), intent(in), target :: subceiling
+      !> The lines that hold it are the joists.
+      logical, intent(in) :: on_joists
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('subceiling_thickness', subceiling%thickness, 'm', 'thickness of a subceiling that radiates ' &
+         //'instead of the floor; 0: none', '[0, 0.2]'), &
+         real_field('subceiling_density', subceiling%density, 'kg/m3', 'density of the subceiling', '[10, 20000]'), &
+         real_field('subceiling_modulus', subceiling%modulus, 'Pa', 'modulus of elasticity of the subceiling in bending', &
+         '[1e7, 1e12]'), &
+         real_field('subceiling_loss_factor', subceiling%loss_factor, '', &
+         'loss factor of the subceiling', '[0, 1]'), &
+         real_field('channel_stiffness', subceiling%channel_stiffness, 'N/m2', 'stiffness per length of each line that ' &
+         //'holds the subceiling (channels, battens, hangers)', '[0, 1e12]'), &
+         real_field('channel_loss_factor', subceiling%channel_loss_factor, '', 'loss factor of these lines', '[0, 1]'), &
+         real_field('cavity_depth', subceiling%cavity_depth, 'm', 'depth of the air between floor and subceiling', &
+         '[0.005, 2]'), &
+         real_field('cavity_loss_factor', subceiling%cavity_loss_factor, '', &
+         'loss factor of this air, high with absorber in it', '[0, 1]')]
+      if (.not. on_joists) fields = [fields, &
+         real_field('channel_spacing', subceiling%channel_spacing, 'm', &
+         'distance of the lines that hold the subceiling, which run along the length', '[0.05, 100]')]
+   end function get_subceiling_fields
+
+   !> The subceiling below another plate.
+   pure function get_subceiling_plate(subceiling, above) result(plate)
+      type(subceiling_type), intent(in) :: subceiling
+      type(plate_type), intent(in) :: above
+      type(plate_type) :: plate
+
+      plate = plate_type(length=above%length, width=above%width, thickness=subceiling%thickness, &
+         density=subceiling%density, wave_speed=sqrt(subceiling%modulus/subceiling%density), &
+         loss_factor=subceiling%loss_factor)
+   end function get_subceiling_plate
+
+   !> The connection of the subceiling with the plate above it: lines of springs, and the stiffness rho0 c0**2/depth of the
+   !> air, which does not move sideways.
+   pure function get_subceiling_layer(subceiling, lines) result(layer)
+      type(subceiling_type), intent(in) :: subceiling
+      !> Positions of the lines along the width, m: [n_line].
+      real(wp), intent(in) :: lines(:)
+      type(layer_type) :: layer
+      type(air_type) :: air
+
+      layer%stiffness = air%density*air%sound_speed**2/subceiling%cavity_depth
+      layer%loss_factor = subceiling%cavity_loss_factor
+      if (.not. subceiling%channel_stiffness > 0.0_wp) return
+      layer%line_y = lines
+      layer%line_stiffness = subceiling%channel_stiffness
+      layer%line_loss_factor = subceiling%channel_loss_factor
+   end function get_subceiling_layer
+
+   !> As many positions a distance apart as fit into a width, symmetric about its middle, m: [n].
+   pure function get_spaced_positions(width, spacing) result(position)
+      !> Width and distance, m.
+      real(wp), intent(in) :: width, spacing
+      real(wp), allocatable :: position(:)
+      integer :: i, n
+
+      n = max(1, int(width/spacing*(1 + epsilon(1.0_wp))))
+      position = width/2 + spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
+   end function get_spaced_positions
+
+   !> Frequency at which the cavity is a quarter of a wavelength deep, Hz; above it, the air is no mere stiffness.
+   pure function get_cavity_limit(subceiling) result(frequency)
+      type(subceiling_type), intent(in) :: subceiling
+      real(wp) :: frequency
+      type(air_type) :: air
+
+      frequency = air%sound_speed/(4*subceiling%cavity_depth)
+   end function get_cavity_limit
+
+end module thud_subceiling

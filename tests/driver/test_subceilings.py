@@ -1,0 +1,196 @@
+"""A subceiling as a plate of its own: limits, its resonance, losses, and what contradicts it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import thud
+from thud.base.bridge import ask
+from thud.case.case import case_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+# 160 mm of concrete, and 9 kg/m2 of gypsum board.
+CONCRETE = thud.Plate(thickness=0.16, loss_factor=0.03, edges="absorption")
+MASS, BOARD = 2300 * 0.16, 720 * 0.0125
+HUNG = replace(CONCRETE, subceiling_thickness=0.0125, cavity_depth=0.2)
+SMALL = replace(HUNG, length=3.0, width=2.5)
+JOISTS = thud.JoistFloor(length=3.0, width=2.5, subceiling_thickness=0.0125, cavity_depth=0.25)
+# Stiffness of 1 m of air, N/m3.
+AIR = 1.2 * 343**2
+# Relative positions of forces.
+STRIKES = {"x": np.array([0.23, 0.41, 0.65]), "y": np.array([0.37, 0.29, 0.44])}
+
+
+def frequencies_of(floor: thud.FloorOptions, highest: float) -> Array:
+    """Return natural frequencies, Hz."""
+    case = thud.Case(floor=floor)
+    return np.asarray(ask("floor_modes", case=case_text(case), highest=highest)["frequency"])
+
+
+def radiated_by(floor: thud.FloorOptions) -> Array:
+    """Return the energies radiated per force in one-third octaves from 50 to 630 Hz, dB."""
+    case = thud.Case(floor=floor, room=thud.Room())
+    answer = ask("radiation", case=case_text(case), **STRIKES)
+    return np.asarray(10 * np.log10(answer["radiated"]))
+
+
+def test_stiff_fastening_of_a_light_ceiling_adds_mass(oracle: Callable[..., None]) -> None:
+    fixed = replace(HUNG, channel_stiffness=1e9, channel_spacing=0.1)
+    heavier = replace(
+        CONCRETE,
+        density=(MASS + BOARD) / 0.16,
+        wave_speed=CONCRETE.wave_speed * np.sqrt(MASS / (MASS + BOARD)),
+    )
+    ratio = frequencies_of(fixed, 300.0) / frequencies_of(heavier, 300.0)
+    # The mass changes frequencies by 1.2 %, the stiffness of the board by 2e-5.
+    oracle("natural frequencies: fixed subceiling − added mass", "limit", ratio - 1, 1e-4)
+    oracle(
+        "energy radiated by a fixed subceiling − added mass",
+        "limit",
+        radiated_by(fixed) - radiated_by(heavier),
+        0.5,
+        "dB",
+    )
+
+
+def test_soft_fastening_above_a_deep_cavity_leaves_the_floor_alone() -> None:
+    frequency = np.array([45.0, 70.0, 140.0, 300.0])
+    soft = replace(HUNG, channel_stiffness=0.0, cavity_depth=2.0)
+    found, bare = (thud.mobility(floor, frequency) for floor in (soft, CONCRETE))
+    # Above the resonance of the board at 14 Hz, its air is a spring of 2 Hz below the floor.
+    assert abs(found / bare - 1).max() < 0.02
+    # Held by stiff lines, it matters.
+    fixed = thud.mobility(replace(soft, channel_stiffness=1e9), frequency)
+    assert abs(fixed / bare - 1).max() > 0.03
+
+
+def test_frequencies_are_those_of_masses_on_a_spring_for_each_shape(
+    oracle: Callable[..., None],
+) -> None:
+    """Both plates have the same sines: two equations for each pair of half waves."""
+    light = replace(
+        CONCRETE, thickness=0.04, density=600.0, wave_speed=2500.0,
+        subceiling_thickness=0.0125, channel_stiffness=0.0, cavity_depth=0.1,
+    )  # fmt: skip
+    upper, stiffness = 24.0, 24.0 * (2500 * 0.04) ** 2 / 12
+    board_stiffness, air = 2.5e9 * 0.0125**3 / 12, AIR / 0.1
+    m, n = (grid.ravel() for grid in np.meshgrid(np.arange(1, 80), np.arange(1, 80)))
+    k4 = ((m * np.pi / 5) ** 2 + (n * np.pi / 4) ** 2) ** 2
+    matrix = np.empty((len(k4), 2, 2))
+    matrix[:, 0, 0] = (stiffness * k4 + air) / upper
+    matrix[:, 1, 1] = (board_stiffness * k4 + air) / BOARD
+    matrix[:, 0, 1] = matrix[:, 1, 0] = -air / np.sqrt(upper * BOARD)
+    expected = np.sort(np.sqrt(np.linalg.eigvalsh(matrix)).ravel()) / (2 * np.pi)
+    found = frequencies_of(light, 150.0)
+    # The second mode of the first shape lies at the resonance of both masses on the air.
+    resonance = np.sqrt(air * (1 / upper + 1 / BOARD)) / (2 * np.pi)
+    assert abs(found / resonance - 1).min() < 2e-3
+    oracle(
+        "natural frequencies of two plates on air",
+        "closed form",
+        found / expected[: len(found)] - 1,
+        1e-9,
+    )
+
+
+def test_radiated_level_has_the_resonance_of_a_mass_on_a_spring(
+    oracle: Callable[..., None],
+) -> None:
+    """Below a heavy slab the board follows as (1 + i eta)/(1 + i eta - (f/f0)**2)."""
+    heavy = replace(CONCRETE, density=20000.0, loss_factor=0.1)
+    lines = replace(
+        heavy, subceiling_thickness=0.0125, cavity_depth=0.2,
+        channel_stiffness=4e4, channel_spacing=0.1, channel_loss_factor=0.3,
+    )  # fmt: skip
+    found = radiated_by(lines) - radiated_by(heavy)
+    stiffness = AIR / 0.2 + 4e4 / 0.1
+    resonance = np.sqrt(stiffness * (1 / BOARD + 1 / (0.16 * 20000))) / (2 * np.pi)
+    nominal = np.array([50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630])
+    frequency = nominal[:, None] * 2 ** np.linspace(-1 / 6, 1 / 6, 101)
+    follows = (1 + 0.3j) / (1 + 0.3j - (frequency / resonance) ** 2)
+    expected = 10 * np.log10((abs(follows) ** 2).mean(axis=1))
+    assert expected[0] > 9
+    oracle(
+        "level below a subceiling − that below the slab, by one mass on a spring",
+        "closed form",
+        found - expected,
+        1.5,
+        "dB",
+    )
+
+
+@pytest.mark.parametrize("floor", [HUNG, JOISTS, thud.LaminateFloor(subceiling_thickness=0.0125)])
+def test_floors_with_subceilings_are_passive(floor: thud.FloorOptions) -> None:
+    mobility = thud.mobility(floor, np.geomspace(1.0, 5000.0, 4000))
+    assert (mobility.real >= 0).all()
+    assert mobility.real.max() > 0
+
+
+@pytest.mark.parametrize("floor", [SMALL, JOISTS])
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("subceiling_thickness", 0.025),
+        ("subceiling_density", 900.0),
+        ("subceiling_modulus", 8e9),
+        ("subceiling_loss_factor", 0.2),
+        ("channel_stiffness", 1e6),
+        ("channel_loss_factor", 0.9),
+        ("cavity_depth", 0.4),
+        ("cavity_loss_factor", 0.05),
+        ("channel_spacing", 0.25),
+    ],
+)
+def test_each_key_changes_the_radiated_level(
+    floor: thud.Plate | thud.JoistFloor, key: str, value: float
+) -> None:
+    if not hasattr(floor, key):
+        with pytest.raises(thud.InputError, match=key):
+            replace(floor, **{key: value})
+        return
+    without = replace(floor, subceiling_thickness=0.0)
+    change: dict[str, Any] = {key: value}
+    assert abs(radiated_by(replace(floor, **change)) - radiated_by(floor)).max() > 0.05
+    if key != "subceiling_thickness":
+        assert radiated_by(replace(without, **change)) == pytest.approx(radiated_by(without))
+
+
+def test_subceiling_lies_below_a_floating_plate() -> None:
+    floating = replace(CONCRETE, screed_thickness=0.05)
+    both = replace(HUNG, screed_thickness=0.05)
+    change = radiated_by(both) - radiated_by(floating)
+    # As below the slab alone: the layers are far apart in frequency and mass.
+    assert change[2:8] == pytest.approx((radiated_by(HUNG) - radiated_by(CONCRETE))[2:8], abs=3.0)
+    assert change[7] < -20
+
+
+@pytest.mark.parametrize(
+    ("room", "words"),
+    [
+        ({"ceiling_mass": 9.0}, "ceiling_mass and subceiling_thickness of the floor describe"),
+        ({"radiation": "iso_12354"}, "radiation = iso_12354"),
+    ],
+)
+def test_rooms_that_contradict_a_subceiling_are_refused(room: dict[str, Any], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words) as refused:
+        thud.solve(model="hollow_sphere", floor=HUNG, room=thud.Room(**room))
+    assert "\n" not in str(refused.value)
+
+
+def test_limits_of_cavity_and_board_are_warned_of() -> None:
+    deep = thud.solve(model="hollow_sphere", floor=replace(HUNG, cavity_depth=0.5))
+    assert any("above 172 Hz the cavity" in warning for warning in deep.warnings)
+    thick = replace(HUNG, cavity_depth=0.02, subceiling_thickness=0.2, subceiling_modulus=1e8)
+    warnings = thud.solve(model="hollow_sphere", floor=thick).warnings
+    assert any("six thicknesses of the subceiling" in warning for warning in warnings)
+    assert not any("subceiling" in warning for warning in thud.solve(floor=CONCRETE).warnings)
