@@ -5,7 +5,7 @@ module thud_room_prediction
    use thud_case, only: case_type, get_floor_number
    use thud_constants, only: pi
    use thud_error, only: error_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, uncoupled_support
    use thud_floor_modes, only: floor_modes_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
@@ -82,8 +82,8 @@ contains
       end associate
    end subroutine predict_room
 
-   !> Radiation of a floor in bands. Those that its modes do not reach, because polynomials resolve few waves, have that of
-   !> the simply supported floor: its waves are so short that edges matter little.
+   !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
+   !> that of the simply supported floor without further supports: its waves are so short that these matter little.
    subroutine get_radiation(room, floor, plate, modes, bands, radiation, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
@@ -103,7 +103,7 @@ contains
       n = count(bands%upper <= modes%limit/(2*pi))
       call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
       if (n == size(bands)) return
-      call floor%get_room_modes('simple', simple_plate, simple_modes, error)
+      call floor%get_room_modes(uncoupled_support, simple_plate, simple_modes, error)
       if (allocated(error)) return
       call get_modal_radiation(simple_modes, plate, room%air, bands(n + 1:), get_area(room, plate), beyond)
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor]

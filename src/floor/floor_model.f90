@@ -15,10 +15,13 @@ module thud_floor_model
    implicit none (type, external)
    private
 
-   public :: floor_model_type, reason_length
+   public :: floor_model_type, reason_length, uncoupled_support
 
    !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
+
+   !> Simply supported edges without further supports and rows across ribs, whose modes reach the highest frequency.
+   character(len=*), parameter :: uncoupled_support = 'uncoupled'
 
    !> The floor, whose components are its options: procedures name it `options`.
    type, abstract :: floor_model_type
@@ -153,7 +156,7 @@ contains
    !> Modes of the floor, with its own support or another one; floors without modes return an error.
    subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
       class(floor_model_type), intent(in) :: options
-      !> Support of the edges.
+      !> Support of the edges, or `uncoupled_support`.
       character(len=*), intent(in) :: support
       !> The plate that radiates.
       type(plate_type), intent(out) :: plate

@@ -2,7 +2,7 @@
 module thud_rectangular_floor
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
-   use thud_floor_model, only: floor_model_type, reason_length
+   use thud_floor_model, only: floor_model_type, reason_length, uncoupled_support
    use thud_floor_modes, only: floor_modes_type, get_floor_modes, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
@@ -291,8 +291,10 @@ contains
       !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
       real(wp), intent(in), optional :: max_frequency
       type(plate_stack_type) :: stack
+      logical :: is_uncoupled
       type(base_floor_type) :: base
 
+      is_uncoupled = .false.
       base = options%get_base()
       group = base%group
       plate = base%plate
@@ -302,8 +304,13 @@ contains
          else
             lower%edge = get_edges(options, options%support)
          end if
-         lower%line_x = options%line_x%values(:options%line_x%count)
-         lower%line_y = options%line_y%values(:options%line_y%count)
+         if (present(support)) is_uncoupled = support == uncoupled_support
+         if (.not. is_uncoupled) then
+            lower%line_x = options%line_x%values(:options%line_x%count)
+            lower%line_y = options%line_y%values(:options%line_y%count)
+         else if (allocated(lower%ribs)) then
+            lower%ribs = pack(lower%ribs, .not. lower%ribs%along_width)
+         end if
       end associate
       stack%length = plate%length
       stack%width = plate%width
@@ -382,12 +389,12 @@ contains
    !> Supports of the edges: [4].
    pure function get_edges(options, support) result(edge)
       class(rectangular_floor_type), intent(in) :: options
-      !> One of `supports`.
+      !> One of `supports`, or `uncoupled_support`.
       character(len=*), intent(in) :: support
       type(edge_type) :: edge(4)
 
       select case (support)
-       case ('simple')
+       case ('simple', uncoupled_support)
          edge = edge_type(rigid_support, 0.0_wp)
        case ('clamped')
          edge = edge_type(rigid_support, rigid_support)

@@ -868,6 +868,19 @@ class JoistFloor(RectangularFloor):
     connection : float
         Composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B; 0 <=
         connection <= 1.
+    screw_spacing : float
+        Distance of the screws along a joist, m; 0.01 <= screw_spacing <= 2.
+    screw_slip : float
+        Slip modulus of a screw, for the composite action by EN 1995-1-1 annex B; 0: connection,
+        N/m; 0 <= screw_slip <= 1e+12.
+    screw_stiffness : float
+        Stiffness of a screw against lifting of the sheathing off the joist; 0: rigid, N/m; 0 <=
+        screw_stiffness <= 1e+12.
+    blocking_x : sequence of float
+        Positions along the length of rows of blocking between joists, m; 0 < blocking_x < 100.
+    blocking_stiffness : float
+        Bending stiffness of a row of blocking; 0: that of a joist, without gaps, N m2; 0 <=
+        blocking_stiffness <= 1e+12.
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
     source_on : str
@@ -887,6 +900,11 @@ class JoistFloor(RectangularFloor):
     joist_density: float = 420.0
     joist_modulus: float = 11000000000.0
     connection: float = 0.1
+    screw_spacing: float = 0.15
+    screw_slip: float = 0.0
+    screw_stiffness: float = 0.0
+    blocking_x: Sequence[float] = ()
+    blocking_stiffness: float = 0.0
     loss_factor: float = 0.05
     source_on: JoistFloorSourceOn = "sheathing"
 
@@ -1312,6 +1330,11 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "screw_spacing", "real", "m", "distance of the screws along a joist", (), 0.01, 2.0),
+    Key("joist_floor", "joist_floor", "screw_slip", "real", "N/m", "slip modulus of a screw, for the composite action by EN 1995-1-1 annex B; 0: connection", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "screw_stiffness", "real", "N/m", "stiffness of a screw against lifting of the sheathing off the joist; 0: rigid", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "blocking_x", "list", "m", "positions along the length of rows of blocking between joists", (), 0.0, 100.0),
+    Key("joist_floor", "joist_floor", "blocking_stiffness", "real", "N m2", "bending stiffness of a row of blocking; 0: that of a joist, without gaps", (), 0.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),

@@ -126,7 +126,7 @@ contains
             do j = 1, size(plate%ribs)
                associate (ribs => plate%ribs(j))
                   key = [key, ribs%position, merge(1.0_wp, 0.0_wp, ribs%along_width), ribs%bending, ribs%shear, &
-                     ribs%torsion, ribs%mass, ribs%inertia, ribs%loss_factor]
+                     ribs%torsion, ribs%mass, ribs%inertia, ribs%fastening, ribs%loss_factor]
                end associate
             end do
          end associate

@@ -6,11 +6,11 @@ module thud_function_set
    implicit none (type, external)
    private
 
-   public :: cosines, function_set_type, get_functions, get_overlap, get_quadrature, new_polynomials, sines
+   public :: amplitudes, cosines, function_set_type, get_functions, get_overlap, get_quadrature, new_polynomials, sines
 
    !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
-   !> rotations of simply supported plates, and polynomials.
-   integer, parameter :: sines = 1, cosines = 2, polynomials = 3
+   !> rotations of simply supported plates, polynomials, and amplitudes of separate members without values between them.
+   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, amplitudes = 4
 
    !> Functions that are orthonormal on [0, length].
    type :: function_set_type

@@ -4,7 +4,7 @@
 !> theory as static displacements. Its edges are held by springs against deflection and rotation, which may be rigid.
 module thud_plate_stack
    use thud_constants, only: pi
-   use thud_function_set, only: cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
+   use thud_function_set, only: amplitudes, cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
@@ -39,6 +39,8 @@ module thud_plate_stack
       real(wp) :: bending = 0.0_wp, shear = 0.0_wp, torsion = 0.0_wp
       !> Mass per length, kg/m, and its moment of inertia about the axis, kg m.
       real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
+      !> Stiffness against lifting off the plate per length, N/m2, of ribs along its length; 0: rigid.
+      real(wp) :: fastening = 0.0_wp
       real(wp) :: loss_factor = 0.0_wp
    end type ribs_type
 
@@ -91,6 +93,9 @@ module thud_plate_stack
    type :: plate_motion_type
       type(product_type) :: deflection, rotation_x, rotation_y
       integer :: w = 0, a = 0, b = 0
+      !> Deflection of the first ribs of a plate, which are fastened by springs, and its number; 0: that of the plate.
+      type(product_type) :: lifting
+      integer :: r = 0
    end type plate_motion_type
 
 contains
@@ -124,14 +129,44 @@ contains
             call add_thin_plate(system, stack%plate(i), motion(i))
          end if
          call add_edges(system, stack%plate(i), motion(i))
+         if (has_fastening(stack%plate(i))) then
+            motion(i)%lifting = product_type(motion(i)%deflection%x, &
+               function_set_type(amplitudes, stack%width, size(stack%plate(i)%ribs(1)%position)))
+            call add_displacement(system, motion(i)%lifting, motion(i)%r)
+         end if
          call add_ribs(system, stack%plate(i), motion(i))
       end do
       system%is_bearing = .false.
       do i = 1, size(stack%plate) - 1
-         call add_layer(system, stack%layer(i), motion(i), motion(i + 1))
+         call add_layer(system, stack%layer(i), stack%plate(i), motion(i), motion(i + 1))
       end do
       call solve_ritz_system(system, modes, failed)
    end subroutine get_stack_modes
+
+   !> Whether springs fasten the first ribs of a plate.
+   pure function has_fastening(plate) result(yes)
+      type(orthotropic_type), intent(in) :: plate
+      logical :: yes
+
+      yes = allocated(plate%ribs)
+      if (yes) yes = plate%ribs(1)%fastening > 0.0_wp
+   end function has_fastening
+
+   !> Amplitudes of separate ribs at positions that are symmetric about the middle, as sums and differences of mirrored ones,
+   !> so that modes remain even or odd: an orthogonal matrix, [n_rib, n_rib].
+   pure function get_amplitudes(n) result(matrix)
+      !> Number of ribs.
+      integer, intent(in) :: n
+      real(wp) :: matrix(n, n)
+      integer :: i
+
+      matrix = 0.0_wp
+      do i = 1, n/2
+         matrix([i, n + 1 - i], i) = sqrt(0.5_wp)
+         matrix([i, n + 1 - i], n + 1 - i) = [sqrt(0.5_wp), -sqrt(0.5_wp)]
+      end do
+      if (mod(n, 2) == 1) matrix((n + 1)/2, (n + 1)/2) = 1.0_wp
+   end function get_amplitudes
 
    !> Frequency up to which the functions of a stack resolve its waves, Hz.
    pure function get_resolved_frequency(stack, max_frequency) result(frequency)
@@ -185,7 +220,7 @@ contains
       !> 1: along the length, 2: along the width.
       integer, intent(in) :: direction
       logical :: yes
-      integer :: i
+      integer :: i, j
 
       yes = .true.
       do i = 1, size(stack%plate)
@@ -195,6 +230,14 @@ contains
          end associate
          if (direction == 1 .and. allocated(stack%plate(i)%line_x)) yes = yes .and. size(stack%plate(i)%line_x) == 0
          if (direction == 2 .and. allocated(stack%plate(i)%line_y)) yes = yes .and. size(stack%plate(i)%line_y) == 0
+         if (.not. allocated(stack%plate(i)%ribs)) cycle
+         do j = 1, size(stack%plate(i)%ribs)
+            associate (ribs => stack%plate(i)%ribs(j))
+               if (ribs%along_width .neqv. direction == 1) cycle
+               yes = yes .and. all(abs(ribs%position + ribs%position(size(ribs%position):1:-1) &
+                  - merge(stack%length, stack%width, direction == 1)) <= 1.0e-9_wp*stack%length)
+            end associate
+         end do
       end do
       do i = 1, size(stack%plate) - 1
          yes = yes .and. .not. allocated(stack%layer(i)%point)
@@ -397,7 +440,8 @@ contains
       end associate
    end function get_point_matrix
 
-   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection.
+   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection. Those that springs fasten
+   !> have a deflection of their own.
    subroutine add_ribs(system, plate, motion)
       type(ritz_system_type), intent(inout) :: system
       type(orthotropic_type), intent(in) :: plate
@@ -417,16 +461,41 @@ contains
                end associate
             else
                associate (at_ribs => get_point_matrix(y, ribs%position, 0), slope => get_point_matrix(y, ribs%position, 1))
+                  call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
+                  call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
+                  if (i == 1 .and. motion%r > 0) then
+                     call add_own_motion(system, ribs, motion, at_ribs)
+                     cycle
+                  end if
                   call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, &
                      ribs%loss_factor)
-                  call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
                   call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
-                  call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
                end associate
             end if
          end associate
       end do
    end subroutine add_ribs
+
+   !> Bending and mass of ribs along the length that springs fasten to a plate.
+   subroutine add_own_motion(system, ribs, motion, at_ribs)
+      type(ritz_system_type), intent(inout) :: system
+      type(ribs_type), intent(in) :: ribs
+      type(plate_motion_type), intent(in) :: motion
+      !> Products of the plate's functions, summed over the ribs: [count, count].
+      real(wp), intent(in) :: at_ribs(:, :)
+
+      associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, r => motion%r, k => ribs%fastening, &
+         amplitude => get_amplitudes(size(ribs%position)))
+         associate (unit => matmul(transpose(amplitude), amplitude), length => get_overlap(x, 0, x, 0))
+            call add_stiffness(system, r, r, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), unit, ribs%loss_factor)
+            call add_mass(system, r, r, ribs%mass, length, unit)
+            call add_stiffness(system, w, w, k, length, at_ribs, ribs%loss_factor)
+            call add_stiffness(system, r, r, k, length, unit, ribs%loss_factor)
+            call add_stiffness(system, w, r, -k, length, &
+               matmul(transpose(get_functions(y, ribs%position, 0)), amplitude), ribs%loss_factor)
+         end associate
+      end associate
+   end subroutine add_own_motion
 
    !> Stiffness of a rib over the functions of its deflection. With shear (Timoshenko), its rotation takes the values of
    !> least energy.
@@ -450,17 +519,25 @@ contains
       stiffness = ribs%shear*get_overlap(deflection, 1, deflection, 1) - matmul(transpose(coupling), followed)
    end function get_beam_stiffness
 
-   !> Springs between two plates.
-   subroutine add_layer(system, layer, upper, lower)
+   !> Springs between two plates; those along lines are at the ribs of the upper plate if it has ribs that springs fasten.
+   subroutine add_layer(system, layer, plate, upper, lower)
       type(ritz_system_type), intent(inout) :: system
       type(layer_type), intent(in) :: layer
+      !> The upper plate.
+      type(orthotropic_type), intent(in) :: plate
       type(plate_motion_type), intent(in) :: upper, lower
       integer :: i
 
       if (layer%stiffness > 0.0_wp) then
          call add_between(layer%stiffness, layer%loss_factor)
       end if
-      if (allocated(layer%line_y)) call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
+      if (allocated(layer%line_y)) then
+         if (upper%r > 0) then
+            call add_below_ribs(get_amplitudes(size(plate%ribs(1)%position)))
+         else
+            call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
+         end if
+      end if
       if (.not. allocated(layer%point)) return
       do i = 1, size(layer%point)
          associate (point => layer%point(i))
@@ -478,6 +555,20 @@ contains
          call add_pair(system, lower, lower, stiffness, loss_factor, x, y)
          call add_pair(system, upper, lower, -stiffness, loss_factor, x, y)
       end subroutine add_between
+
+      !> Adds the springs along lines between ribs and the lower plate.
+      subroutine add_below_ribs(amplitude)
+         !> Amplitudes of the ribs: [n_rib, n_rib].
+         real(wp), intent(in) :: amplitude(:, :)
+
+         associate (x => upper%lifting%x, k => layer%line_stiffness, eta => layer%line_loss_factor)
+            call add_pair(system, lower, lower, k, eta, y=layer%line_y)
+            call add_stiffness(system, upper%r, upper%r, k, get_overlap(x, 0, x, 0), &
+               matmul(transpose(amplitude), amplitude), eta)
+            call add_stiffness(system, upper%r, lower%w, -k, get_overlap(x, 0, lower%deflection%x, 0), &
+               matmul(transpose(amplitude), get_functions(lower%deflection%y, layer%line_y, 0)), eta)
+         end associate
+      end subroutine add_below_ribs
    end subroutine add_layer
 
    !> Stiffness of springs between the deflections of two plates, or of one plate with itself.
