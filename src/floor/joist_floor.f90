@@ -276,7 +276,7 @@ contains
       lowest = 0.0_wp
       highest = (2*pi/(6*options%sheathing_thickness))**2*sqrt(base%stiffness%along/base%stiffness%mass)/(2*pi)
       reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
-      call options%limit_by_subceiling(base%plate, highest, reason)
+      call options%limit_by_surroundings(base%plate, highest, reason)
    end subroutine get_validity
 
 end module thud_joist_floor

@@ -174,7 +174,7 @@ contains
       lowest = 0.0_wp
       highest = sqrt(minval(base%stiffness%shear)/base%stiffness%mass)/(2*base%plate%thickness)
       reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
-      call options%limit_by_subceiling(base%plate, highest, reason)
+      call options%limit_by_surroundings(base%plate, highest, reason)
    end subroutine get_validity
 
 end module thud_laminate_floor

@@ -1,5 +1,6 @@
 !> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
+   use thud_edge_walls, only: edge_walls_type, get_edge_wall_fields, get_wall_edge, get_wall_limit
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
    use thud_floor_model, only: floor_model_type, reason_length, uncoupled_support
@@ -20,7 +21,7 @@ module thud_rectangular_floor
    public :: base_floor_type, rectangular_floor_type
 
    !> Supports of the edges.
-   character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic']
+   character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic', 'walls']
 
    !> Numbers of octaves and one-third-octave bands of a rating.
    integer, parameter :: octave_bands = 4, third_bands = 12
@@ -46,6 +47,8 @@ module thud_rectangular_floor
       !> Springs along the edges x = 0, x = length, y = 0 and y = width, or one value for all: stiffness against deflection
       !> per length, N/m2, and against rotation, N.
       type(list_type) :: support_stiffness, support_rotation
+      !> Walls at the edges.
+      type(edge_walls_type) :: edge_walls
       !> Positions of further supports along the length (walls or beams across it) and along the width, m.
       type(list_type) :: line_x, line_y
       !> Floating plate; no thickness: none.
@@ -68,7 +71,7 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_modes
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
-      procedure, pass(options) :: limit_by_subceiling
+      procedure, pass(options) :: limit_by_surroundings
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
@@ -117,6 +120,7 @@ contains
          //'deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)', '[0, 1e14]'), &
          list_field('support_rotation', options%support_rotation, 'N', &
          'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
+         get_edge_wall_fields(options%edge_walls), &
          list_field('line_x', options%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
          '(0, 100)'), &
          list_field('line_y', options%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
@@ -400,6 +404,8 @@ contains
          edge = edge_type(rigid_support, rigid_support)
        case ('free')
          edge = edge_type(0.0_wp, 0.0_wp)
+       case ('walls')
+         edge = get_wall_edge(options%edge_walls)
        case default
          edge%deflection = get_four(options%support_stiffness, rigid_support)
          edge%rotation = get_four(options%support_rotation, 0.0_wp)
@@ -457,17 +463,21 @@ contains
          highest = min(highest, get_thin_limit(get_screed_plate(options%screed, base%plate)))
       end if
       reason = 'bending waves are shorter than six thicknesses, and a plate is not thin'
-      call options%limit_by_subceiling(base%plate, highest, reason)
+      call options%limit_by_surroundings(base%plate, highest, reason)
    end subroutine get_validity
 
-   !> Lowers a limit of validity to that of the subceiling and its cavity.
-   pure subroutine limit_by_subceiling(options, above, highest, reason)
+   !> Lowers a limit of validity to that of the walls at the edges, the subceiling and its cavity.
+   pure subroutine limit_by_surroundings(options, above, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
       !> The plate above the subceiling.
       type(plate_type), intent(in) :: above
       real(wp), intent(inout) :: highest
       character(len=reason_length), intent(inout) :: reason
 
+      if (options%support == 'walls' .and. get_wall_limit(options%edge_walls) < highest) then
+         highest = get_wall_limit(options%edge_walls)
+         reason = 'the walls at the edges resonate, and are no mere springs'
+      end if
       if (.not. options%has_subceiling()) return
       associate (cavity => get_cavity_limit(options%subceiling), &
          thin => get_thin_limit(get_subceiling_plate(options%subceiling, above)))
@@ -476,6 +486,6 @@ contains
          reason = 'the cavity above the subceiling is deeper than a quarter of a wavelength, and no mere stiffness'
          if (thin < cavity) reason = 'bending waves are shorter than six thicknesses of the subceiling, and it is not thin'
       end associate
-   end subroutine limit_by_subceiling
+   end subroutine limit_by_surroundings
 
 end module thud_rectangular_floor

@@ -81,7 +81,9 @@ RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
 RoomPositions = Literal["standard", "even"]
 RoomRequiredRating = Literal["octaves", "thirds", "standardized"]
-RectangularFloorSupport = Literal["simple", "clamped", "free", "elastic"]
+RectangularFloorSupport = Literal["simple", "clamped", "free", "elastic", "walls"]
+RectangularFloorEdgeWallPosition = Literal["below", "both"]
+RectangularFloorEdgeWallFarEnd = Literal["pinned", "clamped"]
 RectangularFloorScreedEdges = Literal["simple", "free", "strip"]
 BandSet = Literal["octave", "third"]
 
@@ -596,13 +598,25 @@ class RectangularFloor(Group):
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     support : str
-        Support of the edges; "simple", "clamped", "free", "elastic".
+        Support of the edges; "simple", "clamped", "free", "elastic", "walls".
     support_stiffness : sequence of float
         Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
         y at 0 and width), N/m2; 0 <= support_stiffness <= 1e+14.
     support_rotation : sequence of float
         Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
         support_rotation <= 1e+14.
+    edge_wall_thickness : float
+        Thickness of the walls at the edges, for walls, m; 0.01 <= edge_wall_thickness <= 2.
+    edge_wall_height : float
+        Height of these walls, m; 0.5 <= edge_wall_height <= 20.
+    edge_wall_density : float
+        Density of these walls, kg/m3; 10 <= edge_wall_density <= 20000.
+    edge_wall_modulus : float
+        Modulus of elasticity of these walls, Pa; 1e+07 <= edge_wall_modulus <= 1e+12.
+    edge_wall_position : str
+        Walls below the edges, or both below and above; "below", "both".
+    edge_wall_far_end : str
+        Far ends of these walls; "pinned", "clamped".
     line_x : sequence of float
         Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
     line_y : sequence of float
@@ -668,6 +682,12 @@ class RectangularFloor(Group):
     support: RectangularFloorSupport = "simple"
     support_stiffness: Sequence[float] = ()
     support_rotation: Sequence[float] = ()
+    edge_wall_thickness: float = 0.175
+    edge_wall_height: float = 2.5
+    edge_wall_density: float = 1800.0
+    edge_wall_modulus: float = 5000000000.0
+    edge_wall_position: RectangularFloorEdgeWallPosition = "below"
+    edge_wall_far_end: RectangularFloorEdgeWallFarEnd = "pinned"
     line_x: Sequence[float] = ()
     line_y: Sequence[float] = ()
     screed_thickness: float = 0.0
@@ -1245,9 +1265,15 @@ KEYS = (
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic', 'walls')),
     Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
+    Key("plate", "plate", "edge_wall_thickness", "real", "m", "thickness of the walls at the edges, for walls", (), 0.01, 2.0),
+    Key("plate", "plate", "edge_wall_height", "real", "m", "height of these walls", (), 0.5, 20.0),
+    Key("plate", "plate", "edge_wall_density", "real", "kg/m3", "density of these walls", (), 10.0, 20000.0),
+    Key("plate", "plate", "edge_wall_modulus", "real", "Pa", "modulus of elasticity of these walls", (), 10000000.0, 1000000000000.0),
+    Key("plate", "plate", "edge_wall_position", "choice", "", "walls below the edges, or both below and above", ('below', 'both')),
+    Key("plate", "plate", "edge_wall_far_end", "choice", "", "far ends of these walls", ('pinned', 'clamped')),
     Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("plate", "plate", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
@@ -1289,9 +1315,15 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic', 'walls')),
     Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
+    Key("laminate_floor", "laminate_floor", "edge_wall_thickness", "real", "m", "thickness of the walls at the edges, for walls", (), 0.01, 2.0),
+    Key("laminate_floor", "laminate_floor", "edge_wall_height", "real", "m", "height of these walls", (), 0.5, 20.0),
+    Key("laminate_floor", "laminate_floor", "edge_wall_density", "real", "kg/m3", "density of these walls", (), 10.0, 20000.0),
+    Key("laminate_floor", "laminate_floor", "edge_wall_modulus", "real", "Pa", "modulus of elasticity of these walls", (), 10000000.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "edge_wall_position", "choice", "", "walls below the edges, or both below and above", ('below', 'both')),
+    Key("laminate_floor", "laminate_floor", "edge_wall_far_end", "choice", "", "far ends of these walls", ('pinned', 'clamped')),
     Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
@@ -1339,9 +1371,15 @@ KEYS = (
     Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
-    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic', 'walls')),
     Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
+    Key("joist_floor", "joist_floor", "edge_wall_thickness", "real", "m", "thickness of the walls at the edges, for walls", (), 0.01, 2.0),
+    Key("joist_floor", "joist_floor", "edge_wall_height", "real", "m", "height of these walls", (), 0.5, 20.0),
+    Key("joist_floor", "joist_floor", "edge_wall_density", "real", "kg/m3", "density of these walls", (), 10.0, 20000.0),
+    Key("joist_floor", "joist_floor", "edge_wall_modulus", "real", "Pa", "modulus of elasticity of these walls", (), 10000000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "edge_wall_position", "choice", "", "walls below the edges, or both below and above", ('below', 'both')),
+    Key("joist_floor", "joist_floor", "edge_wall_far_end", "choice", "", "far ends of these walls", ('pinned', 'clamped')),
     Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),

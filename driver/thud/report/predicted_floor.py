@@ -42,6 +42,10 @@ _WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
     ("screed_edges", "simple"): ("strip_",),
     ("screed_edges", "free"): ("strip_",),
     ("bridge_x", ()): ("bridge_",),
+    **{
+        ("support", support): ("edge_wall_",)
+        for support in ("simple", "clamped", "free", "elastic")
+    },
     ("subceiling_thickness", 0.0): ("subceiling_", "channel_", "cavity_"),
     ("covering_stiffness", 0.0): ("covering_",),
     ("ceiling_mass", 0.0): ("ceiling_",),
