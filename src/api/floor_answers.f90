@@ -120,7 +120,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(room_level_type) :: prediction
 
-      call predict_room(case, request%get_array('force'), request%get_number('sample_rate'), prediction, error)
+      call predict_room(case, request%get_array('force'), request%get_number('sample_rate'), .true., prediction, error)
       if (.not. allocated(error)) call add_room_level(bundle, case, prediction)
    end subroutine answer_room_level
 

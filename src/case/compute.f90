@@ -44,6 +44,8 @@ module thud_compute
       logical :: energies = .true.
       !> Level in the room below.
       logical :: room = .true.
+      !> Also that by the modes of floor and room, with the interval of the rating.
+      logical :: modal_room = .true.
    end type scope_type
 
    !> Levels and criteria of an impact.
@@ -171,9 +173,9 @@ contains
       if (allocated(on_floor) .and. scope%levels) call get_floor_result(case, on_floor, scope%energies, floor, error)
       if (allocated(error) .or. .not. (case%has_room .and. scope%room)) return
       if (allocated(on_floor)) then
-         call predict_room(case, on_floor%floor_force, on_floor%sample_rate, room, error)
+         call predict_room(case, on_floor%floor_force, on_floor%sample_rate, scope%modal_room, room, error)
       else
-         call predict_room(case, impact%history%floor_force, impact%history%sample_rate, room, error)
+         call predict_room(case, impact%history%floor_force, impact%history%sample_rate, scope%modal_room, room, error)
       end if
    end subroutine assess_floor
 

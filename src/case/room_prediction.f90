@@ -2,6 +2,7 @@
 !> interval of the rating.
 module thud_room_prediction
    use thud_band, only: band_type, octave_count
+   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_case, only: case_type, get_floor_number
    use thud_constants, only: pi
    use thud_error, only: error_type
@@ -39,15 +40,31 @@ module thud_room_prediction
 contains
 
    !> Level in the room below, from a force history.
-   subroutine predict_room(case, force, sample_rate, prediction, error)
+   subroutine predict_room(case, force, sample_rate, with_modes, prediction, error)
       !> The case, with floor and room.
       type(case_type), intent(in) :: case
       !> Force on the floor, N: [n_sample].
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
+      !> Also predict it by the modes of floor and room, with the interval of the rating.
+      logical, intent(in) :: with_modes
       type(room_level_type), intent(out) :: prediction
       !> Set if a level cannot be computed, or the floor cannot radiate into the room.
+      type(error_type), allocatable, intent(out) :: error
+
+      call use_one_blas_thread()
+      call predict(case, force, sample_rate, with_modes, prediction, error)
+      call restore_blas_threads()
+   end subroutine predict_room
+
+   !> As `predict_room`, with the threads of BLAS as they are.
+   subroutine predict(case, force, sample_rate, with_modes, prediction, error)
+      type(case_type), intent(in) :: case
+      real(wp), intent(in) :: force(:)
+      real(wp), intent(in) :: sample_rate
+      logical, intent(in) :: with_modes
+      type(room_level_type), intent(out) :: prediction
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(floor_modes_type) :: modes
@@ -75,12 +92,13 @@ contains
             if (floor%has_modal_conductance()) conductance = radiation%conductance
          end if
          call get_room_level(plate, conductance, radiation_factor, case%room, bands, level, prediction)
+         if (.not. with_modes) return
          call get_room_level(plate, conductance, radiation_factor, get_bare_room(case%room), bands, level, bare)
          call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, &
             prediction%level - bare%level - floor%get_improvement(size(bands)), prediction, error)
          if (.not. allocated(error)) call add_contributions(case, plate, conductance, radiation_factor, level, prediction)
       end associate
-   end subroutine predict_room
+   end subroutine predict
 
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
    !> that of the simply supported floor without further supports: its waves are so short that these matter little.
@@ -101,7 +119,8 @@ contains
       integer :: n
 
       n = count(bands%upper <= modes%limit/(2*pi))
-      call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
+      allocate (radiation%radiation_factor(0), radiation%conductance(0))
+      if (n > 0) call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
       if (n == size(bands)) return
       call floor%get_room_modes(uncoupled_support, simple_plate, simple_modes, error)
       if (allocated(error)) return

@@ -8,8 +8,9 @@ module thud_modal_room
    use thud_floor_modes, only: floor_modes_type
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_kinds, only: wp
+   use thud_matrix_product, only: get_product, get_transposed_product
    use thud_plate, only: air_type
-   use thud_ritz_system, only: get_mode_values
+   use thud_ritz_system, only: get_mode_values, get_ranges
    use thud_transform, only: get_signal
    implicit none (type, external)
    private
@@ -71,6 +72,26 @@ module thud_modal_room
       integer :: floor_modes = 0, room_modes = 0
    end type modal_room_type
 
+   !> Pairs of half waves and modes of the floor that are coupled with them.
+   type :: group_type
+      !> Numbers of the pairs and of the modes: [n_pair], [n_mode].
+      integer, allocatable :: pair(:), mode(:)
+      !> Their coupling, m2/sqrt(kg): [n_pair, n_mode].
+      real(wp), allocatable :: coupling(:, :)
+      !> Shapes of the modes at the balls, 1/sqrt(kg): [n_mode, n_ball].
+      real(wp), allocatable :: drive(:, :)
+   end type group_type
+
+   !> Answers of the room to the volume flow into a pair of half waves along length and width, at some frequencies.
+   type :: answers_type
+      !> Sound pressure at the microphones, real parts before imaginary ones, Pa s/m3: [n_pair, 2*n_microphone, n_line].
+      real(wp), allocatable :: pressure(:, :, :)
+      !> Power into the room and its losses per mean-square flow, Pa s/m3: [n_pair, n_line].
+      real(wp), allocatable :: input(:, :), loss(:, :)
+      !> Number of modes of the room.
+      integer :: n_mode = 0
+   end type answers_type
+
 contains
 
    !> Frequency above which the modes of a room overlap so much that its sound is statistical, Hz: the overlap is the mode
@@ -83,13 +104,12 @@ contains
          /(2.2_wp*4*pi*product(box%sides)))
    end function get_crossover
 
-   !> Frequency of the highest modes of a floor that take part, Hz.
+   !> Frequency of the highest modes of a floor that take part, Hz; 0 if no band is modal.
    pure function get_highest_frequency(box) result(frequency)
       type(box_type), intent(in) :: box
       real(wp) :: frequency
 
-      ! The upper edge of the band at the crossover lies at most a third of an octave above.
-      frequency = floor_ratio*room_ratio*2**(1.0_wp/3)*get_crossover(box)
+      frequency = floor_ratio*room_ratio*maxval([0.0_wp, pack(box%bands%upper, box%bands%center <= get_crossover(box))])
    end function get_highest_frequency
 
    !> Standard positions: center and four points near the corners (KS F 2810-2).
@@ -123,13 +143,12 @@ contains
       type(modal_room_type), intent(out) :: room
       !> Highest mid frequency of a band, Hz (default: the crossover).
       real(wp), intent(in), optional :: max_frequency
-      real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), signal(:), frequency(:), shape_x(:, :)
-      real(wp), allocatable :: shape_y(:, :)
-      complex(wp), allocatable :: spectrum(:), velocity(:, :), flow(:, :), answer(:, :, :), sound(:, :)
-      integer, allocatable :: lx(:), ly(:)
-      logical, allocatable :: kept(:)
-      real(wp) :: highest, duration, step
-      integer :: i, j, n_sample, n_line, n_pair
+      real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), frequency(:)
+      complex(wp), allocatable :: spectrum(:), sound(:, :, :)
+      integer, allocatable :: lx(:), ly(:), kept(:)
+      type(answers_type) :: answers
+      real(wp) :: highest, duration, slowest
+      integer :: i, j, n_sample, n_line
 
       room%n_band = count(box%bands%center <= get_crossover(box))
       if (present(max_frequency)) room%n_band = count(box%bands%center <= max_frequency)
@@ -138,15 +157,18 @@ contains
       do
          if (room%n_band == 0) exit
          highest = room_ratio*box%bands(room%n_band)%upper
-         kept = modes%omega < min(floor_ratio*2*pi*highest, modes%limit)
+         kept = pack([(i, i=1, size(modes%omega))], modes%omega < min(floor_ratio*2*pi*highest, modes%limit))
          ! A floor without modes there answers with its compliance only, which nothing here contains.
-         if (.not. any(kept)) then
+         if (size(kept) == 0) then
             room%n_band = 0
             exit
          end if
-         omega = pack(modes%omega, kept)
-         decay = omega*pack(modes%loss_factor, kept)
-         duration = 0.5_wp + 6*log(10.0_wp)/min(max(minval(decay), 1.0_wp), 6*log(10.0_wp)/maxval(box%reverberation_time))
+         omega = modes%omega(kept)
+         decay = omega*modes%loss_factor(kept)
+         slowest = max(minval(decay), 1.0_wp)
+         ! Modes far below the bands ring longest, but the filters of the bands remove them.
+         if (.not. with_pressure) slowest = max(minval(decay, omega > pi*box%bands(1)%lower), slowest)
+         duration = 0.5_wp + 6*log(10.0_wp)/min(slowest, 6*log(10.0_wp)/maxval(box%reverberation_time))
          n_line = int(highest*duration)
          if (get_room_mode_count(box, highest)*n_line <= max_values) exit
          room%n_band = room%n_band - 1
@@ -158,38 +180,24 @@ contains
       if (room%n_band == 0) return
       n_sample = 128*ceiling(sample_ratio*highest*duration/128)
       room%sample_rate = n_sample/duration
-      step = 1/duration
-      frequency = step*[(i, i=1, n_line)]
+      frequency = [(i, i=1, n_line)]/duration
       spectrum = get_spectrum(force, sample_rate, frequency)
       call get_pairs(box, highest, lx, ly)
-      n_pair = size(lx)
       call get_coupling(modes, box, kept, lx, ly, coupling)
-      call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive)
-      drive = drive(pack([(i, i=1, size(kept))], kept), :)
-      shape_x = get_cosines(lx, microphone(1, :)/box%sides(1))
-      shape_y = get_cosines(ly, microphone(2, :)/box%sides(2))
+      call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive, kept)
       room%floor_modes = size(omega)
-      call get_answers(box, lx, ly, highest, frequency, microphone(3, :)/box%sides(3), answer, room%room_modes)
-      if (with_pressure) allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
-      allocate (signal(n_sample), velocity(size(omega), n_line), sound(n_line, size(microphone, 2)))
-      do j = 1, size(ball, 2)
-         associate (w => 2*pi*frequency)
-            do i = 1, n_line
-               velocity(:, i) = drive(:, j)*spectrum(i)*cmplx(0.0_wp, w(i), wp)/cmplx(omega**2 - w(i)**2, w(i)*decay, wp)
+      call get_answers(box, lx, ly, highest, frequency, microphone, answers)
+      room%room_modes = answers%n_mode
+      call get_sound(omega, decay, drive, get_groups(lx, ly, coupling, drive), frequency, spectrum, answers, sound, room)
+      call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
+      if (with_pressure) then
+         allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
+         do j = 1, size(ball, 2)
+            do i = 1, size(microphone, 2)
+               call get_signal([(0.0_wp, 0.0_wp), sound(:, i, j)*room%sample_rate], room%pressure(:, i, j))
             end do
-         end associate
-         ! Volume flow into the shapes of the room, m3/s per Hz: [n_pair, n_line].
-         flow = matmul(coupling, velocity)
-         room%floor_input(j) = 2*step*sum(real(matmul(drive(:, j), velocity)*conjg(spectrum), wp))
-         room%floor_loss(j) = 2*step*sum(decay*sum(abs(velocity)**2, dim=2))
-         call add_room_energies(box, lx, ly, highest, frequency, flow, step, room%room_input(j), room%room_loss(j))
-         do i = 1, size(microphone, 2)
-            sound(:, i) = sum(spread(shape_x(:, i)*shape_y(:, i), 2, n_line)*flow*answer(:, :, i), dim=1)
-            call add_levels(box%bands(:room%n_band), frequency, sound(:, i)*room%sample_rate, room%sample_rate, signal, &
-               room%level(:, i, j))
-            if (with_pressure) call get_signal([(0.0_wp, 0.0_wp), sound(:, i)*room%sample_rate], room%pressure(:, i, j))
          end do
-      end do
+      end if
       do i = 1, room%n_band
          associate (level => room%level(i, :, :))
             room%mean(i) = 10*log10(sum(10**(level/10))/size(level))
@@ -202,6 +210,88 @@ contains
          end associate
       end do
    end subroutine get_modal_room
+
+   !> Modes of floor and room that are coupled: by the parities of the half waves.
+   pure function get_groups(lx, ly, coupling, drive) result(group)
+      !> Half waves along length and width: [n_pair].
+      integer, intent(in) :: lx(:), ly(:)
+      !> Coupling of pairs and modes, m2/sqrt(kg): [n_pair, n_mode].
+      real(wp), intent(in) :: coupling(:, :)
+      !> Shapes at the balls, 1/sqrt(kg): [n_mode, n_ball].
+      real(wp), intent(in) :: drive(:, :)
+      type(group_type) :: group(4)
+      integer :: i, k
+
+      do i = 1, 4
+         group(i)%pair = pack([(k, k=1, size(lx))], 2*mod(lx, 2) + mod(ly, 2) == i - 1)
+         group(i)%mode = pack([(k, k=1, size(coupling, 2))], &
+            maxval(abs(coupling(group(i)%pair, :)), dim=1) > 1.0e-12_wp*maxval(abs(coupling)))
+         group(i)%coupling = coupling(group(i)%pair, group(i)%mode)
+         group(i)%drive = drive(group(i)%mode, :)
+      end do
+   end function get_groups
+
+   !> Spectra of the sound at the microphones, and energies of floor and room (Parseval).
+   subroutine get_sound(omega, decay, drive, groups, frequency, spectrum, answers, sound, room)
+      !> Angular frequencies, rad/s, and decay rates, 1/s, of the floor's modes: [n_mode].
+      real(wp), intent(in) :: omega(:), decay(:)
+      !> Their shapes at the balls, 1/sqrt(kg): [n_mode, n_ball].
+      real(wp), intent(in) :: drive(:, :)
+      type(group_type), intent(in) :: groups(:)
+      !> Frequencies in equal steps, Hz, and Fourier transform of the force, N s: [n_line].
+      real(wp), intent(in) :: frequency(:)
+      complex(wp), intent(in) :: spectrum(:)
+      type(answers_type), intent(in) :: answers
+      !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
+      complex(wp), allocatable, intent(out) :: sound(:, :, :)
+      type(modal_room_type), intent(inout) :: room
+      complex(wp) :: velocity(size(omega))
+      real(wp), dimension(size(omega)) :: input, square
+      ! Real parts, then imaginary parts, for each ball or microphone.
+      real(wp) :: flow(size(answers%input, 1), 2*size(drive, 2))
+      real(wp), allocatable :: amplitude(:, :), pressure(:, :)
+      integer :: i, j, k, n_ball, n_microphone
+
+      n_ball = size(drive, 2)
+      n_microphone = size(answers%pressure, 2)/2
+      allocate (sound(size(frequency), n_microphone, n_ball))
+      input = 0.0_wp
+      square = 0.0_wp
+      room%room_input = 0.0_wp
+      room%room_loss = 0.0_wp
+      do i = 1, size(frequency)
+         associate (w => 2*pi*frequency(i))
+            velocity = spectrum(i)*cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*decay, wp)
+         end associate
+         input = input + real(velocity*conjg(spectrum(i)), wp)
+         square = square + velocity%re**2 + velocity%im**2
+         ! Volume flow into the shapes of the room, m3/s per Hz.
+         do k = 1, size(groups)
+            associate (group => groups(k), in_group => velocity(groups(k)%mode))
+               allocate (amplitude(size(group%mode), 2*n_ball))
+               do j = 1, n_ball
+                  amplitude(:, j) = in_group%re*group%drive(:, j)
+                  amplitude(:, n_ball + j) = in_group%im*group%drive(:, j)
+               end do
+               flow(group%pair, :) = get_product(group%coupling, amplitude)
+               deallocate (amplitude)
+            end associate
+         end do
+         associate (energy => flow(:, :n_ball)**2 + flow(:, n_ball + 1:)**2)
+            room%room_input = room%room_input + matmul(answers%input(:, i), energy)
+            room%room_loss = room%room_loss + matmul(answers%loss(:, i), energy)
+         end associate
+         pressure = get_transposed_product(answers%pressure(:, :, i), flow)
+         sound(i, :, :) = cmplx(pressure(:n_microphone, :n_ball) - pressure(n_microphone + 1:, n_ball + 1:), &
+            pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
+      end do
+      associate (step => frequency(1))
+         room%floor_input = 2*step*matmul(input, drive**2)
+         room%floor_loss = 2*step*matmul(decay*square, drive**2)
+         room%room_input = 2*step*room%room_input
+         room%room_loss = 2*step*room%room_loss
+      end associate
+   end subroutine get_sound
 
    !> Mean-square deviation from the mean.
    pure function get_variance(values) result(variance)
@@ -284,36 +374,33 @@ contains
    subroutine get_coupling(modes, box, kept, lx, ly, coupling)
       type(floor_modes_type), intent(in) :: modes
       type(box_type), intent(in) :: box
-      logical, intent(in) :: kept(:)
+      !> Numbers of the modes: [n_mode].
+      integer, intent(in) :: kept(:)
       integer, intent(in) :: lx(:), ly(:)
       real(wp), allocatable, intent(out) :: coupling(:, :)
       real(wp), allocatable :: along(:, :), across(:, :), product(:, :)
-      integer, allocatable :: in_block(:)
-      integer :: i, j, k, first, n
+      integer :: range(2, size(modes%modes%block))
+      integer :: i, j, k, n
 
       associate (radiator => modes%modes%displacement(modes%stack%radiator))
          along = get_line_coupling(radiator%x, box%corner(1), box%sides(1), maxval(lx))
          across = get_line_coupling(radiator%y, box%corner(2), box%sides(2), maxval(ly))
       end associate
-      allocate (coupling(size(lx), count(kept)))
-      first = 0
+      allocate (coupling(size(lx), size(kept)))
+      range = get_ranges(modes%modes, kept)
       n = 0
       do i = 1, size(modes%modes%block)
-         associate (block => modes%modes%block(i))
-            in_block = pack([(k, k=1, size(block%omega))], kept(first + 1:first + size(block%omega)))
-            first = first + size(block%omega)
-            if (size(in_block) == 0) cycle
-            associate (shape => block%shape(modes%stack%radiator))
-               allocate (product(size(lx), size(shape%x)*size(shape%y)))
-               do j = 1, size(shape%y)
-                  do k = 1, size(shape%x)
-                     product(:, (j - 1)*size(shape%x) + k) = along(lx + 1, shape%x(k))*across(ly + 1, shape%y(j))
-                  end do
+         if (range(2, i) < range(1, i)) cycle
+         associate (shape => modes%modes%block(i)%shape(modes%stack%radiator), n_mode => range(2, i) - range(1, i) + 1)
+            allocate (product(size(lx), size(shape%x)*size(shape%y)))
+            do j = 1, size(shape%y)
+               do k = 1, size(shape%x)
+                  product(:, (j - 1)*size(shape%x) + k) = along(lx + 1, shape%x(k))*across(ly + 1, shape%y(j))
                end do
-               coupling(:, n + 1:n + size(in_block)) = matmul(product, shape%coefficient(:, in_block))
-               deallocate (product)
-            end associate
-            n = n + size(in_block)
+            end do
+            coupling(:, n + 1:n + n_mode) = get_product(product, shape%coefficient(:, range(1, i):range(2, i)))
+            deallocate (product)
+            n = n + n_mode
          end associate
       end do
    end subroutine get_coupling
@@ -343,57 +430,51 @@ contains
       time = box%reverberation_time(minloc(abs(log(max(frequency, 1.0_wp)/box%bands%center)), dim=1))
    end function get_reverberation_time
 
-   !> Sound pressure at microphones per volume flow into a pair of half waves, Pa s/m3, without the shapes along length and
-   !> width: the sum over the half waves along the height of rho0 c0**2/(V norm) i w/(w_r**2 - w**2 + i w 6 ln 10/T).
-   subroutine get_answers(box, lx, ly, highest, frequency, height, answer, n_mode)
+   !> Answers to the volume flow into pairs of half waves: sums over the half waves along the height of the amplitudes
+   !> rho0 c0**2/(V norm) i w/(w_r**2 - w**2 + i w 6 ln 10/T).
+   subroutine get_answers(box, lx, ly, highest, frequency, microphone, answers)
       type(box_type), intent(in) :: box
       integer, intent(in) :: lx(:), ly(:)
       !> Frequency of the highest modes, Hz.
       real(wp), intent(in) :: highest
       !> Frequencies, Hz: [n_line].
       real(wp), intent(in) :: frequency(:)
-      !> Relative heights of the microphones: [n_microphone].
-      real(wp), intent(in) :: height(:)
-      !> The pressure: [n_pair, n_line, n_microphone].
-      complex(wp), allocatable, intent(out) :: answer(:, :, :)
-      !> Number of modes of the room.
-      integer, intent(out) :: n_mode
-      complex(wp) :: resonance(size(frequency))
-      real(wp) :: natural
-      integer :: i, j, k
+      !> Positions of the microphones, m: [3, n_microphone].
+      real(wp), intent(in) :: microphone(:, :)
+      type(answers_type), intent(out) :: answers
+      real(wp), allocatable :: shape(:, :), height(:)
+      complex(wp) :: amplitude(size(frequency))
+      real(wp) :: natural, decay
+      integer :: i, j, k, n
 
-      allocate (answer(size(lx), size(frequency), size(height)))
-      answer = 0.0_wp
-      n_mode = 0
+      n = size(microphone, 2)
+      allocate (answers%pressure(size(lx), 2*n, size(frequency)), source=0.0_wp)
+      allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
+      shape = get_cosines(lx, microphone(1, :)/box%sides(1))*get_cosines(ly, microphone(2, :)/box%sides(2))
+      height = microphone(3, :)/box%sides(3)
       do i = 1, size(lx)
          k = 0
          do
             natural = get_mode_frequency(box, lx(i), ly(i), k)
             if (natural > highest) exit
-            n_mode = n_mode + 1
-            resonance = get_resonance(box, lx(i), ly(i), k, frequency)
+            answers%n_mode = answers%n_mode + 1
+            decay = 6*log(10.0_wp)/get_reverberation_time(box, natural)
+            associate (w => 2*pi*frequency, stiffness => get_modal_stiffness(box, lx(i), ly(i), k))
+               amplitude = stiffness*cmplx(0.0_wp, w, wp)/cmplx((2*pi*natural)**2 - w**2, w*decay, wp)
+               answers%input(i, :) = answers%input(i, :) + amplitude%re
+               answers%loss(i, :) = answers%loss(i, :) + (amplitude%re**2 + amplitude%im**2)*decay/stiffness
+            end associate
             ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
-            do j = 1, size(height)
-               answer(i, :, j) = answer(i, :, j) + (-1)**k*cos(k*pi*height(j))*resonance
+            do j = 1, n
+               associate (at_microphone => (-1)**k*cos(k*pi*height(j))*shape(i, j))
+                  answers%pressure(i, j, :) = answers%pressure(i, j, :) + at_microphone*amplitude%re
+                  answers%pressure(i, n + j, :) = answers%pressure(i, n + j, :) + at_microphone*amplitude%im
+               end associate
             end do
             k = k + 1
          end do
       end do
    end subroutine get_answers
-
-   !> Amplitude of a mode of the room per volume flow into it, Pa s/m3: [n_line].
-   pure function get_resonance(box, lx, ly, lz, frequency) result(resonance)
-      type(box_type), intent(in) :: box
-      integer, intent(in) :: lx, ly, lz
-      real(wp), intent(in) :: frequency(:)
-      complex(wp) :: resonance(size(frequency))
-      real(wp) :: natural
-
-      natural = get_mode_frequency(box, lx, ly, lz)
-      associate (w => 2*pi*frequency, decay => 6*log(10.0_wp)/get_reverberation_time(box, natural))
-         resonance = get_modal_stiffness(box, lx, ly, lz)*cmplx(0.0_wp, w, wp)/cmplx((2*pi*natural)**2 - w**2, w*decay, wp)
-      end associate
-   end function get_resonance
 
    !> rho0 c0**2/(V norm) of a mode of the room with its mean-square shape as norm, Pa/m3.
    pure function get_modal_stiffness(box, lx, ly, lz) result(stiffness)
@@ -404,63 +485,41 @@ contains
       stiffness = box%air%density*box%air%sound_speed**2/product(box%sides)*2**count([lx, ly, lz] > 0)
    end function get_modal_stiffness
 
-   !> Energy into the modes of the room, and their losses, J (Parseval).
-   subroutine add_room_energies(box, lx, ly, highest, frequency, flow, step, input, loss)
-      type(box_type), intent(in) :: box
-      integer, intent(in) :: lx(:), ly(:)
-      real(wp), intent(in) :: highest
-      real(wp), intent(in) :: frequency(:)
-      !> Volume flow into pairs of half waves: [n_pair, n_line].
-      complex(wp), intent(in) :: flow(:, :)
-      !> Distance of the frequencies, Hz.
-      real(wp), intent(in) :: step
-      real(wp), intent(out) :: input, loss
-      complex(wp) :: pressure(size(frequency))
-      real(wp) :: natural
-      integer :: i, k
-
-      input = 0.0_wp
-      loss = 0.0_wp
-      do i = 1, size(lx)
-         k = 0
-         do
-            natural = get_mode_frequency(box, lx(i), ly(i), k)
-            if (natural > highest) exit
-            pressure = get_resonance(box, lx(i), ly(i), k, frequency)*flow(i, :)
-            input = input + 2*step*sum(real(pressure*conjg(flow(i, :)), wp))
-            loss = loss + 2*step*sum(abs(pressure)**2)*6*log(10.0_wp)/get_reverberation_time(box, natural) &
-               /get_modal_stiffness(box, lx(i), ly(i), k)
-            k = k + 1
-         end do
-      end do
-   end subroutine add_room_energies
-
-   !> Maximum Fast levels of a sound in bands.
-   subroutine add_levels(bands, frequency, sound, sample_rate, signal, level)
+   !> Maximum Fast levels of sounds in bands.
+   subroutine get_levels(bands, frequency, sound, sample_rate, n_sample, level)
       type(band_type), intent(in) :: bands(:)
-      !> Frequencies, Hz, and spectrum, Pa: [n_line].
+      !> Frequencies, Hz: [n_line].
       real(wp), intent(in) :: frequency(:)
-      complex(wp), intent(in) :: sound(:)
+      !> Spectra, Pa: [n_line, n_microphone, n_ball].
+      complex(wp), intent(in) :: sound(:, :, :)
       real(wp), intent(in) :: sample_rate
-      !> Workspace: [n_sample].
-      real(wp), intent(inout) :: signal(:)
-      !> The levels, dB: [n_band].
-      real(wp), intent(out) :: level(:)
+      integer, intent(in) :: n_sample
+      !> The levels, dB: [n_band, n_microphone, n_ball].
+      real(wp), intent(out) :: level(:, :, :)
+      complex(wp) :: filter(size(frequency)), filtered(0:size(frequency))
+      real(wp) :: signal(n_sample)
       real(wp) :: mean, largest, decay
-      integer :: i, k
+      integer :: i, j, k, l
 
       decay = exp(-1/(sample_rate*time_constant))
+      filtered(0) = 0.0_wp
       do i = 1, size(bands)
-         call get_signal([(0.0_wp, 0.0_wp), sound*get_filter(bands(i), frequency)], signal)
-         mean = 0.0_wp
-         largest = tiny(largest)
-         do k = 1, size(signal)
-            mean = decay*mean + (1 - decay)*signal(k)**2
-            largest = max(largest, mean)
+         filter = get_filter(bands(i), frequency)
+         do j = 1, size(sound, 3)
+            do k = 1, size(sound, 2)
+               filtered(1:) = sound(:, k, j)*filter
+               call get_signal(filtered, signal)
+               mean = 0.0_wp
+               largest = tiny(largest)
+               do l = 1, n_sample
+                  mean = decay*mean + (1 - decay)*signal(l)**2
+                  largest = max(largest, mean)
+               end do
+               level(i, k, j) = 10*log10(largest/reference_pressure**2)
+            end do
          end do
-         level(i) = 10*log10(largest/reference_pressure**2)
       end do
-   end subroutine add_levels
+   end subroutine get_levels
 
    !> Transfer function of a band filter: Butterworth of third order with the exact edges (class 1 of IEC 61260-1).
    pure function get_filter(band, frequency) result(transfer)

@@ -61,19 +61,30 @@ contains
       real(wp), intent(out) :: node(:)
       !> Weights: [n].
       real(wp), intent(out) :: weight(:)
-      real(wp), dimension(0:size(node)) :: value, first, second
-      integer :: i, iteration, n
+      real(wp), dimension((size(node) + 1)/2) :: x, step, value, previous, before, slope
+      integer :: iteration, i, j, n
 
+      ! All nodes in [-1, 0] at once; the others are mirrored.
       n = size(node)
-      do i = 1, n
-         node(i) = -cos(pi*(i - 0.25_wp)/(n + 0.5_wp))
-         do iteration = 1, 8
-            call get_legendre(node(i), value, first, second)
-            node(i) = node(i) - value(n)/first(n)
+      x = -cos(pi*([(i, i=1, size(x))] - 0.25_wp)/(n + 0.5_wp))
+      do iteration = 1, 9
+         value = 1.0_wp
+         previous = 0.0_wp
+         do j = 1, n
+            before = previous
+            previous = value
+            value = ((2*j - 1)*x*previous - (j - 1)*before)/j
          end do
-         call get_legendre(node(i), value, first, second)
-         weight(i) = 2/((1 - node(i)**2)*first(n)**2)
+         slope = n*(previous - x*value)/(1 - x**2)
+         step = value/slope
+         if (maxval(abs(step)) <= epsilon(1.0_wp)) exit
+         x = x - step
       end do
+      if (mod(n, 2) == 1) x(size(x)) = 0.0_wp
+      node(:size(x)) = x
+      node(n:n - size(x) + 1:-1) = -x
+      weight(:size(x)) = 2/((1 - x**2)*slope**2)
+      weight(n:n - size(x) + 1:-1) = weight(:size(x))
    end subroutine get_gauss_legendre
 
 end module thud_legendre

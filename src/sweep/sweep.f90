@@ -5,6 +5,7 @@
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_batch_samples, only: fill_samples, suits_batch
+   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only
    use thud_column, only: column_type
@@ -164,9 +165,11 @@ contains
          ! Failed samples are repeated one by one, for their error messages.
          remaining = pack(remaining, sweep%status /= 0)
       end if
+      call use_one_blas_thread()
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
       call solve_remaining()
       !$omp end parallel
+      call restore_blas_threads()
       call check_interrupt(error)
 
    contains
@@ -278,7 +281,7 @@ contains
       real(wp), allocatable :: all_quantities(:)
       integer :: i
 
-      scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels)
+      scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels, modal_room=.false.)
       do i = 1, size(columns)
          if (.not. allocated(error)) call fields(columns(i)%field)%set_number(values(i), columns(i)%entry, error)
       end do

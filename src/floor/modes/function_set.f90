@@ -3,6 +3,7 @@ module thud_function_set
    use thud_constants, only: pi
    use thud_kinds, only: wp
    use thud_legendre, only: get_gauss_legendre, get_legendre
+   use thud_matrix_product, only: get_transposed_product
    implicit none (type, external)
    private
 
@@ -99,18 +100,18 @@ contains
       integer, intent(in) :: order
       !> Values, 1/m**(order + 1/2).
       real(wp) :: value(size(position), set%count)
-      real(wp), allocatable :: legendre(:, :)
+      real(wp), allocatable :: legendre(:, :, :)
       integer :: i, j
 
       if (set%kind == polynomials) then
-         allocate (legendre(0:size(set%coefficient, 1) - 1, 0:2))
+         allocate (legendre(0:size(set%coefficient, 1) - 1, size(position), 0:2))
          do i = 1, size(position)
-            call get_legendre(2*position(i)/set%length - 1, legendre(:, 0), legendre(:, 1), legendre(:, 2))
-            do j = 0, ubound(legendre, 1)
-               legendre(j, order) = legendre(j, order)*sqrt((2*j + 1)/set%length)
-            end do
-            value(i, :) = (2/set%length)**order*matmul(legendre(:, order), set%coefficient)
+            call get_legendre(2*position(i)/set%length - 1, legendre(:, i, 0), legendre(:, i, 1), legendre(:, i, 2))
          end do
+         do j = 0, ubound(legendre, 1)
+            legendre(j, :, order) = (2/set%length)**order*sqrt((2*j + 1)/set%length)*legendre(j, :, order)
+         end do
+         value = get_transposed_product(legendre(:, :, order), set%coefficient)
          return
       end if
       do j = 1, set%count
@@ -162,7 +163,7 @@ contains
       if (present(to)) ends(2) = to
       call get_quadrature(first%count + second%count + 20, ends(1), ends(2), point, weight)
       associate (left => get_functions(first, point, first_order), right => get_functions(second, point, second_order))
-         overlap = matmul(transpose(left*spread(weight, 2, first%count)), right)
+         overlap = get_transposed_product(left*spread(weight, 2, first%count), right)
       end associate
    end function get_overlap
 

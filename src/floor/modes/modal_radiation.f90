@@ -8,9 +8,9 @@ module thud_modal_radiation
    use thud_floor_modes, only: floor_modes_type
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_kinds, only: wp
-   use thud_lapack, only: dgemm
+   use thud_matrix_product, only: get_product, get_transposed_product
    use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
-   use thud_ritz_system, only: get_mode_values
+   use thud_ritz_system, only: get_mode_values, get_ranges
    implicit none (type, external)
    private
 
@@ -34,10 +34,7 @@ module thud_modal_radiation
    real(wp), parameter :: near_ratio = 1.3_wp
 
    !> Maximum number of directions of a quadrature: on large floors, the mean over many modes needs no more.
-   integer, parameter :: max_directions = 40
-
-   !> Parity of a product of functions about the center: even or odd in x and in y.
-   integer, parameter :: n_parity = 4
+   integer, parameter :: max_directions = 64
 
    !> Answer of a floor to a force at its mean position, per band.
    type :: modal_radiation_type
@@ -49,14 +46,41 @@ module thud_modal_radiation
       real(wp), allocatable :: radiated(:)
    end type modal_radiation_type
 
-   !> Transforms of the modes at some wavenumbers.
-   type :: transforms_type
-      !> Weights of the integral over wavenumbers, 1/m: [n_wave].
-      real(wp), allocatable :: weight(:)
-      !> Transforms, m2/sqrt(kg): [n_wave, n_mode, n_parity].
-      real(wp), allocatable :: value(:, :, :)
-      !> Whether a mode has such a part: [n_mode, n_parity].
+   !> Shapes of some modes in a block.
+   type :: block_shapes_type
+      !> Positions of the functions in the lists of all shapes: [n_x], [n_y].
+      integer, allocatable :: x(:), y(:)
+      !> Coefficients of their products, x first: [n_x*n_y, n_mode].
+      real(wp), allocatable :: coefficient(:, :)
+   end type block_shapes_type
+
+   !> Shapes of the radiating plate in some modes, and numbers of all functions of x and of y in them.
+   type :: shapes_type
+      integer, allocatable :: x(:), y(:)
+      type(block_shapes_type), allocatable :: block(:)
+   end type shapes_type
+
+   !> Cosine and sine transforms of functions about the center of an interval, as Chebyshev series of the wavenumber. They
+   !> are entire functions of it, so that few terms give them to rounding.
+   type :: wave_series_type
+      !> Highest wavenumber, 1/m.
+      real(wp) :: highest = 0.0_wp
+      !> Length of the interval, m.
+      real(wp) :: length = 0.0_wp
+      !> Coefficients: [n_term, n_function, 2].
+      real(wp), allocatable :: coefficient(:, :, :)
+      !> Whether a function has such a part: [n_function, 2].
       logical, allocatable :: is_present(:, :)
+   end type wave_series_type
+
+   !> Transforms at one wavenumber k0 of sound: kx = k0 sin(a) and ky = k0 cos(a) sin(b).
+   type :: transforms_type
+      !> Cosine and sine transforms along x: [n_x, n_angle, 2].
+      real(wp), allocatable :: along(:, :, :)
+      !> Integrals over b of products of two transforms along y, with the weights of the angles a: [n_y, n_y, n_angle, 2].
+      real(wp), allocatable :: across(:, :, :, :)
+      !> Whether a function of x or y has a cosine and a sine transform: [n_x, 2], [n_y, 2].
+      logical, allocatable :: has_along(:, :), has_across(:, :)
    end type transforms_type
 
 contains
@@ -75,29 +99,42 @@ contains
       type(modal_radiation_type), intent(out) :: radiation
       !> Strike points, relative to length and width (default: a mean over the floor): [2, n].
       real(wp), intent(in), optional :: stated_strike(:, :)
-      real(wp), allocatable :: strike(:, :), all_drives(:, :), drive(:, :)
+      type(wave_series_type) :: along, across
+      type(shapes_type) :: shapes
+      real(wp), allocatable :: strike(:, :), drive(:, :), omega(:), loss_factor(:)
       integer, allocatable :: kept(:)
-      real(wp) :: power, velocity, total
+      real(wp) :: power, velocity, total, highest
+      logical :: has_strikes
       integer :: i, k
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
       allocate (radiation%radiated(size(bands)))
-      if (present(stated_strike) .or. .not. is_orthogonal(modes)) then
-         if (present(stated_strike)) then
-            strike = stated_strike
-         else
-            call get_strike_points(n_strike, strike)
-         end if
-         call get_mode_values(modes%modes, 1, modes%stack%length*strike(1, :), modes%stack%width*strike(2, :), all_drives)
-      end if
+      call get_strike_points(n_strike, strike)
+      if (present(stated_strike)) strike = stated_strike
+      has_strikes = present(stated_strike) .or. .not. is_orthogonal(modes)
+      highest = 2*pi*maxval(bands%upper)/air%sound_speed
+      associate (radiator => modes%modes%displacement(modes%stack%radiator))
+         along = new_wave_series(radiator%x, area(1:2), highest)
+         across = new_wave_series(radiator%y, area(3:4), highest)
+      end associate
       do i = 1, size(bands)
          kept = pack([(k, k=1, size(modes%omega))], &
             modes%omega < min(modes%limit, max(max_ratio*2*pi*bands(i)%upper, min_highest)))
          ! Of so many modes, those far from the band matter little.
          if (size(kept) > max_modes) kept = pack(kept, modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio &
             .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
-         if (allocated(all_drives)) drive = all_drives(kept, :)
-         call add_band(modes, kept, air, bands(i), area, power, velocity, total, drive)
+         omega = modes%omega(kept)
+         loss_factor = modes%loss_factor(kept)
+         shapes = get_shapes(modes, modes%stack%radiator, kept)
+         if (has_strikes) then
+            call get_mode_values(modes%modes, 1, modes%stack%length*strike(1, :), modes%stack%width*strike(2, :), &
+               drive, kept)
+            call add_strikes(shapes, get_shapes(modes, modes%stack%bearing, kept), omega, loss_factor, drive, air, bands(i), &
+               get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
+         else
+            call add_modes(shapes, omega, loss_factor, modes%stack%length*modes%stack%width, air, bands(i), &
+               get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
+         end if
          if (.not. velocity > 0.0_wp) then
             ! A plate without modes there.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
@@ -121,57 +158,171 @@ contains
       if (yes) yes = .not. allocated(modes%stack%plate(1)%ribs)
    end function is_orthogonal
 
-   !> Sums of a band over its frequencies: over the strike points with the cross terms of the modes or, without strike
-   !> points, the mean over all of them for modes that are orthogonal.
-   subroutine add_band(modes, kept, air, band, area, power, velocity, total, drive)
+   !> Shapes of a plate in some modes.
+   pure function get_shapes(modes, plate, kept) result(shapes)
       type(floor_modes_type), intent(in) :: modes
-      !> Numbers of the modes: [n_mode].
+      !> Number of the plate.
+      integer, intent(in) :: plate
+      !> Numbers of the modes, block after block: [n_mode].
       integer, intent(in) :: kept(:)
+      type(shapes_type) :: shapes
+      integer :: range(2, size(modes%modes%block))
+      integer, allocatable :: position_x(:), position_y(:)
+      integer :: i, k, n
+
+      range = get_ranges(modes%modes, kept)
+      associate (displacement => modes%modes%displacement(plate))
+         allocate (position_x(displacement%x%count), position_y(displacement%y%count), source=0)
+      end associate
+      do i = 1, size(range, 2)
+         if (range(2, i) == 0) cycle
+         associate (shape => modes%modes%block(i)%shape(plate))
+            position_x(shape%x) = 1
+            position_y(shape%y) = 1
+         end associate
+      end do
+      shapes%x = pack([(k, k=1, size(position_x))], position_x == 1)
+      shapes%y = pack([(k, k=1, size(position_y))], position_y == 1)
+      position_x(shapes%x) = [(k, k=1, size(shapes%x))]
+      position_y(shapes%y) = [(k, k=1, size(shapes%y))]
+      allocate (shapes%block(count(range(2, :) > 0)))
+      n = 0
+      do i = 1, size(range, 2)
+         if (range(2, i) == 0) cycle
+         n = n + 1
+         associate (shape => modes%modes%block(i)%shape(plate))
+            shapes%block(n) = block_shapes_type(position_x(shape%x), position_y(shape%y), &
+               shape%coefficient(:, range(1, i):range(2, i)))
+         end associate
+      end do
+   end function get_shapes
+
+   !> Sums of a band over frequencies and strike points, with the cross terms of the modes.
+   subroutine add_strikes(shapes, bearing, omega, loss_factor, drive, air, band, along, across, power, velocity, total)
+      !> Shapes of the radiating and of the bearing plate.
+      type(shapes_type), intent(in) :: shapes, bearing
+      !> Angular frequencies, rad/s, and loss factors: [n_mode].
+      real(wp), intent(in) :: omega(:), loss_factor(:)
+      !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
+      real(wp), intent(in) :: drive(:, :)
       type(air_type), intent(in) :: air
       type(band_type), intent(in) :: band
-      real(wp), intent(in) :: area(4)
+      !> Transforms of the functions of x and of y.
+      type(wave_series_type), intent(in) :: along, across
       !> Sums of radiated power over rho0 c0 and of the squared velocity times area, m4/s2, and of their weights.
       real(wp), intent(out) :: power, velocity, total
-      !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
-      real(wp), intent(in), optional :: drive(:, :)
       type(transforms_type) :: transforms
-      complex(wp), allocatable :: amplitude(:, :)
-      real(wp), allocatable :: square(:), resistance(:), response(:)
-      real(wp) :: omega(size(kept)), loss_factor(size(kept)), edge(2)
-      real(wp) :: ratio, frequency, w
-      integer :: j, l, n
+      complex(wp) :: response(size(omega))
+      real(wp), allocatable :: amplitude(:, :, :), coefficient(:, :)
+      real(wp) :: ratio, frequency
+      real(wp) :: edge(2)
+      integer :: j, k, l, n
 
       power = 0.0_wp
       velocity = 0.0_wp
       total = 0.0_wp
-      omega = modes%omega(kept)
-      loss_factor = modes%loss_factor(kept)
-      if (.not. present(drive)) square = get_square_shapes(modes, kept)
+      ratio = (band%upper/band%lower)**(1.0_wp/n_wavenumber)
+      n = get_frequency_count(omega, loss_factor, band, ratio)
+      allocate (amplitude(size(omega), size(drive, 2), 2*n))
+      do j = 1, n_wavenumber
+         edge = band%lower*ratio**[j - 1, j]
+         do l = 1, n
+            ! Geometric steps, whose widths are proportional to the frequency.
+            frequency = edge(1)*ratio**((l - 0.5_wp)/n)
+            associate (w => 2*pi*frequency)
+               response = sqrt(frequency)*cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, omega**2*loss_factor, wp)
+            end associate
+            do k = 1, size(drive, 2)
+               amplitude(:, k, 2*l - 1) = response%re*drive(:, k)
+               amplitude(:, k, 2*l) = response%im*drive(:, k)
+            end do
+            total = total + frequency*size(drive, 2)
+         end do
+         associate (all_amplitudes => reshape(amplitude, [size(omega), size(drive, 2)*2*n]))
+            ! The functions are orthonormal.
+            call get_coefficients(bearing, all_amplitudes, coefficient)
+            velocity = velocity + sum(coefficient**2)
+            call get_coefficients(shapes, all_amplitudes, coefficient)
+         end associate
+         transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
+         power = power + sum(get_powers(transforms, [(k, k=1, size(shapes%x))], [(k, k=1, size(shapes%y))], coefficient))
+      end do
+   end subroutine add_strikes
+
+   !> Coefficients of the functions of all shapes, those of x first: [n_x*n_y, n_column].
+   pure subroutine get_coefficients(shapes, amplitude, coefficient)
+      type(shapes_type), intent(in) :: shapes
+      !> Amplitudes of the modes: [n_mode, n_column].
+      real(wp), intent(in) :: amplitude(:, :)
+      real(wp), allocatable, intent(out) :: coefficient(:, :)
+      real(wp), allocatable :: in_block(:, :)
+      integer :: i, j, k, l, n
+
+      allocate (coefficient(size(shapes%x)*size(shapes%y), size(amplitude, 2)), source=0.0_wp)
+      n = 0
+      do i = 1, size(shapes%block)
+         associate (block => shapes%block(i), n_mode => size(shapes%block(i)%coefficient, 2))
+            in_block = get_product(block%coefficient, amplitude(n + 1:n + n_mode, :))
+            do j = 1, size(amplitude, 2)
+               do k = 1, size(block%y)
+                  do l = 1, size(block%x)
+                     coefficient(block%x(l) + (block%y(k) - 1)*size(shapes%x), j) = in_block(l + (k - 1)*size(block%x), j)
+                  end do
+               end do
+            end do
+            n = n + n_mode
+         end associate
+      end do
+   end subroutine get_coefficients
+
+   !> Sums of a band over frequencies for modes that are orthogonal, averaged over all strike points.
+   subroutine add_modes(shapes, omega, loss_factor, area, air, band, along, across, power, velocity, total)
+      type(shapes_type), intent(in) :: shapes
+      !> Angular frequencies, rad/s, and loss factors: [n_mode].
+      real(wp), intent(in) :: omega(:), loss_factor(:)
+      !> Area of the floor, m2.
+      real(wp), intent(in) :: area
+      type(air_type), intent(in) :: air
+      type(band_type), intent(in) :: band
+      !> Transforms of the functions of x and of y.
+      type(wave_series_type), intent(in) :: along, across
+      !> Sums as in `add_strikes`.
+      real(wp), intent(out) :: power, velocity, total
+      type(transforms_type) :: transforms
+      real(wp), dimension(size(omega)) :: square, resistance, response
+      real(wp) :: ratio, frequency
+      real(wp) :: edge(2)
+      integer :: i, j, l, n, n_before
+
+      power = 0.0_wp
+      velocity = 0.0_wp
+      total = 0.0_wp
       ratio = (band%upper/band%lower)**(1.0_wp/n_wavenumber)
       n = get_frequency_count(omega, loss_factor, band, ratio)
       do j = 1, n_wavenumber
          edge = band%lower*ratio**[j - 1, j]
-         call get_transforms(modes, kept, area, 2*pi*sqrt(product(edge))/air%sound_speed, transforms)
-         if (.not. present(drive)) resistance = matmul(transforms%weight, sum(transforms%value**2, dim=3))
+         transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
+         n_before = 0
+         do i = 1, size(shapes%block)
+            associate (block => shapes%block(i), first => n_before + 1, &
+               last => n_before + size(shapes%block(i)%coefficient, 2))
+               ! Integrals of the squared shapes over the plate, m2/kg.
+               square(first:last) = sum(block%coefficient**2, dim=1)
+               resistance(first:last) = get_powers(transforms, block%x, block%y, block%coefficient)
+            end associate
+            n_before = n_before + size(shapes%block(i)%coefficient, 2)
+         end do
          do l = 1, n
-            ! Geometric steps, whose widths are proportional to the frequency.
             frequency = edge(1)*ratio**((l - 0.5_wp)/n)
-            w = 2*pi*frequency
-            if (present(drive)) then
-               amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, omega**2*loss_factor, wp), 2, &
-                  size(drive, 2))*drive
-               power = power + frequency*get_power(transforms, amplitude)
-               velocity = velocity + frequency*get_square_velocity(modes, kept, amplitude)
-               total = total + frequency*size(drive, 2)
-            else
+            associate (w => 2*pi*frequency)
                response = square*w**2/((omega**2 - w**2)**2 + (omega**2*loss_factor)**2)
-               power = power + frequency*sum(response*resistance)
-               velocity = velocity + frequency*sum(response*square)
-               total = total + frequency*modes%stack%length*modes%stack%width
-            end if
+            end associate
+            power = power + frequency*sum(response*resistance)
+            velocity = velocity + frequency*sum(response*square)
+            total = total + frequency*area
          end do
       end do
-   end subroutine add_band
+   end subroutine add_modes
 
    !> Relative positions that fill a floor evenly (the R2 sequence of Roberts): [2, n].
    pure subroutine get_strike_points(n, strike)
@@ -204,180 +355,136 @@ contains
          1.0e-3_wp)), min_frequencies), max_frequencies)
    end function get_frequency_count
 
-   !> Transforms of the modes at the wavenumbers of sound.
-   subroutine get_transforms(modes, kept, area, wavenumber, transforms)
-      type(floor_modes_type), intent(in) :: modes
-      !> Numbers of the modes: [n_mode].
-      integer, intent(in) :: kept(:)
-      real(wp), intent(in) :: area(4)
-      !> Wavenumber of sound, 1/m.
-      real(wp), intent(in) :: wavenumber
-      type(transforms_type), intent(out) :: transforms
-      real(wp), allocatable :: theta(:), theta_weight(:), phi(:), phi_weight(:), kx(:), ky(:)
-      real(wp), allocatable :: wave_x(:, :, :), wave_y(:, :, :), product(:, :)
-      integer, allocatable :: in_block(:)
-      integer :: i, j, k, p, n, n_wave, first
-
-      ! A quadrant is enough: squares of the four parities add up. Products of two transforms are resolved.
-      n = min(6 + int(wavenumber*max(area(2) - area(1), area(4) - area(3))/2), max_directions)
-      call get_quadrature(n, 0.0_wp, pi/2, theta, theta_weight)
-      call get_quadrature(n, 0.0_wp, pi/2, phi, phi_weight)
-      kx = [((wavenumber*sin(theta(i))*cos(phi(j)), i=1, n), j=1, n)]
-      ky = [((wavenumber*sin(theta(i))*sin(phi(j)), i=1, n), j=1, n)]
-      ! d2k/kz = k0 sin(theta) dtheta dphi; k0/(4 pi**2) makes it a radiation factor times an area.
-      transforms%weight = 4*(wavenumber/(2*pi))**2*[((theta_weight(i)*sin(theta(i))*phi_weight(j), i=1, n), j=1, n)]
-      n_wave = size(kx)
-      associate (radiator => modes%modes%displacement(modes%stack%radiator))
-         call get_waves(radiator%x, area(1:2), kx, wave_x)
-         call get_waves(radiator%y, area(3:4), ky, wave_y)
-      end associate
-      allocate (transforms%value(n_wave, size(kept), n_parity), source=0.0_wp)
-      allocate (transforms%is_present(size(kept), n_parity), source=.false.)
-      first = 0
-      n = 0
-      do i = 1, size(modes%modes%block)
-         if (n == size(kept)) exit
-         associate (block => modes%modes%block(i))
-            in_block = get_in_block(kept, n, first, size(block%omega))
-            first = first + size(block%omega)
-            if (size(in_block) == 0) cycle
-            associate (shape => block%shape(modes%stack%radiator))
-               do p = 1, n_parity
-                  associate (x => wave_x(:, shape%x, 1 + (p - 1)/2), y => wave_y(:, shape%y, 1 + mod(p - 1, 2)))
-                     if (maxval(abs(x))*maxval(abs(y)) < 1.0e-10_wp) cycle
-                     allocate (product(n_wave, size(x, 2)*size(y, 2)))
-                     do j = 1, size(y, 2)
-                        do k = 1, size(x, 2)
-                           product(:, (j - 1)*size(x, 2) + k) = x(:, k)*y(:, j)
-                        end do
-                     end do
-                     transforms%value(:, n + 1:n + size(in_block), p) = &
-                        get_matrix_product(product, shape%coefficient(:, in_block))
-                     transforms%is_present(n + 1:n + size(in_block), p) = .true.
-                     deallocate (product)
-                  end associate
-               end do
-            end associate
-            n = n + size(in_block)
-         end associate
-      end do
-   end subroutine get_transforms
-
-   !> Product of two matrices, by BLAS.
-   pure function get_matrix_product(left, right) result(product)
-      real(wp), intent(in) :: left(:, :), right(:, :)
-      real(wp) :: product(size(left, 1), size(right, 2))
-
-      product = 0.0_wp
-      call dgemm('N', 'N', size(left, 1), size(right, 2), size(left, 2), 1.0_wp, left, size(left, 1), right, &
-         size(right, 1), 0.0_wp, product, size(left, 1))
-   end function get_matrix_product
-
-   !> Cosine and sine transforms of functions about the center of an interval: [n_wave, count, 2].
-   pure subroutine get_waves(set, ends, wavenumber, wave)
+   !> Transforms of functions as series of the wavenumber.
+   pure function new_wave_series(set, ends, highest) result(series)
       type(function_set_type), intent(in) :: set
       !> Ends of the interval, m: [2].
       real(wp), intent(in) :: ends(2)
-      !> Wavenumbers, 1/m: [n_wave].
+      !> Highest wavenumber, 1/m.
+      real(wp), intent(in) :: highest
+      type(wave_series_type) :: series
+      real(wp), allocatable :: point(:), weight(:), function_value(:, :), phase(:, :), angle(:), terms(:, :)
+      integer :: i, n
+
+      series%highest = highest
+      series%length = ends(2) - ends(1)
+      call get_quadrature(set%count + 20 + int(highest*series%length/2), ends(1), ends(2), point, weight)
+      function_value = get_functions(set, point, 0)*spread(weight, 2, set%count)
+      ! The coefficients of cos(z t) decrease faster than exponentially from the term z on; z is a quarter of highest*length.
+      n = 30 + int(highest*series%length/4)
+      angle = pi*([(i, i=1, n)] - 0.5_wp)/n
+      phase = spread(point - sum(ends)/2, 2, n)*spread(highest*(1 + cos(angle))/2, 1, size(point))
+      terms = cos(spread(angle, 2, n)*spread([(i, i=0, n - 1)], 1, n))*2/n
+      terms(:, 1) = terms(:, 1)/2
+      allocate (series%coefficient(n, set%count, 2))
+      series%coefficient(:, :, 1) = get_transposed_product(terms, get_transposed_product(cos(phase), function_value))
+      series%coefficient(:, :, 2) = get_transposed_product(terms, get_transposed_product(sin(phase), function_value))
+      series%is_present = maxval(abs(series%coefficient), dim=1) > 1.0e-10_wp*maxval(abs(series%coefficient))
+   end function new_wave_series
+
+   !> Transforms of some of the functions.
+   pure function get_some(series, numbers) result(some)
+      type(wave_series_type), intent(in) :: series
+      integer, intent(in) :: numbers(:)
+      type(wave_series_type) :: some
+
+      some = wave_series_type(series%highest, series%length, series%coefficient(:, numbers, :), &
+         series%is_present(numbers, :))
+   end function get_some
+
+   !> Transforms at wavenumbers: [n_function, n_wave, 2].
+   pure function get_waves(series, wavenumber) result(wave)
+      type(wave_series_type), intent(in) :: series
+      !> Wavenumbers up to the highest, 1/m: [n_wave].
       real(wp), intent(in) :: wavenumber(:)
-      real(wp), allocatable, intent(out) :: wave(:, :, :)
-      real(wp), allocatable :: point(:), weight(:), function_value(:, :), phase(:, :)
+      real(wp), allocatable :: wave(:, :, :)
+      real(wp) :: argument(size(wavenumber)), term(size(wavenumber), size(series%coefficient, 1))
+      integer :: i
 
-      call get_quadrature(set%count + 20 + int(maxval(wavenumber)*(ends(2) - ends(1))/2), ends(1), ends(2), point, weight)
-      allocate (function_value, source=get_functions(set, point, 0)*spread(weight, 2, set%count))
-      allocate (phase, source=spread(wavenumber, 2, size(point))*spread(point - sum(ends)/2, 1, size(wavenumber)))
-      allocate (wave(size(wavenumber), set%count, 2))
-      wave(:, :, 1) = get_matrix_product(cos(phase), function_value)
-      wave(:, :, 2) = get_matrix_product(sin(phase), function_value)
-   end subroutine get_waves
+      argument = 2*wavenumber/series%highest - 1
+      term(:, 1) = 1.0_wp
+      term(:, 2) = argument
+      do i = 3, size(term, 2)
+         term(:, i) = 2*argument*term(:, i - 1) - term(:, i - 2)
+      end do
+      allocate (wave(size(series%coefficient, 2), size(wavenumber), 2))
+      do i = 1, 2
+         wave(:, :, i) = get_transposed_product(series%coefficient(:, :, i), transpose(term))
+      end do
+   end function get_waves
 
-   !> Radiated power over rho0 c0, summed over the strike points, m4/s2.
-   function get_power(transforms, amplitude) result(power)
+   !> Transforms at a wavenumber of sound.
+   pure function get_transforms(along, across, wavenumber) result(transforms)
+      type(wave_series_type), intent(in) :: along, across
+      !> Wavenumber of sound, 1/m.
+      real(wp), intent(in) :: wavenumber
+      type(transforms_type) :: transforms
+      real(wp), allocatable :: angle(:), weight(:), wave(:, :, :), weighted(:, :)
+      integer :: i, j, n, p
+
+      ! A quadrant is enough: squares of the four parities add up. Products of two transforms are resolved.
+      n = min(6 + int(wavenumber*max(along%length, across%length)/2), max_directions)
+      call get_quadrature(n, 0.0_wp, pi/2, angle, weight)
+      transforms%along = get_waves(along, wavenumber*sin(angle))
+      transforms%has_along = along%is_present
+      transforms%has_across = across%is_present
+      associate (n_y => size(across%is_present, 1))
+         allocate (transforms%across(n_y, n_y, n, 2))
+         do i = 1, n
+            wave = get_waves(across, wavenumber*cos(angle(i))*sin(angle))
+            do p = 1, 2
+               ! dkx dky/kz = k0 cos(a) da db; k0/(4 pi**2) makes it a radiation factor times an area.
+               weighted = wave(:, :, p)
+               do j = 1, n
+                  weighted(:, j) = weighted(:, j)*4*(wavenumber/(2*pi))**2*cos(angle(i))*weight(i)*weight(j)
+               end do
+               transforms%across(:, :, i, p) = get_product(weighted, transpose(wave(:, :, p)))
+            end do
+         end do
+      end associate
+   end function get_transforms
+
+   !> Radiated powers over rho0 c0 of velocities that are sums of products of functions, m4/s2: [n_column].
+   pure function get_powers(transforms, x, y, coefficient) result(power)
       type(transforms_type), intent(in) :: transforms
-      !> Amplitudes of the modes: [n_mode, n_strike].
-      complex(wp), intent(in) :: amplitude(:, :)
-      real(wp) :: power
-      integer, allocatable :: present_modes(:)
-      integer :: p, k
+      !> Numbers of the functions of x and of y: [n_x], [n_y].
+      integer, intent(in) :: x(:), y(:)
+      !> Coefficients of the products, x first: [n_x*n_y, n_column].
+      real(wp), intent(in) :: coefficient(:, :)
+      real(wp) :: power(size(coefficient, 2))
+      real(wp), allocatable :: velocity(:, :), wave(:, :)
+      integer, allocatable :: in_x(:), in_y(:)
+      integer :: i, k, l, p, q
 
       power = 0.0_wp
-      do p = 1, n_parity
-         present_modes = pack([(k, k=1, size(amplitude, 1))], transforms%is_present(:, p))
-         if (size(present_modes) == 0) cycle
-         associate (value => transforms%value(:, present_modes, p), part => amplitude(present_modes, :))
-            power = power + sum(matmul(transforms%weight, get_matrix_product(value, real(part, wp))**2 &
-               + get_matrix_product(value, aimag(part))**2))
-         end associate
-      end do
-   end function get_power
-
-   !> Numbers of the next modes within their block.
-   pure function get_in_block(kept, n_before, first, count) result(in_block)
-      !> Numbers of the modes, ascending: [n_mode].
-      integer, intent(in) :: kept(:)
-      !> Number of modes in blocks before this one, of those kept and of all; number of modes of the block.
-      integer, intent(in) :: n_before, first, count
-      integer, allocatable :: in_block(:)
-      integer :: n
-
-      n = n_before
-      do
-         if (n == size(kept)) exit
-         if (kept(n + 1) > first + count) exit
-         n = n + 1
-      end do
-      in_block = kept(n_before + 1:n) - first
-   end function get_in_block
-
-   !> Integral of the squared velocity of the bearing plate, summed over the strike points, m4/s2.
-   function get_square_velocity(modes, kept, amplitude) result(total)
-      type(floor_modes_type), intent(in) :: modes
-      integer, intent(in) :: kept(:)
-      complex(wp), intent(in) :: amplitude(:, :)
-      real(wp) :: total
-      integer, allocatable :: in_block(:)
-      integer :: i, first, n
-
-      total = 0.0_wp
-      first = 0
-      n = 0
-      do i = 1, size(modes%modes%block)
-         if (n == size(kept)) exit
-         associate (block => modes%modes%block(i))
-            in_block = get_in_block(kept, n, first, size(block%omega))
-            first = first + size(block%omega)
-            if (size(in_block) == 0) cycle
-            ! The functions are orthonormal.
-            associate (shape => block%shape(modes%stack%bearing)%coefficient(:, in_block), &
-               part => amplitude(n + 1:n + size(in_block), :))
-               total = total + sum(get_matrix_product(shape, real(part, wp))**2 + get_matrix_product(shape, aimag(part))**2)
+      do p = 1, 2
+         in_x = pack([(k, k=1, size(x))], transforms%has_along(x, p))
+         if (size(in_x) == 0) cycle
+         do q = 1, 2
+            in_y = pack([(k, k=1, size(y))], transforms%has_across(y, q))
+            if (size(in_y) == 0) cycle
+            associate (n_y => size(in_y), n_column => size(coefficient, 2))
+               if (allocated(velocity)) deallocate (velocity)
+               allocate (velocity(size(in_x), n_y*n_column))
+               do i = 1, n_column
+                  do k = 1, n_y
+                     do l = 1, size(in_x)
+                        velocity(l, (i - 1)*n_y + k) = coefficient(in_x(l) + (in_y(k) - 1)*size(x), i)
+                     end do
+                  end do
+               end do
+               wave = get_transposed_product(velocity, transforms%along(x(in_x), :, p))
+               if (n_y == 1) then
+                  power = power + matmul(wave**2, transforms%across(y(in_y(1)), y(in_y(1)), :, q))
+                  cycle
+               end if
+               do i = 1, size(wave, 2)
+                  velocity = reshape(wave(:, i), [n_y, n_column])
+                  power = power + sum(velocity*get_product(transforms%across(y(in_y), y(in_y), i, q), velocity), dim=1)
+               end do
             end associate
-            n = n + size(in_block)
-         end associate
+         end do
       end do
-   end function get_square_velocity
-
-   !> Integrals of the squared shapes of the radiating plate, m2/kg: [n_mode].
-   function get_square_shapes(modes, kept) result(square)
-      type(floor_modes_type), intent(in) :: modes
-      integer, intent(in) :: kept(:)
-      real(wp) :: square(size(kept))
-      integer, allocatable :: in_block(:)
-      integer :: i, first, n
-
-      first = 0
-      n = 0
-      do i = 1, size(modes%modes%block)
-         if (n == size(kept)) exit
-         associate (block => modes%modes%block(i))
-            in_block = get_in_block(kept, n, first, size(block%omega))
-            first = first + size(block%omega)
-            if (size(in_block) == 0) cycle
-            square(n + 1:n + size(in_block)) = &
-               sum(block%shape(modes%stack%radiator)%coefficient(:, in_block)**2, dim=1)
-            n = n + size(in_block)
-         end associate
-      end do
-   end function get_square_shapes
+   end function get_powers
 
 end module thud_modal_radiation

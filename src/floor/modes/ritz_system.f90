@@ -7,11 +7,12 @@ module thud_ritz_system
    use thud_function_set, only: function_set_type, get_functions
    use thud_kinds, only: wp
    use thud_lapack, only: dposv, dsygvd
+   use thud_matrix_product, only: get_product, get_transposed_product
    implicit none (type, external)
    private
 
-   public :: add_displacement, add_mass, add_stiffness, get_mode_values, mode_block_type, modes_type, product_type
-   public :: ritz_system_type, solve_ritz_system
+   public :: add_displacement, add_mass, add_stiffness, get_mode_values, get_ranges, mode_block_type, modes_type
+   public :: product_type, ritz_system_type, solve_ritz_system
 
    !> A matrix entry below this fraction of the largest one in its row or column is rounding.
    real(wp), parameter :: rounding = 1.0e-11_wp
@@ -42,6 +43,11 @@ module thud_ritz_system
       !> The stiffnesses that are added now belong to the bearing plate.
       logical :: is_bearing = .false.
    end type ritz_system_type
+
+   !> Numbers of the functions of one displacement in one group.
+   type :: members_type
+      integer, allocatable :: number(:)
+   end type members_type
 
    !> One displacement in the modes of a block.
    type :: shape_type
@@ -112,22 +118,35 @@ contains
       !> A mass or the stiffness of a static displacement is not positive.
       logical, intent(out) :: failed
       integer, allocatable :: group_x(:), group_y(:)
+      type(members_type), allocatable :: x(:, :), y(:, :)
       integer :: i, j, n
 
       failed = .false.
       call find_groups(system, .true., group_x)
       call find_groups(system, .false., group_y)
+      x = get_members(group_x, system%displacement%x%count)
+      y = get_members(group_y, system%displacement%y%count)
       allocate (modes%displacement, source=system%displacement)
-      allocate (modes%block(maxval(group_x)*maxval(group_y)))
+      allocate (modes%block(count([((has_mass(x(:, i), y(:, j)), i=1, size(x, 2)), j=1, size(y, 2))])))
       n = 0
-      do i = 1, maxval(group_x)
-         do j = 1, maxval(group_y)
-            call solve_block(system, group_x == i, group_y == j, modes%block(n + 1), failed)
+      do i = 1, size(x, 2)
+         do j = 1, size(y, 2)
+            if (.not. has_mass(x(:, i), y(:, j))) cycle
+            n = n + 1
+            call solve_block(system, x(:, i), y(:, j), modes%block(n), failed)
             if (failed) return
-            if (size(modes%block(n + 1)%omega) > 0) n = n + 1
          end do
       end do
-      if (n < size(modes%block)) modes%block = modes%block(:n)
+   contains
+
+      !> Whether some products of functions have mass.
+      pure function has_mass(x, y) result(yes)
+         type(members_type), intent(in) :: x(:), y(:)
+         logical :: yes
+         integer :: i
+
+         yes = any([(size(x(i)%number)*size(y(i)%number) > 0, i=1, size(x))] .and. .not. system%displacement%is_static)
+      end function has_mass
    end subroutine solve_ritz_system
 
    !> Number of the group of each function of one coordinate; functions of different groups are not coupled.
@@ -212,6 +231,27 @@ contains
       end function get_root
    end subroutine find_groups
 
+   !> Functions of each displacement in each group: [n_displacement, n_group].
+   pure function get_members(group, count) result(members)
+      !> Groups of the functions, in the order of displacements.
+      integer, intent(in) :: group(:)
+      !> Number of functions of each displacement.
+      integer, intent(in) :: count(:)
+      type(members_type) :: members(size(count), maxval(group))
+      integer :: i, k, p
+
+      i = 0
+      do p = 1, size(count)
+         do k = 1, size(members, 2)
+            allocate (members(p, k)%number(0))
+         end do
+         do k = 1, count(p)
+            members(p, group(i + k))%number = [members(p, group(i + k))%number, k]
+         end do
+         i = i + count(p)
+      end do
+   end function get_members
+
    !> First of the numbers of each part, and the one after the last: [size(count) + 1].
    pure function get_first(count) result(first)
       !> Sizes of the parts.
@@ -226,25 +266,23 @@ contains
    end function get_first
 
    !> Modes of the functions of one group in x and one in y.
-   subroutine solve_block(system, in_x, in_y, block, failed)
+   subroutine solve_block(system, x, y, block, failed)
       type(ritz_system_type), intent(in) :: system
-      !> Functions of x and of y in the block.
-      logical, intent(in) :: in_x(:), in_y(:)
+      !> Functions of x and of y in the block: [n_displacement].
+      type(members_type), intent(in) :: x(:), y(:)
       type(mode_block_type), intent(out) :: block
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), loss(:, :), bearing(:, :), mass(:, :), omega(:)
-      integer, allocatable :: first(:), first_x(:), first_y(:), dynamic(:), static(:)
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), omega(:), transformation(:, :)
+      integer, allocatable :: first(:), dynamic(:), static(:)
       integer :: i, p, n
 
       failed = .false.
       associate (displacement => system%displacement)
          n = size(displacement)
-         first_x = get_first(displacement%x%count)
-         first_y = get_first(displacement%y%count)
          allocate (block%shape(n))
          do p = 1, n
-            block%shape(p)%x = pack([(i, i=1, displacement(p)%x%count)], in_x(first_x(p):first_x(p + 1) - 1))
-            block%shape(p)%y = pack([(i, i=1, displacement(p)%y%count)], in_y(first_y(p):first_y(p + 1) - 1))
+            block%shape(p)%x = x(p)%number
+            block%shape(p)%y = y(p)%number
          end do
          first = get_first([(size(block%shape(p)%x)*size(block%shape(p)%y), p=1, n)])
          allocate (dynamic(0), static(0))
@@ -256,24 +294,24 @@ contains
             end if
          end do
       end associate
-      if (size(dynamic) == 0) then
-         allocate (block%omega(0), block%loss_factor(0), block%bearing_share(0))
-         return
-      end if
       associate (terms => system%stiffness)
          call assemble(terms, spread(1.0_wp, 1, size(terms)), block, first, stiffness)
-         call assemble(terms, terms%loss_factor, block, first, loss)
-         call assemble(terms, merge(1.0_wp, 0.0_wp, terms%in_bearing), block, first, bearing)
       end associate
       call assemble(system%mass, spread(1.0_wp, 1, size(system%mass)), block, first, mass)
-      if (size(static) > 0) call condense(dynamic, static, stiffness, loss, bearing, mass, failed)
-      if (failed) return
+      if (size(static) > 0) then
+         call get_static_part(dynamic, static, stiffness, transformation, failed)
+         if (failed) return
+         call condense(stiffness)
+         call condense(mass)
+      end if
       call get_eigenmodes(stiffness, mass, omega, failed)
       if (failed) return
       ! `stiffness` contains the shapes now. Without stiffness and losses, a mode moves as a rigid body.
       block%omega = omega
-      block%loss_factor = get_share(loss)
-      block%bearing_share = get_share(bearing)
+      associate (terms => system%stiffness)
+         block%loss_factor = get_share(terms%loss_factor)
+         block%bearing_share = get_share(merge(1.0_wp, 0.0_wp, terms%in_bearing))
+      end associate
       i = 0
       do p = 1, n
          if (system%displacement(p)%is_static) cycle
@@ -284,12 +322,26 @@ contains
       end do
    contains
 
-      !> Energy of the modes by a matrix over their elastic energy: [n_mode].
-      function get_share(matrix) result(share)
-         real(wp), intent(in) :: matrix(:, :)
-         real(wp) :: share(size(omega))
+      !> Replaces a matrix of all coefficients by that of the dynamic ones.
+      subroutine condense(matrix)
+         real(wp), allocatable, intent(inout) :: matrix(:, :)
 
-         share = sum(stiffness*matmul(matrix, stiffness), dim=1)/max(omega**2, tiny(omega))
+         matrix = get_transposed_product(transformation, get_product(matrix, transformation))
+      end subroutine condense
+
+      !> Weighted sum of the energies of the stiffnesses in each mode, over their sum: [n_mode].
+      function get_share(weight) result(share)
+         !> Weights of the stiffnesses.
+         real(wp), intent(in) :: weight(:)
+         real(wp) :: share(size(omega))
+         real(wp), allocatable :: matrix(:, :)
+
+         share = weight(1)
+         if (any(abs(weight - weight(1)) > 0.0_wp)) then
+            call assemble(system%stiffness, weight, block, first, matrix)
+            if (size(static) > 0) call condense(matrix)
+            share = sum(stiffness*get_product(matrix, stiffness), dim=1)/max(omega**2, tiny(omega))
+         end if
          where (omega <= 0.0_wp) share = 0.0_wp
       end function get_share
    end subroutine solve_block
@@ -304,7 +356,8 @@ contains
       integer, intent(in) :: first(:)
       !> The matrix: [n, n].
       real(wp), allocatable, intent(out) :: matrix(:, :)
-      integer :: i, k, l, p, q, at_row, at_column
+      real(wp) :: factor
+      integer :: h, i, j, k, l, p, q, at_row, at_column
 
       allocate (matrix(first(size(first)) - 1, first(size(first)) - 1), source=0.0_wp)
       do i = 1, size(terms)
@@ -312,34 +365,38 @@ contains
          q = terms(i)%column
          if (.not. abs(weight(i)) > 0.0_wp) cycle
          associate (row => block%shape(p), column => block%shape(q))
-            associate (x => weight(i)*terms(i)%x(row%x, column%x), n_row => size(row%x), n_column => size(column%x))
-               do l = 1, size(column%y)
-                  at_column = first(q) + (l - 1)*n_column
-                  do k = 1, size(row%y)
-                     at_row = first(p) + (k - 1)*n_row
-                     associate (part => matrix(at_row:at_row + n_row - 1, at_column:at_column + n_column - 1))
-                        part = part + x*terms(i)%y(row%y(k), column%y(l))
-                     end associate
-                     if (p == q) cycle
-                     associate (part => matrix(at_column:at_column + n_column - 1, at_row:at_row + n_row - 1))
-                        part = part + transpose(x)*terms(i)%y(row%y(k), column%y(l))
-                     end associate
+            do l = 1, size(column%y)
+               do k = 1, size(row%y)
+                  factor = weight(i)*terms(i)%y(row%y(k), column%y(l))
+                  ! Many functions are orthogonal.
+                  if (.not. abs(factor) > 0.0_wp) cycle
+                  at_row = first(p) + (k - 1)*size(row%x) - 1
+                  do j = 1, size(column%x)
+                     at_column = first(q) + (l - 1)*size(column%x) + j - 1
+                     do h = 1, size(row%x)
+                        matrix(at_row + h, at_column) = matrix(at_row + h, at_column) &
+                           + factor*terms(i)%x(row%x(h), column%x(j))
+                     end do
+                     if (p /= q) matrix(at_column, at_row + 1:at_row + size(row%x)) = &
+                        matrix(at_row + 1:at_row + size(row%x), at_column)
                   end do
                end do
-            end associate
+            end do
          end associate
       end do
    end subroutine assemble
 
-   !> Eliminates the static coefficients: they take the values of least energy.
-   subroutine condense(dynamic, static, stiffness, loss, bearing, mass, failed)
+   !> All coefficients for those of the dynamic displacements: the static ones take the values of least energy.
+   subroutine get_static_part(dynamic, static, stiffness, transformation, failed)
       !> Numbers of the coefficients.
       integer, intent(in) :: dynamic(:), static(:)
-      !> Matrices of all coefficients, then of the dynamic ones: [n, n].
-      real(wp), allocatable, intent(inout) :: stiffness(:, :), loss(:, :), bearing(:, :), mass(:, :)
+      !> Stiffness of all coefficients: [n, n].
+      real(wp), intent(in) :: stiffness(:, :)
+      !> All coefficients, one column for each dynamic one: [n, n_dynamic].
+      real(wp), allocatable, intent(out) :: transformation(:, :)
       !> The stiffness of the static coefficients is not positive.
       logical, intent(out) :: failed
-      real(wp), allocatable :: followed(:, :), static_stiffness(:, :), transformation(:, :)
+      real(wp), allocatable :: followed(:, :), static_stiffness(:, :)
       integer, allocatable :: stiff(:)
       integer :: i, info
 
@@ -354,19 +411,7 @@ contains
          transformation(dynamic(i), i) = 1.0_wp
       end do
       transformation(stiff, :) = followed
-      call transform(stiffness)
-      call transform(loss)
-      call transform(bearing)
-      call transform(mass)
-   contains
-
-      !> The matrix of the dynamic coefficients.
-      subroutine transform(matrix)
-         real(wp), allocatable, intent(inout) :: matrix(:, :)
-
-         matrix = matmul(transpose(transformation), matmul(matrix, transformation))
-      end subroutine transform
-   end subroutine condense
+   end subroutine get_static_part
 
    !> Angular frequencies and shapes; the shapes replace the stiffness.
    subroutine get_eigenmodes(stiffness, mass, omega, failed)
@@ -396,8 +441,32 @@ contains
       omega = sqrt(max(omega, 0.0_wp))
    end subroutine get_eigenmodes
 
-   !> Values of a displacement of all modes at points, block after block: [n_mode, n_point].
-   subroutine get_mode_values(modes, displacement, x, y, value)
+   !> First and last of some modes in each block, 1 and 0 if there is none: [2, n_block].
+   pure function get_ranges(modes, kept) result(range)
+      type(modes_type), intent(in) :: modes
+      !> Numbers of the modes, block after block: ascending, and consecutive in each block.
+      integer, intent(in) :: kept(:)
+      integer :: range(2, size(modes%block))
+      integer :: i, before, n
+
+      before = 0
+      n = 0
+      do i = 1, size(modes%block)
+         associate (n_mode => size(modes%block(i)%omega))
+            range(:, i) = [1, 0]
+            do while (n < size(kept))
+               if (kept(n + 1) > before + n_mode) exit
+               n = n + 1
+               if (range(2, i) == 0) range(1, i) = kept(n) - before
+               range(2, i) = kept(n) - before
+            end do
+            before = before + n_mode
+         end associate
+      end do
+   end function get_ranges
+
+   !> Values of a displacement of modes at points, block after block: [n_mode, n_point].
+   subroutine get_mode_values(modes, displacement, x, y, value, kept)
       type(modes_type), intent(in) :: modes
       !> Number of the displacement.
       integer, intent(in) :: displacement
@@ -405,21 +474,34 @@ contains
       real(wp), intent(in) :: x(:), y(:)
       !> Values, 1/sqrt(kg).
       real(wp), allocatable, intent(out) :: value(:, :)
-      real(wp), allocatable :: at_x(:, :), at_y(:, :), product(:)
-      integer :: i, j, k, n
+      !> Numbers of the modes as in `get_ranges` (default: all).
+      integer, intent(in), optional :: kept(:)
+      real(wp), allocatable :: at_x(:, :), at_y(:, :), product(:, :)
+      integer :: range(2, size(modes%block))
+      integer :: i, j, k, l, n
 
       associate (set => modes%displacement(displacement))
          allocate (at_x, source=get_functions(set%x, x, 0))
          allocate (at_y, source=get_functions(set%y, y, 0))
       end associate
-      allocate (value(sum([(size(modes%block(i)%omega), i=1, size(modes%block))]), size(x)))
+      range(1, :) = 1
+      range(2, :) = [(size(modes%block(i)%omega), i=1, size(modes%block))]
+      if (present(kept)) range = get_ranges(modes, kept)
+      allocate (value(sum(range(2, :) - range(1, :) + 1), size(x)))
       n = 0
       do i = 1, size(modes%block)
-         associate (shape => modes%block(i)%shape(displacement), n_mode => size(modes%block(i)%omega))
+         if (range(2, i) < range(1, i)) cycle
+         associate (shape => modes%block(i)%shape(displacement), n_mode => range(2, i) - range(1, i) + 1)
+            if (allocated(product)) deallocate (product)
+            allocate (product(size(shape%x)*size(shape%y), size(x)))
             do j = 1, size(x)
-               product = [(at_x(j, shape%x)*at_y(j, shape%y(k)), k=1, size(shape%y))]
-               value(n + 1:n + n_mode, j) = matmul(product, shape%coefficient)
+               do k = 1, size(shape%y)
+                  do l = 1, size(shape%x)
+                     product((k - 1)*size(shape%x) + l, j) = at_x(j, shape%x(l))*at_y(j, shape%y(k))
+                  end do
+               end do
             end do
+            value(n + 1:n + n_mode, :) = get_transposed_product(shape%coefficient(:, range(1, i):range(2, i)), product)
             n = n + n_mode
          end associate
       end do
