@@ -129,8 +129,8 @@ contains
          if (has_strikes) then
             call get_mode_values(modes%modes, 1, modes%stack%length*strike(1, :), modes%stack%width*strike(2, :), &
                drive, kept)
-            call add_strikes(shapes, get_shapes(modes, modes%stack%bearing, kept), omega, loss_factor, drive, air, bands(i), &
-               get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
+            call add_strikes(shapes, get_shapes(modes, modes%stack%bearing, kept), omega, loss_factor, drive, air, &
+               bands(i), get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
          else
             call add_modes(shapes, omega, loss_factor, modes%stack%length*modes%stack%width, air, bands(i), &
                get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
