@@ -53,10 +53,10 @@ def test_stiff_fastening_of_a_light_ceiling_adds_mass(oracle: Callable[..., None
     )
     ratio = frequencies_of(fixed, 300.0) / frequencies_of(heavier, 300.0)
     # The mass changes frequencies by 1.2 %, the stiffness of the board by 2e-5.
-    oracle("natural frequencies: fixed subceiling − added mass", "limit", ratio - 1, 1e-4)
+    oracle("natural frequencies: fixed subceiling − added mass", "other model", ratio - 1, 1e-4)
     oracle(
         "energy radiated by a fixed subceiling − added mass",
-        "limit",
+        "other model",
         radiated_by(fixed) - radiated_by(heavier),
         0.5,
         "dB",
