@@ -22,6 +22,7 @@ import scipy
 from ensemble import bench_ensemble
 from finite_elements import bench_impact, bench_modes
 from requirements import Load, assess, conclude
+from room_predictions import bench_rooms
 from scipy.integrate import solve_ivp
 from scipy.signal import ZoomFFT
 
@@ -165,6 +166,8 @@ def main() -> int:
     bench_modes(row, medians)
     print()
     bench_impact(row)
+    print()
+    bench_rooms(row, medians)
     return conclude(load)
 
 

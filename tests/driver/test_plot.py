@@ -97,12 +97,13 @@ def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact
     assert figure.get_figwidth() == pytest.approx(3.5)
 
 
-def test_animation_has_a_picture_for_each_snapshot(deformed: thud.Impact, tmp_path: Path) -> None:
-    assert deformed.motion
-    thud.plot.animate(deformed, tmp_path / "ball.gif")
+def test_animation_has_a_picture_for_each_snapshot(tmp_path: Path) -> None:
+    impact = thud.solve(model="finite_element", **{**SNAPSHOTS, "snapshot_interval": 4e-3})
+    assert impact.motion
+    thud.plot.animate(impact, tmp_path / "ball.gif")
     assert names_in(tmp_path) == ["ball.gif"]
     with Image.open(tmp_path / "ball.gif") as pictures:
-        assert pictures.n_frames == len(deformed.motion.time)
+        assert pictures.n_frames == len(impact.motion.time) > 4
 
 
 def test_floor_is_drawn_where_it_moves() -> None:

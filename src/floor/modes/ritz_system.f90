@@ -301,7 +301,8 @@ contains
       if (size(static) > 0) then
          call get_static_part(dynamic, static, stiffness, transformation, failed)
          if (failed) return
-         call condense(stiffness)
+         ! The forces on the static coefficients vanish.
+         stiffness = get_product(stiffness(dynamic, :), transformation)
          call condense(mass)
       end if
       call get_eigenmodes(stiffness, mass, omega, failed)
