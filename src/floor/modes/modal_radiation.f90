@@ -61,8 +61,8 @@ module thud_modal_radiation
 
 contains
 
-   !> Radiation of a floor in bands, averaged over strike points and over the frequencies of each band. A single plate
-   !> without ribs has orthogonal modes: averaged over all strike points, their cross terms vanish.
+   !> Radiation of a floor in bands, averaged over strike points and over the frequencies of each band. Averaged over all
+   !> strike points, the cross terms of orthogonal modes vanish. In bands beyond the modes the plate takes their place.
    subroutine get_modal_radiation(modes, plate, air, bands, area, radiation, stated_strike)
       type(floor_modes_type), intent(in) :: modes
       !> The radiating plate, with its mass and total losses.
@@ -82,7 +82,7 @@ contains
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
       allocate (radiation%radiated(size(bands)))
-      if (present(stated_strike) .or. .not. is_orthogonal(modes)) then
+      if (present(stated_strike) .or. .not. modes%is_orthogonal) then
          if (present(stated_strike)) then
             strike = stated_strike
          else
@@ -105,8 +105,8 @@ contains
             square = get_square_shapes(modes, kept)
             call add_modes(modes, kept, omega, loss_factor, square, air, bands(i), area, power, velocity, total)
          end if
-         if (.not. velocity > 0.0_wp) then
-            ! A plate without modes there.
+         if (.not. velocity > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
+            ! A plate without modes there, or without known ones.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
             radiation%conductance(i) = 1/get_resistance(plate)
             radiation%radiated(i) = 0.0_wp
@@ -118,15 +118,6 @@ contains
             *get_total_loss(plate, air, bands(i)%center)
       end do
    end subroutine get_modal_radiation
-
-   !> Whether the modes of a floor are orthogonal over its area: one plate without ribs.
-   pure function is_orthogonal(modes) result(yes)
-      type(floor_modes_type), intent(in) :: modes
-      logical :: yes
-
-      yes = size(modes%stack%plate) == 1
-      if (yes) yes = .not. allocated(modes%stack%plate(1)%ribs)
-   end function is_orthogonal
 
    !> Sums of a band over frequencies and strike points, with the cross terms of the modes.
    subroutine add_strikes(modes, kept, omega, loss_factor, drive, air, band, area, power, velocity, total)

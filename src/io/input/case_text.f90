@@ -18,7 +18,7 @@ module thud_case_text
 contains
 
    !> Reads a case from the text of a namelist file and checks it.
-   subroutine read_case(text, default_name, case, error, unchecked)
+   subroutine read_case(text, default_name, case, error, unchecked, directory)
       character(len=*), intent(in) :: text
       !> Name of the case if the text has none.
       character(len=*), intent(in) :: default_name
@@ -27,6 +27,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Skip the check of ranges and of the case as a whole (default: false).
       logical, intent(in), optional :: unchecked
+      !> Directory of the case, with a slash at its end, to which paths are relative (default: the current one).
+      character(len=*), intent(in), optional :: directory
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
       integer :: i, j
@@ -54,6 +56,7 @@ contains
          if (allocated(error)) return
          call assign_group(groups(i), fields, error)
       end do
+      if (present(directory) .and. .not. allocated(error)) call resolve_paths(fields, directory, error)
       if (allocated(error)) return
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
@@ -64,6 +67,30 @@ contains
       end if
       if (.not. allocated(error)) call check_case(case, error)
    end subroutine read_case
+
+   !> Makes the paths of a case relative to the current directory.
+   subroutine resolve_paths(fields, directory, error)
+      !> All keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      character(len=*), intent(in) :: directory
+      !> Set if a path is too long.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, size(fields)
+         if (.not. fields(i)%is_path) cycle
+         associate (path => fields(i)%text_value)
+            if (path == '' .or. path(1:1) == '/') cycle
+            if (len(directory) + len_trim(path) > name_length) then
+               error = input_error('&'//trim(fields(i)%group)//': '//trim(fields(i)%key)//' = '//quoted(directory &
+                  //trim(path))//' is too long; allowed: up to '//to_text(name_length)//' characters with the directory ' &
+                  //'of the case')
+               return
+            end if
+            path = directory//path
+         end associate
+      end do
+   end subroutine resolve_paths
 
    !> Whether a file names the source model.
    pure function names_model(groups) result(named)
