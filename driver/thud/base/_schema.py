@@ -83,6 +83,7 @@ LaminateFloorScreedEdges = Literal["simple", "free", "strip"]
 JoistFloorSourceOn = Literal["sheathing", "joist", "position"]
 JoistFloorSupport = Literal["simple", "clamped", "free", "elastic"]
 JoistFloorScreedEdges = Literal["simple", "free", "strip"]
+MeasuredMobilityEdges = Literal["building", "laboratory", "absorption"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
@@ -1023,6 +1024,29 @@ class MeasuredMobility(Group):
         Lowest frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
     highest_frequency : float
         Highest frequency of the measurement, Hz; 0 < highest_frequency <= 1e+07.
+    length : float
+        Length of the floor, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor, m; 0.5 <= width <= 100.
+    thickness : float
+        Thickness of the plate that radiates into a room; 0: none, m; 0 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    stiffness_ratio : float
+        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
+        stiffness_ratio <= 10000.
+    torsion_ratio : float
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
+        torsion_ratio <= 1.
+    loss_factor : float
+        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+    edges : str
+        Losses at the edges of the floor; "building", "laboratory", "absorption".
+    edge_absorption : float
+        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
+        <= 1000.
     """
 
     name: ClassVar[FloorName] = "measured_mobility"
@@ -1033,6 +1057,16 @@ class MeasuredMobility(Group):
     residue_imaginary: Sequence[float] = ()
     lowest_frequency: float = 10.0
     highest_frequency: float = 1000.0
+    length: float = 5.0
+    width: float = 4.0
+    thickness: float = 0.0
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    stiffness_ratio: float = 1.0
+    torsion_ratio: float = 1.0
+    loss_factor: float = 0.005
+    edges: MeasuredMobilityEdges = "building"
+    edge_absorption: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -1486,6 +1520,16 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
     Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
+    Key("measured_mobility", "measured_mobility", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
+    Key("measured_mobility", "measured_mobility", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("measured_mobility", "measured_mobility", "thickness", "real", "m", "thickness of the plate that radiates into a room; 0: none", (), 0.0, 2.0),
+    Key("measured_mobility", "measured_mobility", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("measured_mobility", "measured_mobility", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("measured_mobility", "measured_mobility", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
+    Key("measured_mobility", "measured_mobility", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("measured_mobility", "measured_mobility", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
+    Key("measured_mobility", "measured_mobility", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
+    Key("measured_mobility", "measured_mobility", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("modal_floor", "modal_floor", "file", "text", "", "file of the modes: frequencies, loss factors, shapes on a grid"),
     Key("modal_floor", "modal_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("modal_floor", "modal_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
