@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -110,7 +109,8 @@ def test_mobility_is_the_sum_of_the_modes(path: Path) -> None:
     assert thud.mobility(BARE, frequency) == pytest.approx(exact, rel=2e-3, abs=1e-9)
 
 
-def test_plate_adds_the_modes_above_the_highest(path: Path) -> None:
+@pytest.mark.usefixtures("path")
+def test_plate_adds_the_modes_above_the_highest() -> None:
     frequency = np.linspace(22, 708, 2000)
     exact = thud.mobility(PLATE, frequency)
     given = thud.mobility(FLOOR, frequency)
@@ -130,7 +130,8 @@ def test_plate_adds_the_modes_above_the_highest(path: Path) -> None:
     assert added == pytest.approx(2e-8 * omega, rel=1e-2)
 
 
-def test_other_points_move_as_those_of_the_plate(path: Path) -> None:
+@pytest.mark.usefixtures("path")
+def test_other_points_move_as_those_of_the_plate() -> None:
     impacts = [thud.solve(model="modal_ball", floor=floor).on_floor for floor in (FLOOR, PLATE)]
     given, exact = (impact.velocity_at(1.2, 2.9) for impact in impacts if impact)
     assert given == pytest.approx(exact, abs=0.03 * abs(exact).max())
@@ -138,7 +139,8 @@ def test_other_points_move_as_those_of_the_plate(path: Path) -> None:
         impacts[0].velocity_at(5.5, 1.0)  # type: ignore[union-attr]
 
 
-def test_slab_by_its_sampled_modes_radiates_like_the_plate(path: Path) -> None:
+@pytest.mark.usefixtures("path")
+def test_slab_by_its_sampled_modes_radiates_like_the_plate() -> None:
     given, exact = radiation(FLOOR), radiation(PLATE)
     for name in ("radiation_factor", "radiated"):
         change = decibels(given[name] / exact[name])
@@ -147,7 +149,8 @@ def test_slab_by_its_sampled_modes_radiates_like_the_plate(path: Path) -> None:
         assert np.abs(change).max() < 0.1, name
 
 
-def test_levels_by_modes_are_those_of_the_plate(path: Path) -> None:
+@pytest.mark.usefixtures("path")
+def test_levels_by_modes_are_those_of_the_plate() -> None:
     given, exact = (thud.predict_level(floor=floor, room=ROOM) for floor in (FLOOR, PLATE))
     modal = slice(0, exact.n_modal)
     assert given.n_modal == exact.n_modal > 0
@@ -158,7 +161,8 @@ def test_levels_by_modes_are_those_of_the_plate(path: Path) -> None:
     assert {row[3] for row in given.rows()[1:]} == {"–"}
 
 
-def test_statistical_levels_follow_the_mean_velocity_of_the_modes(path: Path) -> None:
+@pytest.mark.usefixtures("path")
+def test_statistical_levels_follow_the_mean_velocity_of_the_modes() -> None:
     given, exact = (thud.predict_level(floor=floor, room=ROOM) for floor in (FLOOR, PLATE))
     modes = slab(800, *grid(2, 2))
     omega, bands = 2 * np.pi * modes.frequency[:, None], thud.get_bands("third")
@@ -237,7 +241,7 @@ def test_changed_file_changes_the_floor(path: Path) -> None:
 def test_file_lies_beside_its_case(path: Path) -> None:
     case = path.parent / "cases" / "slab.nml"
     case.parent.mkdir()
-    os.rename(path, case.parent / "modes.csv")
+    path.rename(case.parent / "modes.csv")
     case.write_text(case_text(thud.Case(floor=FLOOR)).decode())
     floor = thud.read_case(case).floor
     assert isinstance(floor, thud.ModalFloor)
@@ -333,6 +337,7 @@ def test_arrays_that_do_not_fit_are_not_written(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_shapes_are_drawn(path: Path) -> None:
+@pytest.mark.usefixtures("path")
+def test_shapes_are_drawn() -> None:
     titles = [axes.get_title() for axes in plate_modes(FLOOR).axes[:2]]
     assert titles == [f"{frequency:.1f} Hz" for frequency in slab(800, *grid(2, 2)).frequency[:2]]
