@@ -231,6 +231,19 @@ def test_masses_and_unequal_spacings_do_not_matter(path: Path) -> None:
     assert thud.mobility(FLOOR, frequency) == pytest.approx(same, rel=1e-12)
 
 
+@pytest.mark.usefixtures("path")
+def test_samples_of_floors_share_the_file() -> None:
+    # Each thread reads the file for itself.
+    parameters = {"source_x": [0.2, 0.3, 0.4, 0.5], "source_y": 0.35}
+    case = thud.Case(floor=FLOOR, room=ROOM)
+    many = thud.solve_many(parameters, case, threads=2)
+    alone = thud.solve_many(parameters, case, threads=1)
+    assert many.room_rating == pytest.approx(alone.room_rating, abs=1e-9)
+    work = many.floor_work
+    assert work is not None
+    assert np.ptp(work) > 0.01 * work.mean()
+
+
 def test_changed_file_changes_the_floor(path: Path) -> None:
     before = thud.mobility(FLOOR, [30.0])
     modes = slab(800, *grid(21, 17))
@@ -238,7 +251,7 @@ def test_changed_file_changes_the_floor(path: Path) -> None:
     assert abs(thud.mobility(FLOOR, [30.0]) / before - 1) > 0.1
 
 
-def test_file_lies_beside_its_case(path: Path) -> None:
+def test_file_lies_beside_its_case(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     case = path.parent / "cases" / "slab.nml"
     case.parent.mkdir()
     path.rename(case.parent / "modes.csv")
@@ -248,7 +261,15 @@ def test_file_lies_beside_its_case(path: Path) -> None:
     assert floor.file == str(case.parent / "modes.csv")
     with pytest.raises(thud.InputError, match=naming("modes.csv", "no such file")):
         thud.mobility(FLOOR, [30.0])
-    case.write_text(case.read_text().replace("modes.csv", f"{'x' * 120}.csv"))
+    # The effective input lies beside the results, and not beside the modes.
+    monkeypatch.chdir(case.parent)
+    results = path.parent / "results"
+    results.mkdir()
+    (results / "effective.nml").write_text(case.read_text())
+    assert thud.read_case(results / "effective.nml").floor == FLOOR
+    long = f"{'x' * 120}.csv"
+    (case.parent / "modes.csv").rename(case.parent / long)
+    case.write_text(case.read_text().replace("modes.csv", long))
     with pytest.raises(thud.InputError, match=naming("file", "too long", 128)):
         thud.read_case(case)
 

@@ -21,10 +21,15 @@ module thud_sampled_modes
    !> Maximum size of a file, bytes.
    integer(int64), parameter :: max_size = 200000000_int64
 
-   !> The last text of each thread and its modes, because a case needs them several times.
-   character(len=:), allocatable :: cached_text
-   type(floor_modes_type) :: cached_modes
-   !$omp threadprivate(cached_text, cached_modes)
+   !> The text of a file and its modes.
+   type :: cached_file_type
+      character(len=:), allocatable :: text
+      type(floor_modes_type) :: modes
+   end type cached_file_type
+
+   !> The last file of each thread, because a case needs it several times.
+   type(cached_file_type) :: cached
+   !$omp threadprivate(cached)
 
 contains
 
@@ -40,11 +45,11 @@ contains
 
       call read_text_file(path, text, error, 'table of modes', max_size)
       if (.not. allocated(error)) then
-         is_cached = allocated(cached_text)
-         if (is_cached) is_cached = len(text) == len(cached_text)
-         if (is_cached) is_cached = text == cached_text
+         is_cached = allocated(cached%text)
+         if (is_cached) is_cached = len(text) == len(cached%text)
+         if (is_cached) is_cached = text == cached%text
          if (is_cached) then
-            modes = cached_modes
+            modes = cached%modes
             return
          end if
          call read_mode_table(text, table, error)
@@ -54,8 +59,8 @@ contains
          return
       end if
       call get_sampled_modes(table, modes)
-      call move_alloc(text, cached_text)
-      cached_modes = modes
+      call move_alloc(text, cached%text)
+      cached%modes = modes
    end subroutine read_sampled_modes
 
    !> Modes of a floor from a table.
