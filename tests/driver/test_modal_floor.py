@@ -322,6 +322,9 @@ def test_unfit_modes_are_refused(path: Path) -> None:
         modes.write(path, **changes)
         with pytest.raises(thud.InputError, match=naming("modal_floor", *words)):
             thud.solve(floor=FLOOR)
+    slab(60, *grid(126, 81)).write(path)
+    with pytest.raises(thud.InputError, match=naming(10206, "points", 10000)):
+        thud.mobility(FLOOR, [30.0])
     # Every fourth mode, as of a quarter with symmetric edges.
     quarter = Modes(*(part[::4] for part in modes[:2]), *modes[2:4], modes.shape[::4])
     quarter.write(path)

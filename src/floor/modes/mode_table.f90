@@ -22,6 +22,9 @@ module thud_mode_table
    !> Limits of their values: above 0, and up to these.
    real(wp), parameter :: highest_value(*) = [1.0e6_wp, 1.0_wp, 1.0e9_wp]
 
+   !> Maximum number of points: time and memory of the radiation.
+   integer, parameter :: max_points = 10000
+
    !> Coordinates closer than this, relative to the floor, are equal.
    real(wp), parameter :: same_position = 1.0e-6_wp
 
@@ -222,6 +225,11 @@ contains
          if (.not. allocated(error)) call get_coordinates(point(2, :), 'y', table%y, error)
          if (allocated(error)) return
          associate (n_x => size(table%x), n_y => size(table%y))
+            if (rows%n_point > max_points) then
+               error = input_error('the grid has '//to_text(rows%n_point)//' points; allowed: up to '//to_text(max_points) &
+                  //', of which eight per wavelength are enough')
+               return
+            end if
             if (n_x*n_y /= rows%n_point) then
                error = input_error('the points are no rectangular grid: there are '//to_text(rows%n_point)//' with ' &
                   //to_text(n_x)//' values of x and '//to_text(n_y)//' of y; allowed: one point for each pair of x and y')
