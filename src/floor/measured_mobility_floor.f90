@@ -20,6 +20,9 @@ module thud_measured_mobility_floor
 
    public :: measured_mobility_floor_type
 
+   !> Minimum thickness of a plate that radiates, m.
+   real(wp), parameter :: min_thickness = 0.001_wp
+
    !> The floor.
    type, extends(floor_model_type) :: measured_mobility_floor_type
       !> Mobility at high frequencies, m/(N s).
@@ -79,6 +82,9 @@ contains
                //to_text(options%damping_ratio%count)//', residue_real '//to_text(options%residue_real%count) &
                //' and residue_imaginary '//to_text(options%residue_imaginary%count) &
                //'; allowed: the same number of each, at least one')
+         else if (options%radiator%plate%thickness > 0.0_wp .and. options%radiator%plate%thickness < min_thickness) then
+            error = input_error('&measured_mobility: thickness = '//to_text(options%radiator%plate%thickness) &
+               //' m; allowed: 0, or from '//to_text(min_thickness)//' m on')
          else
             call get_receiver(options, receiver, error)
          end if

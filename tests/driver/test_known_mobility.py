@@ -84,3 +84,5 @@ def test_plate_takes_over_outside_the_measurement(floor: thud.MeasuredMobility) 
 def test_mobility_without_a_plate_does_not_radiate(floor: thud.MeasuredMobility) -> None:
     with pytest.raises(thud.InputError, match=naming("measured_mobility", "thickness", "plate")):
         thud.predict_level(floor=replace(floor, thickness=0.0), room=ROOM)
+    with pytest.raises(thud.InputError, match=naming("measured_mobility", "thickness", 0.001)):
+        thud.predict_level(floor=replace(floor, thickness=1e-4), room=ROOM)
