@@ -77,6 +77,8 @@ STANDARD_BALL = '''
         return cls(youngs_modulus=2.08e6)
 '''
 EXTRAS = {"ball": STANDARD_BALL}
+# Base of the floors of rectangular plates, named like a group.
+RECTANGULAR = "rectangular_floor"
 # Groups that a case may ask for.
 OPTIONAL = {
     "modes": "Free modes that are requested.",
@@ -152,7 +154,9 @@ def python_default(key: Entry) -> str:
     return json.dumps(default) if isinstance(default, str) else repr(default)
 
 
-def python_class(title: str, keys: list[Entry], group: str, kind: str = "") -> str:
+def python_class(
+    title: str, keys: list[Entry], group: str, kind: str = "", base: str = "Group"
+) -> str:
     """Return the dataclass of some keys; a model and a floor name their kind of names."""
     attributes: list[str] = []
     members = [f'    name: ClassVar[{kind}] = "{group}"'] if kind else []
@@ -171,7 +175,9 @@ def python_class(title: str, keys: list[Entry], group: str, kind: str = "") -> s
         attributes.append(f"    {key['name']} : {plain_type}")
         attributes += textwrap.wrap(text, 99, subsequent_indent=INDENT)
         members.append(f"    {key['name']}: {type_name} = {default}")
-    head = f"\n\n@dataclass(frozen=True, eq=False)\nclass {class_name(group)}(Group):\n"
+    # The keys of a base follow those of a class.
+    options = ", kw_only=True" if group == RECTANGULAR else ""
+    head = f"\n\n@dataclass(frozen=True, eq=False{options})\nclass {class_name(group)}({base}):\n"
     head += f'    """{title}'
     if not keys:
         return "\n".join([f'{head}"""', "", *members, ""])
@@ -192,11 +198,28 @@ def optional_groups(schema: Entry) -> list[str]:
     return [owner for owner in owners if owner not in known]
 
 
+def shared_keys(schema: Entry) -> tuple[list[str], list[Entry]]:
+    """Return the floors whose edges are supported, and the keys that they all declare alike."""
+    owned = {floor: [key for key in schema["keys"] if key["owner"] == floor]
+             for floor in schema["floors"]}  # fmt: skip
+    names = [floor for floor, keys in owned.items() if any(k["name"] == "support" for k in keys)]
+    alike = [{json.dumps(without_place(key)) for key in owned[floor]} for floor in names]
+    shared = [without_place(key) for key in owned[names[0]]]
+    return names, [key for key in shared if all(json.dumps(key) in keys for keys in alike)]
+
+
+def without_place(key: Entry) -> Entry:
+    """Return a key of a floor as one of `RectangularFloor`."""
+    return key | {"owner": RECTANGULAR, "group": RECTANGULAR}
+
+
 def public_names(schema: Entry) -> list[str]:
     """Return the names that the package offers of its schema."""
     groups = [*shared_groups(schema), *optional_groups(schema)]
     names = map(class_name, [*groups, *schema["models"], *schema["floors"]])
-    return sorted([*names, "FloorName", "FloorOptions", "ModelName", "ModelOptions"])
+    return sorted(
+        [*names, class_name(RECTANGULAR), "FloorName", "FloorOptions", "ModelName", "ModelOptions"]
+    )
 
 
 def with_public_names(stub: str, schema: Entry) -> str:
@@ -210,7 +233,13 @@ def python_module(schema: Entry) -> str:
     """Return the text of ``base/_schema.py``."""
     keys, models, floors = schema["keys"], schema["models"], schema["floors"]
     groups, optional = shared_groups(schema), optional_groups(schema)
-    choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
+    rectangular, shared = shared_keys(schema)
+    inherited = {key["name"] for key in shared}
+    with_type = [
+        key for key in keys if key["owner"] not in rectangular or key["name"] not in inherited
+    ]
+    choices = [literal(choice_name(key), key["choices"])
+               for key in [*with_type, *shared] if key["choices"]]  # fmt: skip
     choices.append(literal("BandSet", [*schema["band_sets"]]))
     quoted_names = "".join(f"    {quoted(name)},\n" for name in public_names(schema))
     parts = [HEAD.format(names=quoted_names, choices="".join(choices))]
@@ -224,9 +253,15 @@ def python_module(schema: Entry) -> str:
         members = [key for key in keys if key["owner"] == model]
         title = f"Options of the source model ``{model}``."
         parts.append(python_class(title, members, model, "ModelName"))
+    parts.append(python_class("What all floors of rectangular plates have.", shared, RECTANGULAR))
     for floor in floors:
         members = [key for key in keys if key["owner"] == floor]
-        parts.append(python_class(f"Floor ``{floor}``.", members, floor, "FloorName"))
+        title, base = f"Floor ``{floor}``.", "Group"
+        if floor in rectangular:
+            members = [key for key in members if key["name"] not in inherited]
+            base = class_name(RECTANGULAR)
+            title = f"Floor ``{floor}``, with all keys of `{base}`."
+        parts.append(python_class(title, members, floor, "FloorName", base))
     quantities = schema["quantities"]
     of_impacts = quantities[: schema["history_quantities"]]
     of_samples = quantities[: schema["sample_quantities"]]

@@ -17,15 +17,19 @@ from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
 )
+from .export.floor_sound import (
+    FloorSound as FloorSound,
+)
 from .export.force_files import (
     BlockedForce as BlockedForce,
     blocked_force as blocked_force,
 )
 from .export.room_sound import (
-    FloorSound as FloorSound,
     RoomSound as RoomSound,
-    SoundLevels as SoundLevels,
     listen as listen,
+)
+from .export.sound_levels import (
+    SoundLevels as SoundLevels,
 )
 from .floors.constructions import (
     Construction as Construction,
@@ -166,6 +170,7 @@ from .base._schema import (
     Modes as Modes,
     Oscillator as Oscillator,
     Plate as Plate,
+    RectangularFloor as RectangularFloor,
     Rigid as Rigid,
     Room as Room,
     Sampling as Sampling,

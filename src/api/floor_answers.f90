@@ -138,11 +138,7 @@ contains
       type(box_type) :: box
       real(wp), allocatable :: ball(:, :), microphone(:, :)
 
-      call get_case_box(case, box, plate, error)
-      if (allocated(error)) return
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_room_modes(floor%get_support(), plate, modes, error)
-      end associate
+      call get_modes_and_box(case, modes, plate, box, error)
       if (allocated(error)) return
       associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
          call get_positions(case%room, box, ball, microphone)
@@ -190,11 +186,7 @@ contains
       type(plate_type) :: plate
       type(box_type) :: box
 
-      call get_case_box(case, box, plate, error)
-      if (allocated(error)) return
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_room_modes(floor%get_support(), plate, modes, error)
-      end associate
+      call get_modes_and_box(case, modes, plate, box, error)
       if (allocated(error)) return
       associate (x => request%get_array('x'), y => request%get_array('y'), area => get_area(case%room, plate))
          if (size(x) > 0) then
@@ -263,12 +255,13 @@ contains
       end do
    end subroutine sort_by
 
-   !> The room of a case as a box, and the plate that radiates into it.
-   subroutine get_case_box(case, box, plate, error)
+   !> Modes of a case's floor, the plate that radiates, and the room below as a box.
+   subroutine get_modes_and_box(case, modes, plate, box, error)
       type(case_type), intent(in) :: case
-      type(box_type), intent(out) :: box
+      type(floor_modes_type), intent(out) :: modes
       type(plate_type), intent(out) :: plate
-      !> Set if the floor cannot radiate into the room.
+      type(box_type), intent(out) :: box
+      !> Set if the floor has no modes or cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: conductance(:)
@@ -278,10 +271,12 @@ contains
       allocate (conductance(size(bands)))
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_radiator(bands%center, plate, conductance, error)
+         if (.not. allocated(error)) call check_below(plate, case%room, error)
+         if (allocated(error)) return
+         box = get_box(case%room, plate, bands)
+         call floor%get_room_modes(floor%get_support(), plate, modes, error)
       end associate
-      if (.not. allocated(error)) call check_below(plate, case%room, error)
-      if (.not. allocated(error)) box = get_box(case%room, plate, bands)
-   end subroutine get_case_box
+   end subroutine get_modes_and_box
 
    !> The plate of a floor that radiates into the room below, at the frequencies `frequency`, Hz.
    subroutine answer_radiator(case, request, bundle, error)

@@ -61,7 +61,7 @@ module thud_field
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''
       !> Help text: what the value is, in a few words.
-      character(len=96) :: meaning = ''
+      character(len=128) :: meaning = ''
       !> The variable of a real key, else null.
       real(wp), pointer :: real_value => null()
       !> The variable of an integer key, else null.

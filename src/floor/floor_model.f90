@@ -206,7 +206,7 @@ contains
    end function get_improvement
 
    !> Whether the mean power into the floor follows from its modes, because no homogeneous plate represents it.
-   pure function has_modal_conductance(options) result(yes)
+   function has_modal_conductance(options) result(yes)
       class(floor_model_type), intent(in) :: options
       logical :: yes
 

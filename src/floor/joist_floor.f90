@@ -2,13 +2,13 @@
 module thud_joist_floor
    use thud_constants, only: pi
    use thud_error, only: error_type
-   use thud_field, only: field_type, key_length, name_length
+   use thud_field, only: field_type, name_length
    use thud_floor_model, only: reason_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, real_field
-   use thud_plate, only: get_resistance, plate_type
-   use thud_plate_stack, only: orthotropic_type, ribs_type
-   use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_plate, only: plate_type
+   use thud_plate_stack, only: ribs_type
+   use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
    use thud_screed, only: new_orthotropic
    implicit none (type, external)
    private
@@ -38,9 +38,7 @@ module thud_joist_floor
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: get_base
       procedure, pass(options) :: get_source
-      procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
-      procedure, pass(options) :: has_modal_conductance
    end type joist_floor_type
 
 contains
@@ -75,16 +73,15 @@ contains
    end function get_fields
 
    !> The smeared plate, and the sheathing with its joists.
-   subroutine get_base(options, group, plate, base)
+   function get_base(options) result(base)
       class(joist_floor_type), intent(in) :: options
-      character(len=key_length), intent(out) :: group
-      type(plate_type), intent(out) :: plate
-      type(orthotropic_type), intent(out) :: base
+      type(base_floor_type) :: base
       type(ribs_type) :: joists
 
-      group = 'joist_floor'
-      plate = get_smeared(options)
-      base = new_orthotropic(plate_type(length=options%length, width=options%width, &
+      base%group = 'joist_floor'
+      base%is_homogeneous = .false.
+      base%plate = get_smeared(options)
+      base%stiffness = new_orthotropic(plate_type(length=options%length, width=options%width, &
          thickness=options%sheathing_thickness, density=options%sheathing_density, &
          wave_speed=sqrt(options%sheathing_modulus/options%sheathing_density), loss_factor=options%loss_factor))
       associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height)
@@ -97,8 +94,8 @@ contains
          joists%inertia = joists%mass*(b**2 + h**2)/12
       end associate
       joists%loss_factor = options%loss_factor
-      base%ribs = [joists]
-   end subroutine get_base
+      base%stiffness%ribs = [joists]
+   end function get_base
 
    !> Positions of the joists' axes across the width, symmetric about the center, m: [n_joist].
    pure function get_positions(options) result(position)
@@ -207,34 +204,12 @@ contains
       class(joist_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
-      type(plate_type) :: plate
-      type(orthotropic_type) :: base
-      character(len=key_length) :: group
+      type(base_floor_type) :: base
 
-      call options%get_base(group, plate, base)
+      base = options%get_base()
       lowest = 0.0_wp
-      highest = (2*pi/(6*options%sheathing_thickness))**2*sqrt(base%along/base%mass)/(2*pi)
+      highest = (2*pi/(6*options%sheathing_thickness))**2*sqrt(base%stiffness%along/base%stiffness%mass)/(2*pi)
       reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
    end subroutine get_validity
-
-   !> The smeared plate, and its conductance if it were infinite.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
-      class(joist_floor_type), intent(in) :: options
-      real(wp), intent(in) :: frequency(:)
-      type(plate_type), intent(out) :: plate
-      real(wp), intent(out) :: conductance(:)
-      type(error_type), allocatable, intent(out) :: error
-
-      plate = get_smeared(options)
-      conductance = 1/get_resistance(plate)
-   end subroutine get_radiator
-
-   !> No homogeneous plate represents the floor.
-   pure function has_modal_conductance(options) result(yes)
-      class(joist_floor_type), intent(in) :: options
-      logical :: yes
-
-      yes = .true.
-   end function has_modal_conductance
 
 end module thud_joist_floor

@@ -1,14 +1,13 @@
 !> A plate of crossed layers that yield in shear, as cross-laminated timber.
 module thud_laminate_floor
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length, list_type
+   use thud_field, only: field_type, list_type
    use thud_floor_model, only: reason_length
    use thud_kinds, only: wp
    use thud_legendre, only: get_gauss_legendre
    use thud_new_field, only: list_field, real_field
-   use thud_plate, only: get_resistance, plate_type
-   use thud_plate_stack, only: orthotropic_type
-   use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_plate, only: plate_type
+   use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -39,9 +38,7 @@ module thud_laminate_floor
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: get_base
-      procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
-      procedure, pass(options) :: has_modal_conductance
    end type laminate_floor_type
 
 contains
@@ -139,67 +136,44 @@ contains
    end subroutine get_section
 
    !> The equivalent homogeneous plate, and the stiffnesses of the layers.
-   subroutine get_base(options, group, plate, base)
+   function get_base(options) result(base)
       class(laminate_floor_type), intent(in) :: options
-      character(len=key_length), intent(out) :: group
-      type(plate_type), intent(out) :: plate
-      type(orthotropic_type), intent(out) :: base
+      type(base_floor_type) :: base
       real(wp), allocatable :: thickness(:)
       logical, allocatable :: is_along(:)
       real(wp) :: mean
 
-      group = 'laminate_floor'
+      base%group = 'laminate_floor'
+      base%is_homogeneous = .false.
       call get_layers(options, thickness, is_along)
       associate (e => options%youngs_modulus, e_cross => options%cross_modulus, g => options%shear_modulus, &
-         g_rolling => options%rolling_shear_modulus, total => sum(thickness))
-         call get_section(thickness, merge(e, e_cross, is_along), merge(g, g_rolling, is_along), base%along, base%shear(1))
-         call get_section(thickness, merge(e_cross, e, is_along), merge(g_rolling, g, is_along), base%across, base%shear(2))
-         base%torsion = options%torsion_factor*g*total**3/12
-         base%mass = options%density*total + options%added_mass
-         base%inertia = options%density*total**3/12
-         base%loss_factor = options%loss_factor
-         mean = sqrt(base%along*base%across)
-         plate = plate_type(length=options%length, width=options%width, thickness=total, density=base%mass/total, &
-            wave_speed=sqrt(12*mean/base%mass)/total, stiffness_ratio=base%across/base%along, &
-            torsion_ratio=min(2*base%torsion/mean, 1.0_wp), loss_factor=options%loss_factor, edges='absorption')
+         g_rolling => options%rolling_shear_modulus, total => sum(thickness), layers => base%stiffness)
+         call get_section(thickness, merge(e, e_cross, is_along), merge(g, g_rolling, is_along), layers%along, &
+            layers%shear(1))
+         call get_section(thickness, merge(e_cross, e, is_along), merge(g_rolling, g, is_along), layers%across, &
+            layers%shear(2))
+         layers%torsion = options%torsion_factor*g*total**3/12
+         layers%mass = options%density*total + options%added_mass
+         layers%inertia = options%density*total**3/12
+         layers%loss_factor = options%loss_factor
+         mean = sqrt(layers%along*layers%across)
+         base%plate = plate_type(length=options%length, width=options%width, thickness=total, density=layers%mass/total, &
+            wave_speed=sqrt(12*mean/layers%mass)/total, stiffness_ratio=layers%across/layers%along, &
+            torsion_ratio=min(2*layers%torsion/mean, 1.0_wp), loss_factor=options%loss_factor, edges='absorption')
       end associate
-   end subroutine get_base
-
-   !> The equivalent plate, and its conductance if it were infinite and rigid in shear.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
-      class(laminate_floor_type), intent(in) :: options
-      real(wp), intent(in) :: frequency(:)
-      type(plate_type), intent(out) :: plate
-      real(wp), intent(out) :: conductance(:)
-      type(error_type), allocatable, intent(out) :: error
-      type(orthotropic_type) :: base
-      character(len=key_length) :: group
-
-      call options%get_base(group, plate, base)
-      conductance = 1/get_resistance(plate)
-   end subroutine get_radiator
+   end function get_base
 
    !> Frequency band in which shear waves are longer than two thicknesses.
    subroutine get_validity(options, lowest, highest, reason)
       class(laminate_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
-      type(plate_type) :: plate
-      type(orthotropic_type) :: base
-      character(len=key_length) :: group
+      type(base_floor_type) :: base
 
-      call options%get_base(group, plate, base)
+      base = options%get_base()
       lowest = 0.0_wp
-      highest = sqrt(minval(base%shear)/base%mass)/(2*plate%thickness)
+      highest = sqrt(minval(base%stiffness%shear)/base%stiffness%mass)/(2*base%plate%thickness)
       reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
    end subroutine get_validity
-
-   !> No homogeneous plate represents the floor.
-   pure function has_modal_conductance(options) result(yes)
-      class(laminate_floor_type), intent(in) :: options
-      logical :: yes
-
-      yes = .true.
-   end function has_modal_conductance
 
 end module thud_laminate_floor

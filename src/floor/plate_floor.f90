@@ -2,11 +2,10 @@
 module thud_plate_floor
    use thud_double_plate, only: double_plate_type, get_lower_conductance
    use thud_error, only: error_type
-   use thud_field, only: field_type, key_length
+   use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_plate, only: get_plate_fields, get_resistance, plate_type
-   use thud_plate_stack, only: orthotropic_type
-   use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
    use thud_screed, only: get_screed_plate, new_orthotropic
    implicit none (type, external)
    private
@@ -34,16 +33,12 @@ contains
    end function get_fields
 
    !> The plate.
-   subroutine get_base(options, group, plate, base)
+   function get_base(options) result(base)
       class(plate_floor_type), intent(in) :: options
-      character(len=key_length), intent(out) :: group
-      type(plate_type), intent(out) :: plate
-      type(orthotropic_type), intent(out) :: base
+      type(base_floor_type) :: base
 
-      group = 'plate'
-      plate = options%plate
-      base = new_orthotropic(plate)
-   end subroutine get_base
+      base = base_floor_type('plate', options%plate, new_orthotropic(options%plate))
+   end function get_base
 
    !> The plate itself; its conductance, averaged over positions, is that of the infinite plate, or the power through the
    !> layer of a floating plate with both plates infinite.

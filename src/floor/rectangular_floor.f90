@@ -15,13 +15,25 @@ module thud_rectangular_floor
    implicit none (type, external)
    private
 
-   public :: rectangular_floor_type
+   public :: base_floor_type, rectangular_floor_type
 
    !> Supports of the edges.
    character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic']
 
    !> Numbers of octaves and one-third-octave bands of a rating.
    integer, parameter :: octave_bands = 4, third_bands = 12
+
+   !> A floor without supports and floating plate.
+   type :: base_floor_type
+      !> Namelist group of the floor.
+      character(len=key_length) :: group = ''
+      !> The plate with homogeneous stiffness that radiates into the room.
+      type(plate_type) :: plate
+      !> Stiffnesses, masses and ribs.
+      type(orthotropic_type) :: stiffness
+      !> Whether the homogeneous plate represents the mean power into the floor.
+      logical :: is_homogeneous = .true.
+   end type base_floor_type
 
    !> The floor; all plates have the same length and width.
    type, abstract, extends(floor_model_type) :: rectangular_floor_type
@@ -50,26 +62,23 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_mobility_at
       procedure, pass(options) :: get_source
       procedure, pass(options) :: get_modes
+      procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: get_room_modes
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
+      procedure, pass(options) :: has_modal_conductance
       procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
 
    abstract interface
-      !> The floor without floating plate: the plate that radiates into the room, and its stiffnesses.
-      subroutine get_base(options, group, plate, base)
-         import :: key_length, orthotropic_type, plate_type, rectangular_floor_type
+      !> The floor without supports and floating plate.
+      function get_base(options) result(base)
+         import :: base_floor_type, rectangular_floor_type
          implicit none (type, external)
          class(rectangular_floor_type), intent(in) :: options
-         !> Namelist group of the floor.
-         character(len=key_length), intent(out) :: group
-         !> The plate with homogeneous stiffness.
-         type(plate_type), intent(out) :: plate
-         !> Stiffnesses, masses and ribs, without supports.
-         type(orthotropic_type), intent(out) :: base
-      end subroutine get_base
+         type(base_floor_type) :: base
+      end function get_base
    end interface
 
 contains
@@ -121,28 +130,28 @@ contains
    subroutine check_build_up(options, error)
       class(rectangular_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
-      type(plate_type) :: plate
-      type(orthotropic_type) :: base
-      character(len=key_length) :: group
+      type(base_floor_type) :: base
 
-      call options%get_base(group, plate, base)
+      base = options%get_base()
       call check_edges(options%support_stiffness, 'support_stiffness')
       call check_edges(options%support_rotation, 'support_rotation')
-      call check_positions(options%line_x, 'line_x', plate%length)
-      call check_positions(options%line_y, 'line_y', plate%width)
-      call check_positions(options%screed%bridge_x, 'bridge_x', plate%length)
-      call check_positions(options%screed%bridge_y, 'bridge_y', plate%width)
+      call check_positions(options%line_x, 'line_x', base%plate%length)
+      call check_positions(options%line_y, 'line_y', base%plate%width)
+      call check_positions(options%screed%bridge_x, 'bridge_x', base%plate%length)
+      call check_positions(options%screed%bridge_y, 'bridge_y', base%plate%width)
       if (allocated(error)) return
       if (all(options%covering_improvement%count /= [0, octave_bands, third_bands])) then
-         error = input_error('&'//trim(group)//': covering_improvement has '//to_text(options%covering_improvement%count) &
-            //' values; allowed: 4, one for each octave from 63 to 500 Hz, or 12, one for each one-third-octave band')
+         error = input_error('&'//trim(base%group)//': covering_improvement has ' &
+            //to_text(options%covering_improvement%count)//' values; allowed: 4, one for each octave from 63 to 500 Hz, ' &
+            //'or 12, one for each one-third-octave band')
       else if (options%covering_improvement%count > 0 .and. options%covering_stiffness > 0.0_wp) then
-         error = input_error('&'//trim(group)//': covering_stiffness and covering_improvement describe the same covering ' &
-            //'twice; allowed: one of them')
+         error = input_error('&'//trim(base%group)//': covering_stiffness and covering_improvement describe the same ' &
+            //'covering twice; allowed: one of them')
       else if (options%support == 'free' .and. options%line_x%count + options%line_y%count == 0) then
-         error = input_error('&'//trim(group)//': support = free needs supports at line_x or line_y; allowed: at least one')
+         error = input_error('&'//trim(base%group)//': support = free needs supports at line_x or line_y; ' &
+            //'allowed: at least one')
       else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
-         error = input_error('&'//trim(group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
+         error = input_error('&'//trim(base%group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
             //' values and bridge_y '//to_text(options%screed%bridge_y%count)//'; allowed: the same number of both')
       end if
    contains
@@ -153,7 +162,7 @@ contains
          character(len=*), intent(in) :: key
 
          if (allocated(error) .or. any(list%count == [0, 1, 4])) return
-         error = input_error('&'//trim(group)//': '//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
+         error = input_error('&'//trim(base%group)//': '//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
       end subroutine check_edges
 
       !> Checks that positions lie between two edges.
@@ -164,7 +173,7 @@ contains
          real(wp), intent(in) :: side
 
          if (allocated(error) .or. all(list%values(:list%count) < side)) return
-         error = input_error('&'//trim(group)//': '//key//' = '//to_text(maxval(list%values(:list%count))) &
+         error = input_error('&'//trim(base%group)//': '//key//' = '//to_text(maxval(list%values(:list%count))) &
             //' m lies outside the floor; allowed: below '//to_text(side)//' m')
       end subroutine check_positions
    end subroutine check_build_up
@@ -200,16 +209,14 @@ contains
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
       type(error_type), allocatable, intent(out) :: error
-      type(plate_type) :: plate
-      type(orthotropic_type) :: base
-      character(len=key_length) :: group
+      type(base_floor_type) :: base
 
-      call options%get_base(group, plate, base)
-      associate (length => plate%length, width => plate%width)
+      base = options%get_base()
+      associate (length => base%plate%length, width => base%plate%width)
          if (x >= 0.0_wp .and. x <= length .and. y >= 0.0_wp .and. y <= width) then
             call options%get_mobility_at(options%get_source(), [x/length, y/width], transfer, error)
          else
-            error = input_error('&'//trim(group)//': the point ('//to_text(x)//', '//to_text(y) &
+            error = input_error('&'//trim(base%group)//': the point ('//to_text(x)//', '//to_text(y) &
                //') m lies outside; allowed: 0 to '//to_text(length)//' m and 0 to '//to_text(width)//' m')
          end if
       end associate
@@ -271,24 +278,28 @@ contains
       !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
       real(wp), intent(in), optional :: max_frequency
       type(plate_stack_type) :: stack
-      type(orthotropic_type) :: base
+      type(base_floor_type) :: base
 
-      call options%get_base(group, plate, base)
-      if (present(support)) then
-         base%edge = get_edges(options, support)
-      else
-         base%edge = get_edges(options, options%support)
-      end if
-      base%line_x = options%line_x%values(:options%line_x%count)
-      base%line_y = options%line_y%values(:options%line_y%count)
+      base = options%get_base()
+      group = base%group
+      plate = base%plate
+      associate (lower => base%stiffness)
+         if (present(support)) then
+            lower%edge = get_edges(options, support)
+         else
+            lower%edge = get_edges(options, options%support)
+         end if
+         lower%line_x = options%line_x%values(:options%line_x%count)
+         lower%line_y = options%line_y%values(:options%line_y%count)
+      end associate
       stack%length = plate%length
       stack%width = plate%width
       if (options%screed%thickness > 0.0_wp) then
-         stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base]
+         stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base%stiffness]
          stack%plate(1)%edge = get_screed_edge(options%screed)
          stack%layer = [get_screed_layer(options%screed)]
       else
-         stack%plate = [base]
+         stack%plate = [base%stiffness]
          allocate (stack%layer(0))
       end if
       stack%radiator = size(stack%plate)
@@ -362,19 +373,43 @@ contains
       if (list%count == 4) values = list%values(:4)
    end function get_four
 
+   !> The plate, and its conductance if it were infinite.
+   subroutine get_radiator(options, frequency, plate, conductance, error)
+      class(rectangular_floor_type), intent(in) :: options
+      real(wp), intent(in) :: frequency(:)
+      type(plate_type), intent(out) :: plate
+      real(wp), intent(out) :: conductance(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(base_floor_type) :: base
+
+      base = options%get_base()
+      plate = base%plate
+      conductance = 1/get_resistance(plate)
+   end subroutine get_radiator
+
+   !> Whether no homogeneous plate represents the mean power into the floor.
+   function has_modal_conductance(options) result(yes)
+      class(rectangular_floor_type), intent(in) :: options
+      logical :: yes
+      type(base_floor_type) :: base
+
+      base = options%get_base()
+      yes = .not. base%is_homogeneous
+   end function has_modal_conductance
+
    !> Frequency band in which all plates are thin.
    subroutine get_validity(options, lowest, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
-      type(plate_type) :: plate
-      type(orthotropic_type) :: base
-      character(len=key_length) :: group
+      type(base_floor_type) :: base
 
-      call options%get_base(group, plate, base)
+      base = options%get_base()
       lowest = 0.0_wp
-      highest = get_thin_limit(plate)
-      if (options%screed%thickness > 0.0_wp) highest = min(highest, get_thin_limit(get_screed_plate(options%screed, plate)))
+      highest = get_thin_limit(base%plate)
+      if (options%screed%thickness > 0.0_wp) then
+         highest = min(highest, get_thin_limit(get_screed_plate(options%screed, base%plate)))
+      end if
       reason = 'bending waves are shorter than six thicknesses, and a plate is not thin'
    end subroutine get_validity
 

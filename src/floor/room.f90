@@ -21,8 +21,8 @@ module thud_room
    private
 
    public :: check_below, check_room, few_modes, get_completed_room, get_reverberation_times, get_room_bands
-   public :: get_room_fields, get_room_level, meets_requirement, modal_radiation, room_level_type, room_type
-   public :: standard_positions
+   public :: get_required_interval, get_room_fields, get_room_level, judge_requirement, modal_radiation, room_level_type
+   public :: room_type, standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
@@ -319,15 +319,39 @@ contains
       call add_history(energies, prediction)
    end subroutine get_room_level
 
-   !> Whether a prediction meets the requirement of its room: the rounded rating is at most the required one.
-   pure function meets_requirement(room, prediction) result(met)
+   !> Ends of the interval of the rating that is required, dB: that of both predictions of the one-third-octave bands, moved
+   !> by the difference of the statistical ratings.
+   pure function get_required_interval(room, prediction) result(ends)
       !> A room with a requirement.
       type(room_type), intent(in) :: room
       type(room_level_type), intent(in) :: prediction
-      logical :: met
+      real(wp) :: ends(2)
 
-      met = get_rounded(prediction%rating(findloc(rating_names == room%required_rating, .true., dim=1))) <= room%required
-   end function meets_requirement
+      ends = prediction%interval + get_statistical(room%required_rating) - get_statistical('thirds')
+   contains
+
+      !> A statistical rating, dB.
+      pure function get_statistical(name) result(level)
+         character(len=*), intent(in) :: name
+         real(wp) :: level
+
+         level = prediction%rating(findloc(rating_names == name, .true., dim=1))
+      end function get_statistical
+   end function get_required_interval
+
+   !> Verdict on the requirement of a room: whether all levels of the interval, rounded, are at most the required one.
+   pure function judge_requirement(room, prediction) result(verdict)
+      !> A room with a requirement.
+      type(room_type), intent(in) :: room
+      type(room_level_type), intent(in) :: prediction
+      character(len=9) :: verdict
+
+      associate (ends => get_rounded(get_required_interval(room, prediction)))
+         verdict = 'undecided'
+         if (ends(2) <= room%required) verdict = 'met'
+         if (ends(1) > room%required) verdict = 'not met'
+      end associate
+   end function judge_requirement
 
    !> Levels of the octaves. The detector is linear in the energies, so an octave needs the sum of the energies of its
    !> one-third-octave bands; the maximum of the sum is at most the sum of the maxima.

@@ -18,7 +18,6 @@ from thud.base.bridge import ask
 from thud.case.case import case_text
 from thud.cli import main
 from thud.floors.tapping import FREQUENCY
-from thud.level.rating import CLASS_LIMITS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -139,8 +138,16 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
     assert thin.level == pytest.approx(expected.level)
     rows = {row[0]: row[1:] for row in found.rows()}
     assert rows[""] == ("thin", "thick")
-    assert rows[f"{RATINGS['thirds']}, dB"] == (str(thin.rating.rounded), str(thick.rating.rounded))
-    assert rows[f"{RATINGS['octaves']}, dB"] == tuple(
+    assert rows["mean of both predictions, L_iA,Fmax (ISO 717-2)"] == (
+        thin.rated_text,
+        thick.rated_text,
+    )
+    assert rows["by modes, dB"][0] == str(thin.modal_rating.rounded)
+    assert rows[f"statistical, {RATINGS['thirds']}, dB"] == (
+        str(thin.rating.rounded),
+        str(thick.rating.rounded),
+    )
+    assert rows[f"statistical, {RATINGS['octaves']}, dB"] == tuple(
         f"{one.octave_rating.rounded}, class none" for one in (thin, thick)
     )
     assert rows["63 Hz octave, dB"] == (
@@ -192,9 +199,9 @@ def test_case_that_fails_is_named() -> None:
         thud.compare_floors({"short": case})
 
 
-def test_page_draws_chain_and_classes(found: thud.FloorComparison) -> None:
+def test_page_draws_chain_and_both_predictions(found: thud.FloorComparison) -> None:
     figure = found.figure()
-    force, energy, radiated, level, classes = figure.axes[:5]
+    force, energy, radiated, level, ratings = figure.axes[:5]
     thin = found.predictions["thin"]
     for axes, values in (
         (force, 10 * np.log10(thin.energy / thin.conductance)),
@@ -203,8 +210,17 @@ def test_page_draws_chain_and_classes(found: thud.FloorComparison) -> None:
         (level, thin.level),
     ):
         assert axes.lines[0].get_ydata() == pytest.approx(values)
-    assert [line.get_ydata()[0] for line in classes.lines] == list(CLASS_LIMITS)  # type: ignore[index]
-    assert CLASS_LIMITS == (37, 41, 45, 49)
+    assert level.lines[1].get_ydata() == pytest.approx(thin.modal_level[: thin.n_modal])
+    predictions = found.predictions.values()
+    drawn = [np.asarray(line.get_ydata()) for line in ratings.lines]
+    for wanted in (
+        [one.rated for one in predictions],
+        [one.interval[0] for one in predictions],
+        [one.interval[1] for one in predictions],
+        [one.rating.a_weighted for one in predictions],
+        [one.modal_rating.a_weighted for one in predictions],
+    ):
+        assert any(values == pytest.approx(wanted) for values in drawn)
     page = found.html()
     assert page.count('"layout": ') == 4
     assert "Comparison of floors" in page

@@ -16,7 +16,7 @@ from scipy.signal import resample
 
 import thud
 from thud.cli import main
-from thud.export import room_sound
+from thud.export import floor_sound
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,7 +128,7 @@ def test_levels_by_another_instrument_are_those_predicted(
 def test_noise_decays_as_floor_and_room_do(predictions: dict[str, thud.RoomPrediction]) -> None:
     """Two exponentials, with the rates omega eta of the floor and 6 ln 10/T of the room."""
     prediction = predictions["concrete"]
-    square = room_sound._mean_square(prediction)  # noqa: SLF001
+    square = floor_sound._mean_square(prediction)  # noqa: SLF001
     time = prediction.history_time - prediction.history_time[0] / 2
     floor = 2 * np.pi * CENTER * prediction.loss_factor
     room = 6 * np.log(10) / prediction.reverberation_time
@@ -140,12 +140,12 @@ def test_noise_decays_as_floor_and_room_do(predictions: dict[str, thud.RoomPredi
     assert abs(deviation).max() < 0.15
     # The decay ends 60 dB below the maximum, also after long reverberation.
     long = replace(prediction, history=prediction.history)
-    assert (room_sound._mean_square(long)[-1] <= 1.01e-6 * square.max(axis=0)).all()  # noqa: SLF001
+    assert (floor_sound._mean_square(long)[-1] <= 1.01e-6 * square.max(axis=0)).all()  # noqa: SLF001
 
 
 def test_decay_continues_beyond_the_history() -> None:
     room = replace(ROOM, reverberation_time=4.0)
-    square = room_sound._mean_square(thud.predict_level(floor=FLOORS["concrete"], room=room))  # noqa: SLF001
+    square = floor_sound._mean_square(thud.predict_level(floor=FLOORS["concrete"], room=room))  # noqa: SLF001
     step = 0.005
     decay = 10 * np.log10(square[300:-50:50] / square[350::50][: len(square[300:-50:50])])
     loud = square[350::50][: len(decay)] > 1e-5 * square.max(axis=0)

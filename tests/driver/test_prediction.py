@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
@@ -530,26 +531,31 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
     found = thud.predict_level(shell, floor, room)
     assert found.requirement is None
     assert list(found.ratings) == list(_schema.RATINGS)
-    level = found.ratings[name].rounded
+    mean = found.rated + found.ratings[name].a_weighted - found.rating.a_weighted
+    low, high = (math.floor(end + mean - found.rated + 0.5) for end in found.interval)
     # The three ratings of this room differ.
     assert len({rating.rounded for rating in found.ratings.values()}) == 3
-    for limit, met in ((level, True), (level - 1, False)):
+    assert high - low > 1
+    for limit, verdict in (
+        (high, "met"), (high - 1, "undecided"), (low, "undecided"), (low - 1, "not met")
+    ):  # fmt: skip
         strict = replace(room, required=limit, required_rating=name)
-        verdict = thud.predict_level(shell, floor, strict).requirement
-        assert verdict is not None
-        assert (verdict.level, verdict.required, verdict.met) == (level, limit, met)
+        judged = thud.predict_level(shell, floor, strict).requirement
+        assert judged is not None
+        assert (judged.required, judged.verdict) == (limit, verdict)
+        assert judged.level == pytest.approx(mean, abs=1e-9)
         keys = f"volume = 70\n reverberation_time = 1.5\n required = {limit}"
         text = ROOM_CASE.replace("volume = 40", f"{keys}\n required_rating = '{name}'")
         done = run(case_file(text), "-o", f"out_{limit}")
-        word = "met" if met else "not met"
-        assert f"Required of {name}: at most {limit:.1f} dB: {word}." in done.stdout
+        words = f"at most {limit:.1f} dB: {verdict} ({low} to {high})."
+        assert f"Required of {name}: {words}" in done.stdout
         summary = f90nml.read(case_file(text).parent / f"out_{limit}" / "summary.nml")
-        assert summary["room_summary"]["met"] is met
+        assert summary["room_summary"]["verdict"] == verdict
         assert summary["room_summary"]["level"] == pytest.approx(
             [rating.a_weighted for rating in found.ratings.values()], abs=1e-9
         )
         page = thud.compare_floors({"floor": thud.predict_level(shell, floor, strict)})
-        assert ("required, dB", f"{limit} ({name}): {word}") in page.rows()
+        assert ("required, dB", f"{limit} ({name}): {verdict}") in page.rows()
 
 
 def test_paths_share_the_energy_that_enters_the_room(

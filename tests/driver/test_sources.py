@@ -6,6 +6,8 @@ import re
 
 from conftest import REPOSITORY
 
+from thud.base._schema import KEYS
+
 SOURCES = sorted((REPOSITORY / "src").rglob("*.f90"))
 FUNCTION = re.compile(
     r"^ *(?:pure |elemental )*function \w+\(.*?result\((\w+)\)(.*?)^ *end function",
@@ -39,3 +41,8 @@ def test_library_does_not_print() -> None:
     for path in SOURCES:
         code = [line.split("!")[0] for line in path.read_text().splitlines()]
         assert not [line for line in code if re.match(r" *(print|write *\( *\*)", line)], path
+
+
+def test_meanings_of_keys_are_whole() -> None:
+    """The library holds 128 characters of a meaning, and cuts what is longer."""
+    assert [key.name for key in KEYS if len(key.meaning) > 127] == []

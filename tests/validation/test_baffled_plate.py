@@ -152,7 +152,7 @@ def test_rooms_have_the_factor_of_the_standard(
     prediction = thud.predict_level(
         thud.solve(thud.Ball()),
         floor,
-        thud.Room(room_height=4.0, sound_speed=SOUND_SPEED, radiation="iso_12354"),
+        thud.Room(height=4.0, sound_speed=SOUND_SPEED, radiation="iso_12354"),
     )
     # The standard rounds the critical frequency, 2 pi/sqrt(12) to 1.8.
     rounded = 3500 * 2 * math.pi / (1.8 * math.sqrt(12))

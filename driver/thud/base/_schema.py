@@ -39,6 +39,7 @@ __all__ = [
     "Modes",
     "Oscillator",
     "Plate",
+    "RectangularFloor",
     "Rigid",
     "Room",
     "Sampling",
@@ -76,19 +77,15 @@ FloorName = Literal[
     "modal_floor",
 ]
 PlateEdges = Literal["building", "laboratory", "absorption"]
-PlateSupport = Literal["simple", "clamped", "free", "elastic"]
-PlateScreedEdges = Literal["simple", "free", "strip"]
-LaminateFloorSupport = Literal["simple", "clamped", "free", "elastic"]
-LaminateFloorScreedEdges = Literal["simple", "free", "strip"]
 JoistFloorSourceOn = Literal["sheathing", "joist", "position"]
-JoistFloorSupport = Literal["simple", "clamped", "free", "elastic"]
-JoistFloorScreedEdges = Literal["simple", "free", "strip"]
 MeasuredMobilityEdges = Literal["building", "laboratory", "absorption"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
 RoomPositions = Literal["standard", "even"]
 RoomRequiredRating = Literal["octaves", "thirds", "standardized"]
+RectangularFloorSupport = Literal["simple", "clamped", "free", "elastic"]
+RectangularFloorScreedEdges = Literal["simple", "free", "strip"]
 BandSet = Literal["octave", "third"]
 
 
@@ -590,6 +587,91 @@ class TwoMass(Group):
     belt_damping: float = 0.2
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RectangularFloor(Group):
+    """What all floors of rectangular plates have.
+
+    Attributes
+    ----------
+    source_x : float
+        Relative source position along the length; statistical levels in the room are means; 0 <
+        source_x < 1.
+    source_y : float
+        Relative source position along the width; 0 < source_y < 1.
+    support : str
+        Support of the edges; "simple", "clamped", "free", "elastic".
+    support_stiffness : sequence of float
+        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
+        y at 0 and width), N/m2; 0 <= support_stiffness <= 1e+14.
+    support_rotation : sequence of float
+        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
+        support_rotation <= 1e+14.
+    line_x : sequence of float
+        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
+    line_y : sequence of float
+        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
+    screed_thickness : float
+        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
+    screed_density : float
+        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
+    screed_wave_speed : float
+        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
+    screed_loss_factor : float
+        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
+    layer_stiffness : float
+        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
+        layer_stiffness <= 1e+12.
+    layer_loss_factor : float
+        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
+    screed_edges : str
+        Edges of the floating plate; "simple", "free", "strip".
+    strip_stiffness : float
+        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
+        strip_stiffness <= 1e+12.
+    bridge_x : sequence of float
+        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
+    bridge_y : sequence of float
+        Positions along the width of these bridges, m; 0 < bridge_y < 100.
+    bridge_stiffness : float
+        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
+    covering_stiffness : float
+        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
+    covering_loss_factor : float
+        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
+    covering_improvement : sequence of float
+        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
+        third octaves 50 to 630 Hz, dB; -30 <= covering_improvement <= 60.
+    point_x : sequence of float
+        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Positions of these points along the width, m; 0 <= point_y <= 1000.
+    """
+
+    source_x: float = 0.5
+    source_y: float = 0.5
+    support: RectangularFloorSupport = "simple"
+    support_stiffness: Sequence[float] = ()
+    support_rotation: Sequence[float] = ()
+    line_x: Sequence[float] = ()
+    line_y: Sequence[float] = ()
+    screed_thickness: float = 0.0
+    screed_density: float = 2000.0
+    screed_wave_speed: float = 3500.0
+    screed_loss_factor: float = 0.03
+    layer_stiffness: float = 10000000.0
+    layer_loss_factor: float = 0.1
+    screed_edges: RectangularFloorScreedEdges = "simple"
+    strip_stiffness: float = 1000000.0
+    bridge_x: Sequence[float] = ()
+    bridge_y: Sequence[float] = ()
+    bridge_stiffness: float = 100000000.0
+    covering_stiffness: float = 0.0
+    covering_loss_factor: float = 0.2
+    covering_improvement: Sequence[float] = ()
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Rigid(Group):
     """Floor ``rigid``."""
@@ -632,8 +714,8 @@ class Oscillator(Group):
 
 
 @dataclass(frozen=True, eq=False)
-class Plate(Group):
-    """Floor ``plate``.
+class Plate(RectangularFloor):
+    """Floor ``plate``, with all keys of `RectangularFloor`.
 
     Attributes
     ----------
@@ -660,58 +742,6 @@ class Plate(Group):
     edge_absorption : float
         Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
         <= 1000.
-    source_x : float
-        Relative source position along the length; statistical levels in the room are means; 0 <
-        source_x < 1.
-    source_y : float
-        Relative source position along the width; 0 < source_y < 1.
-    support : str
-        Support of the edges; "simple", "clamped", "free", "elastic".
-    support_stiffness : sequence of float
-        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
-        y at, N/m2; 0 <= support_stiffness <= 1e+14.
-    support_rotation : sequence of float
-        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
-        support_rotation <= 1e+14.
-    line_x : sequence of float
-        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
-    line_y : sequence of float
-        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
-    screed_thickness : float
-        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
-    screed_density : float
-        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
-    screed_wave_speed : float
-        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
-    screed_loss_factor : float
-        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
-    layer_stiffness : float
-        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
-        layer_stiffness <= 1e+12.
-    layer_loss_factor : float
-        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
-    screed_edges : str
-        Edges of the floating plate; "simple", "free", "strip".
-    strip_stiffness : float
-        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
-        strip_stiffness <= 1e+12.
-    bridge_x : sequence of float
-        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
-    bridge_y : sequence of float
-        Positions along the width of these bridges, m; 0 < bridge_y < 100.
-    bridge_stiffness : float
-        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
-    covering_stiffness : float
-        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
-    covering_loss_factor : float
-        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
-    covering_improvement : sequence of float
-        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
-        third oct, dB; -30 <= covering_improvement <= 60.
-    point_x : sequence of float
-        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
-    point_y : sequence of float
-        Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -725,34 +755,11 @@ class Plate(Group):
     loss_factor: float = 0.005
     edges: PlateEdges = "building"
     edge_absorption: float = 0.0
-    source_x: float = 0.5
-    source_y: float = 0.5
-    support: PlateSupport = "simple"
-    support_stiffness: Sequence[float] = ()
-    support_rotation: Sequence[float] = ()
-    line_x: Sequence[float] = ()
-    line_y: Sequence[float] = ()
-    screed_thickness: float = 0.0
-    screed_density: float = 2000.0
-    screed_wave_speed: float = 3500.0
-    screed_loss_factor: float = 0.03
-    layer_stiffness: float = 10000000.0
-    layer_loss_factor: float = 0.1
-    screed_edges: PlateScreedEdges = "simple"
-    strip_stiffness: float = 1000000.0
-    bridge_x: Sequence[float] = ()
-    bridge_y: Sequence[float] = ()
-    bridge_stiffness: float = 100000000.0
-    covering_stiffness: float = 0.0
-    covering_loss_factor: float = 0.2
-    covering_improvement: Sequence[float] = ()
-    point_x: Sequence[float] = ()
-    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class LaminateFloor(Group):
-    """Floor ``laminate_floor``.
+class LaminateFloor(RectangularFloor):
+    """Floor ``laminate_floor``, with all keys of `RectangularFloor`.
 
     Attributes
     ----------
@@ -783,58 +790,6 @@ class LaminateFloor(Group):
         Mass without stiffness on the plate, as gravel, kg/m2; 0 <= added_mass <= 1000.
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
-    source_x : float
-        Relative source position along the length; statistical levels in the room are means; 0 <
-        source_x < 1.
-    source_y : float
-        Relative source position along the width; 0 < source_y < 1.
-    support : str
-        Support of the edges; "simple", "clamped", "free", "elastic".
-    support_stiffness : sequence of float
-        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
-        y at, N/m2; 0 <= support_stiffness <= 1e+14.
-    support_rotation : sequence of float
-        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
-        support_rotation <= 1e+14.
-    line_x : sequence of float
-        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
-    line_y : sequence of float
-        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
-    screed_thickness : float
-        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
-    screed_density : float
-        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
-    screed_wave_speed : float
-        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
-    screed_loss_factor : float
-        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
-    layer_stiffness : float
-        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
-        layer_stiffness <= 1e+12.
-    layer_loss_factor : float
-        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
-    screed_edges : str
-        Edges of the floating plate; "simple", "free", "strip".
-    strip_stiffness : float
-        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
-        strip_stiffness <= 1e+12.
-    bridge_x : sequence of float
-        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
-    bridge_y : sequence of float
-        Positions along the width of these bridges, m; 0 < bridge_y < 100.
-    bridge_stiffness : float
-        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
-    covering_stiffness : float
-        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
-    covering_loss_factor : float
-        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
-    covering_improvement : sequence of float
-        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
-        third oct, dB; -30 <= covering_improvement <= 60.
-    point_x : sequence of float
-        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
-    point_y : sequence of float
-        Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "laminate_floor"
@@ -850,34 +805,11 @@ class LaminateFloor(Group):
     density: float = 470.0
     added_mass: float = 0.0
     loss_factor: float = 0.03
-    source_x: float = 0.5
-    source_y: float = 0.5
-    support: LaminateFloorSupport = "simple"
-    support_stiffness: Sequence[float] = ()
-    support_rotation: Sequence[float] = ()
-    line_x: Sequence[float] = ()
-    line_y: Sequence[float] = ()
-    screed_thickness: float = 0.0
-    screed_density: float = 2000.0
-    screed_wave_speed: float = 3500.0
-    screed_loss_factor: float = 0.03
-    layer_stiffness: float = 10000000.0
-    layer_loss_factor: float = 0.1
-    screed_edges: LaminateFloorScreedEdges = "simple"
-    strip_stiffness: float = 1000000.0
-    bridge_x: Sequence[float] = ()
-    bridge_y: Sequence[float] = ()
-    bridge_stiffness: float = 100000000.0
-    covering_stiffness: float = 0.0
-    covering_loss_factor: float = 0.2
-    covering_improvement: Sequence[float] = ()
-    point_x: Sequence[float] = ()
-    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
-class JoistFloor(Group):
-    """Floor ``joist_floor``.
+class JoistFloor(RectangularFloor):
+    """Floor ``joist_floor``, with all keys of `RectangularFloor`.
 
     Attributes
     ----------
@@ -906,61 +838,9 @@ class JoistFloor(Group):
         connection <= 1.
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
-    source_x : float
-        Relative source position along the length; statistical levels in the room are means; 0 <
-        source_x < 1.
-    source_y : float
-        Relative source position along the width; 0 < source_y < 1.
     source_on : str
         Impact location: midway between the next joists, on the next joist, or exactly the
         position; "sheathing", "joist", "position".
-    support : str
-        Support of the edges; "simple", "clamped", "free", "elastic".
-    support_stiffness : sequence of float
-        Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
-        y at, N/m2; 0 <= support_stiffness <= 1e+14.
-    support_rotation : sequence of float
-        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
-        support_rotation <= 1e+14.
-    line_x : sequence of float
-        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
-    line_y : sequence of float
-        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
-    screed_thickness : float
-        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
-    screed_density : float
-        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
-    screed_wave_speed : float
-        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
-    screed_loss_factor : float
-        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
-    layer_stiffness : float
-        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
-        layer_stiffness <= 1e+12.
-    layer_loss_factor : float
-        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
-    screed_edges : str
-        Edges of the floating plate; "simple", "free", "strip".
-    strip_stiffness : float
-        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
-        strip_stiffness <= 1e+12.
-    bridge_x : sequence of float
-        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
-    bridge_y : sequence of float
-        Positions along the width of these bridges, m; 0 < bridge_y < 100.
-    bridge_stiffness : float
-        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
-    covering_stiffness : float
-        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
-    covering_loss_factor : float
-        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
-    covering_improvement : sequence of float
-        Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
-        third oct, dB; -30 <= covering_improvement <= 60.
-    point_x : sequence of float
-        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
-    point_y : sequence of float
-        Positions of these points along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "joist_floor"
@@ -976,30 +856,7 @@ class JoistFloor(Group):
     joist_modulus: float = 11000000000.0
     connection: float = 0.1
     loss_factor: float = 0.05
-    source_x: float = 0.5
-    source_y: float = 0.5
     source_on: JoistFloorSourceOn = "sheathing"
-    support: JoistFloorSupport = "simple"
-    support_stiffness: Sequence[float] = ()
-    support_rotation: Sequence[float] = ()
-    line_x: Sequence[float] = ()
-    line_y: Sequence[float] = ()
-    screed_thickness: float = 0.0
-    screed_density: float = 2000.0
-    screed_wave_speed: float = 3500.0
-    screed_loss_factor: float = 0.03
-    layer_stiffness: float = 10000000.0
-    layer_loss_factor: float = 0.1
-    screed_edges: JoistFloorScreedEdges = "simple"
-    strip_stiffness: float = 1000000.0
-    bridge_x: Sequence[float] = ()
-    bridge_y: Sequence[float] = ()
-    bridge_stiffness: float = 100000000.0
-    covering_stiffness: float = 0.0
-    covering_loss_factor: float = 0.2
-    covering_improvement: Sequence[float] = ()
-    point_x: Sequence[float] = ()
-    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -1422,7 +1279,7 @@ KEYS = (
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
-    Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at", (), 0.0, 100000000000000.0),
+    Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1439,7 +1296,7 @@ KEYS = (
     Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("plate", "plate", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("plate", "plate", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
-    Key("plate", "plate", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third oct", (), -30.0, 60.0),
+    Key("plate", "plate", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),
     Key("plate", "plate", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("plate", "plate", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("laminate_floor", "laminate_floor", "length", "real", "m", "length of the floor, along layers of 0 degrees", (), 0.5, 100.0),
@@ -1457,7 +1314,7 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
-    Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at", (), 0.0, 100000000000000.0),
+    Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1474,7 +1331,7 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
-    Key("laminate_floor", "laminate_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third oct", (), -30.0, 60.0),
+    Key("laminate_floor", "laminate_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),
     Key("laminate_floor", "laminate_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("laminate_floor", "laminate_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
@@ -1493,7 +1350,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
     Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
-    Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at", (), 0.0, 100000000000000.0),
+    Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1510,7 +1367,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "covering_stiffness", "real", "N/m", "stiffness of a covering under the source; 0: none", (), 0.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "covering_loss_factor", "real", "", "loss factor of the covering at 50 Hz", (), 0.01, 2.0),
-    Key("joist_floor", "joist_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third oct", (), -30.0, 60.0),
+    Key("joist_floor", "joist_floor", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "limit of the mobility at high frequencies", (), 0.0, 1000.0),

@@ -12,7 +12,7 @@ from thud.base.checks import refuse, refuse_unknown
 from thud.base.immutable import Plain
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Iterator
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -87,10 +87,19 @@ def _names(group: type[Group]) -> list[str]:
     return [option.name for option in fields(group)]  # type: ignore[arg-type]
 
 
+def _groups(base: type[Group]) -> Iterator[type[Group]]:
+    """Return the classes of groups below a base that have no class below them."""
+    for group in base.__subclasses__():
+        if group.__subclasses__():
+            yield from _groups(group)
+        else:
+            yield group
+
+
 def require_keywords(label: str, keywords: Collection[str], allowed: Collection[str]) -> None:
     """Raise InputError for an unknown keyword; its message names the classes with that field."""
     unknown = [word for word in keywords if word not in allowed]
-    keys = {group.__name__: _names(group) for group in Group.__subclasses__()} if unknown else {}
+    keys = {group.__name__: _names(group) for group in _groups(Group)} if unknown else {}
     for word in unknown:
         if owners := [name for name, names in keys.items() if word in names]:
             refuse(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import QUANTITIES, RATINGS, SAMPLE_QUANTITIES, FiniteElement
+from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.case.case import tables_case
@@ -248,15 +248,23 @@ def _room(impact: Impact) -> Answer:
     return {
         "frequency": _to_json(prediction.frequency),
         "level": _to_json(prediction.level),
+        "modal_level": _to_json(prediction.modal_level[: prediction.n_modal]),
         "ratings": _ratings_text(prediction),
         "warnings": list(prediction.warnings),
     }
 
 
 def _ratings_text(prediction: RoomPrediction) -> str:
-    """Return the ratings by name, the class and the verdict on a requirement."""
-    words = [f"{title} {prediction.ratings[name].rounded} dB" for name, title in RATINGS.items()]
-    words[0] += f", {class_text(prediction.octave_rating.korean_class or 0)}"
+    """Return the ratings, the class and the verdict on a requirement."""
+    both = f"statistical {prediction.rating.rounded} dB"
+    if prediction.n_modal:
+        both += f", by modes {prediction.modal_rating.rounded} dB"
+    octaves = prediction.octave_rating
+    words = [
+        f"L_iA,Fmax {prediction.rated_text} (ISO 717-2), {both}",
+        f"octaves {octaves.rounded} dB (KS F 2863-2), {class_text(octaves.korean_class or 0)}",
+        f"standardized {prediction.standardized_rating.rounded} dB (ISO 16283-2)",
+    ]
     required = prediction.requirement
     return "; ".join([*words, *([str(required)] if required else [])])
 

@@ -51,7 +51,8 @@ class FloorComparison(Displayed, Page):
         """Return header and rows of text, with a column for each floor."""
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         titles = (
-            "", "floor", "force", *(f"{title}, dB" for title in RATINGS.values()),
+            "", "floor", "force", "mean of both predictions, L_iA,Fmax (ISO 717-2)",
+            "by modes, dB", *(f"statistical, {title}, dB" for title in RATINGS.values()),
             "required, dB", *octaves, "energy, 50 to 630 Hz, mJ",
             "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
@@ -80,7 +81,7 @@ class FloorComparison(Displayed, Page):
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
         items = self.predictions.items()
-        result = (f"{name} {prediction.rating.rounded} dB" for name, prediction in items)
+        result = (f"{name} {prediction.rated_text}" for name, prediction in items)
         return f"<FloorComparison: {', '.join(result)}>"
 
 
@@ -127,6 +128,8 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         name,
         prediction.floor.name.replace("_", " "),
         prediction.force,
+        prediction.rated_text,
+        str(prediction.modal_rating.rounded) if prediction.n_modal else "",
         *(_rated(rating) for rating in prediction.ratings.values()),
         _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
@@ -147,8 +150,7 @@ def _required(prediction: RoomPrediction) -> str:
     required = prediction.requirement
     if required is None:
         return ""
-    verdict = "met" if required.met else "not met"
-    return f"{required.required:g} ({required.rating}): {verdict}"
+    return f"{required.required:g} ({required.rating}): {required.verdict}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:

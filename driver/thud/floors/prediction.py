@@ -84,6 +84,12 @@ class RoomPrediction(RoomLevel, Displayed):
         return self.n_modal > 0 and hasattr(self.floor, "support")
 
     @property
+    def rated_text(self) -> str:
+        """Mean rating of both predictions with its interval, such as ``"57 dB (55 to 60)"``."""
+        low, high = self.interval
+        return f"{self.rated:.0f} dB ({low:.0f} to {high:.0f})"
+
+    @property
     def radiated_share(self) -> Array:
         """Fraction of the energy loss of the floor that is radiated into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
@@ -113,8 +119,10 @@ class RoomPrediction(RoomLevel, Displayed):
         room = self.room
         if not room.required:
             return None
-        level = self.ratings[room.required_rating].rounded
-        return Requirement(room.required_rating, room.required, level)
+        shift = self.ratings[room.required_rating].a_weighted - self.rating.a_weighted
+        low, high = self.interval
+        ends = low + shift, high + shift
+        return Requirement(room.required_rating, room.required, self.rated + shift, ends)
 
     @property
     def standardized(self) -> Array:
@@ -195,12 +203,11 @@ class RoomPrediction(RoomLevel, Displayed):
 
     def __repr__(self) -> str:
         """Return the single-number ratings."""
-        low, high = self.interval
         octaves = self.octave_rating
         required = self.requirement
         modal = f"modal {self.modal_rating.rounded} dB" if self.n_modal else "no modal prediction"
         return (
-            f"<RoomPrediction: L_iA,Fmax {self.rated:.0f} dB ({low:.0f} to {high:.0f}; ISO 717-2), "
+            f"<RoomPrediction: L_iA,Fmax {self.rated_text}, ISO 717-2; "
             f"statistical {self.rating.rounded} dB, {modal}; octaves "
             f"{octaves.rounded} dB (KS F 2863-2, class {CLASSES[octaves.korean_class or 0]}), "
             f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -73,31 +74,45 @@ class Rating(Displayed):
 
 @dataclass(frozen=True)
 class Requirement:
-    """Requirement on the level in the room below, and whether it is met.
+    """Requirement on the level in the room below, and the verdict on it.
 
     Attributes
     ----------
     rating : str
         Rating that it refers to: ``"octaves"``, ``"thirds"`` or ``"standardized"``.
-    required, level : float and int
-        Maximum rating, and the rounded rating of the prediction, dB.
-    met : bool
-        Whether the rating is at most the required one.
+    required, level : float
+        Maximum rating, and the mean rating of both predictions, dB.
+    interval : tuple of float
+        Ends of the interval of that rating, dB.
+    verdict : str
+        ``"met"``, ``"not met"``, or ``"undecided"`` if the interval, rounded, holds both.
     """
 
     rating: RoomRequiredRating
     required: float
-    level: int
+    level: float
+    interval: tuple[float, float]
 
     @property
-    def met(self) -> bool:
-        """Whether the rounded rating is at most the required one."""
-        return self.level <= self.required
+    def verdict(self) -> Literal["met", "not met", "undecided"]:
+        """Whether all levels of the interval, rounded, are at most the required one."""
+        low, high = map(_rounded, self.interval)
+        if high <= self.required:
+            return "met"
+        return "not met" if low > self.required else "undecided"
 
     def __str__(self) -> str:
         """Return rating, requirement and verdict in words."""
-        verdict = "met" if self.met else "not met"
-        return f"{RATINGS[self.rating]}: {self.level} dB, required {self.required:g} dB, {verdict}"
+        low, high = map(_rounded, self.interval)
+        return (
+            f"{RATINGS[self.rating]}: {_rounded(self.level)} dB ({low} to {high}), required "
+            f"{self.required:g} dB, {self.verdict}"
+        )
+
+
+def _rounded(level: float) -> int:
+    """Return a level rounded half up."""
+    return math.floor(level + 0.5)
 
 
 def class_text(korean_class: int) -> str:

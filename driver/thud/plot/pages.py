@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from thud.base._schema import CLASS_LIMITS, RATINGS
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
@@ -293,7 +292,10 @@ _STEPS = {
 
 @own_style()
 def draw_floors(comparison: FloorComparison) -> Figure:
-    """Draw spectra of the steps from force to room, ratings with class limits, and the table."""
+    """Draw spectra of the steps from force to room, ratings with intervals, and the table.
+
+    The last spectrum is that of both predictions; that by modes is thin.
+    """
     figure = new_figure(7.2, 2 * WIDTH)
     grid = figure.add_gridspec(4, 2)
     panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
@@ -303,13 +305,17 @@ def draw_floors(comparison: FloorComparison) -> Figure:
                 np.arange(len(values)), values, label=escape_label(name), **line_style(i),
                 **marker_style(i, 3.5),
             )  # fmt: skip
+        panels[-1].plot(
+            np.arange(prediction.n_modal), prediction.modal_level[: prediction.n_modal],
+            **line_style(i) | {"linewidth": 0.8},
+        )  # fmt: skip
     nominal = next(iter(comparison.predictions.values())).frequency
     for axes, (label, logarithmic) in zip(panels, _STEPS.items(), strict=True):
         band_axis(axes, nominal, "third")
         axes.set_ylabel(label)
         if logarithmic:
             axes.set_yscale("log")
-    _draw_classes(figure.add_subplot(grid[2, :]), comparison)
+    _draw_ratings(figure.add_subplot(grid[2, :]), comparison)
     legend_above(panels[0])
     _add_table(figure, grid, comparison.rows())
     return figure
@@ -326,6 +332,12 @@ def floors_html(comparison: FloorComparison) -> str:
             step.append(
                 {**style, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
             )
+        modal = curve_points(
+            names[: prediction.n_modal], prediction.modal_level[: prediction.n_modal]
+        )
+        traces[-1].append(
+            {**curve_style(i, f"{name}, by modes"), "mode": "lines", **modal, "showlegend": False}
+        )
     plots = [
         {
             "data": data,
@@ -337,8 +349,8 @@ def floors_html(comparison: FloorComparison) -> str:
     ]
     text = (
         "Levels in the room below, and the chain that leads to them: force, energy, floor, room. "
-        "They are statistical means over positions, floors and rooms; see the warnings of each "
-        "prediction."
+        "Lines with marks are statistical means over positions, floors and rooms; thin lines are "
+        "levels by the modes of floor and room. See the warnings of each prediction."
     )
     # The first plot has the full width: the level in the room.
     return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
@@ -350,27 +362,28 @@ def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
     return force, prediction.energy, 100 * prediction.radiated_share, prediction.level
 
 
-def _draw_classes(axes: Axes, comparison: FloorComparison) -> None:
-    """Draw the ratings of floors by each standard, and the limits of the Korean classes."""
-    x = np.arange(len(comparison.predictions))
-    width = 0.8 / len(RATINGS)
-    levels = [
-        [prediction.ratings[name].a_weighted for prediction in comparison.predictions.values()]
-        for name in RATINGS
-    ]
-    styles = ((COLORS[5], ""), ("0.75", ".."), ("white", "////"))
-    for i, (title, values) in enumerate(zip(RATINGS.values(), levels, strict=True)):
-        axes.bar(
-            x + (i - (len(RATINGS) - 1) / 2) * width, values, 0.9 * width, edgecolor="black",
-            linewidth=0.5, label=title, color=styles[i][0], hatch=styles[i][1],
-        )  # fmt: skip
-    for number, limit in enumerate(CLASS_LIMITS, 1):
-        axes.axhline(limit, color=COLORS[1], linewidth=0.8, linestyle="--")
-        axes.annotate(
-            f"class {number}", (1, limit), xycoords=("axes fraction", "data"), ha="left",
-            va="center", fontsize="x-small", color=COLORS[1],
+def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:
+    """Draw the rating of each floor with its interval, and the ratings of both predictions."""
+    predictions = list(comparison.predictions.values())
+    x = np.arange(len(predictions))
+    rated = np.array([prediction.rated for prediction in predictions])
+    ends = np.array([prediction.interval for prediction in predictions]).T
+    axes.errorbar(
+        x, rated, abs(ends - rated), fmt="o", color="black", capsize=4, markersize=5,
+        label="mean of both predictions, with interval",
+    )  # fmt: skip
+    for i, (title, ratings) in enumerate(
+        {
+            "statistical": [prediction.rating for prediction in predictions],
+            "by modes": [prediction.modal_rating for prediction in predictions],
+        }.items()
+    ):
+        levels = [rating.a_weighted for rating in ratings]
+        axes.plot(
+            x + 0.1 * (2 * i - 1), levels, "s^"[i], markersize=5, markerfacecolor="white",
+            color=COLORS[i], label=title,
         )  # fmt: skip
     axes.set_xticks(x, [escape_label(name) for name in comparison.predictions], rotation=20)
-    axes.set_ylabel("Rating, dB; classes: KS F 2863-2")
-    axes.set_ylim(bottom=min([CLASS_LIMITS[0], *np.ravel(levels)]) - 5)
-    axes.legend(ncols=2, loc="lower left", bbox_to_anchor=(0, 1))
+    axes.set_xlim(-0.5, len(x) - 0.5)
+    axes.set_ylabel(r"$L_\mathrm{iA,Fmax}$ (ISO 717-2), dB")
+    axes.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))

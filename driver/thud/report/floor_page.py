@@ -128,7 +128,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
     prediction = floor.prediction
     low, high = prediction.interval
     body = BODY.substitute(
-        rating=escaped(floor.rated_text),
+        rating=escaped(floor.prediction.rated_text),
         box="<br>".join(map(_with_index, _box(floor))),
         name=escaped(floor.name),
         section=_figure(section, "s"),
@@ -270,7 +270,7 @@ def _about_model(floor: PredictedFloor) -> str:
         statistical=prediction.rating.rounded, modal=prediction.modal_rating.rounded
     )
     return ABOUT_MODEL.format(
-        interval=floor.rated_text,
+        interval=floor.prediction.rated_text,
         largest=floor.largest,
         predictions=both if prediction.n_modal else ABOUT_ONE,
     )

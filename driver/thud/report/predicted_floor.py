@@ -112,12 +112,6 @@ class PredictedFloor:
         return tuple(_case_layers(self.prediction))
 
     @property
-    def rated_text(self) -> str:
-        """Rating with its interval, such as ``"57 dB (55 to 60)"``."""
-        low, high = self.prediction.interval
-        return f"{self.prediction.rated:.0f} dB ({low:.0f} to {high:.0f})"
-
-    @property
     def contributions(self) -> dict[str, tuple[float, float]]:
         """Lower and upper deviation from the rating, dB, the largest contribution first.
 
@@ -143,7 +137,7 @@ class PredictedFloor:
         mean = f"{predictions}, with interval"
         octaves = prediction.octave_rating
         result = [
-            (mean, "ISO 717-2", prediction.rated, self.rated_text),
+            (mean, "ISO 717-2", prediction.rated, prediction.rated_text),
             _rating_entry("statistical prediction", "ISO 717-2", prediction.level),
         ]
         if prediction.n_modal:

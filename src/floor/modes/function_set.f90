@@ -7,10 +7,10 @@ module thud_function_set
    implicit none (type, external)
    private
 
-   public :: function_set_type, get_functions, get_overlap, get_quadrature, new_cosines, new_polynomials, new_sines
-   public :: new_splines
+   public :: cosines, function_set_type, get_functions, get_overlap, get_quadrature, new_polynomials, new_splines, sines
 
-   !> Kinds of functions.
+   !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
+   !> rotations of simply supported plates, polynomials, and splines.
    integer, parameter :: sines = 1, cosines = 2, polynomials = 3, splines = 4
 
    !> Minimum number of nodes of a spline.
@@ -33,28 +33,6 @@ module thud_function_set
    end type function_set_type
 
 contains
-
-   !> sqrt(2/length) sin(i pi x/length), i = 1 to count: deflections of simply supported plates.
-   pure function new_sines(length, count) result(set)
-      !> Length, m.
-      real(wp), intent(in) :: length
-      !> Number of functions.
-      integer, intent(in) :: count
-      type(function_set_type) :: set
-
-      set = function_set_type(sines, length, count)
-   end function new_sines
-
-   !> sqrt(2/length) cos(i pi x/length), i = 1 to count: rotations of simply supported plates.
-   pure function new_cosines(length, count) result(set)
-      !> Length, m.
-      real(wp), intent(in) :: length
-      !> Number of functions.
-      integer, intent(in) :: count
-      type(function_set_type) :: set
-
-      set = function_set_type(cosines, length, count)
-   end function new_cosines
 
    !> Polynomials up to a degree that fulfill constraints: at each position, the derivative of the given order is 0.
    !>

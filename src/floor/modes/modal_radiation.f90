@@ -75,7 +75,7 @@ contains
       type(modal_radiation_type), intent(out) :: radiation
       !> Strike points, relative to length and width (default: a mean over the floor): [2, n].
       real(wp), intent(in), optional :: stated_strike(:, :)
-      real(wp), allocatable :: strike(:, :), all_drives(:, :), drive(:, :), square(:), omega(:), loss_factor(:)
+      real(wp), allocatable :: strike(:, :), all_drives(:, :), drive(:, :)
       integer, allocatable :: kept(:)
       real(wp) :: power, velocity, total
       integer :: i, k
@@ -96,15 +96,8 @@ contains
          ! Of so many modes, those far from the band matter little.
          if (size(kept) > max_modes) kept = pack(kept, modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio &
             .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
-         omega = modes%omega(kept)
-         loss_factor = modes%loss_factor(kept)
-         if (allocated(all_drives)) then
-            drive = all_drives(kept, :)
-            call add_strikes(modes, kept, omega, loss_factor, drive, air, bands(i), area, power, velocity, total)
-         else
-            square = get_square_shapes(modes, kept)
-            call add_modes(modes, kept, omega, loss_factor, square, air, bands(i), area, power, velocity, total)
-         end if
+         if (allocated(all_drives)) drive = all_drives(kept, :)
+         call add_band(modes, kept, air, bands(i), area, power, velocity, total, drive)
          if (.not. velocity > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
             ! A plate without modes there, or without known ones.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
@@ -119,86 +112,57 @@ contains
       end do
    end subroutine get_modal_radiation
 
-   !> Sums of a band over frequencies and strike points, with the cross terms of the modes.
-   subroutine add_strikes(modes, kept, omega, loss_factor, drive, air, band, area, power, velocity, total)
+   !> Sums of a band over its frequencies: over the strike points with the cross terms of the modes or, without strike
+   !> points, the mean over all of them for modes that are orthogonal.
+   subroutine add_band(modes, kept, air, band, area, power, velocity, total, drive)
       type(floor_modes_type), intent(in) :: modes
-      !> Numbers of the modes, their angular frequencies, rad/s, and loss factors: [n_mode].
+      !> Numbers of the modes: [n_mode].
       integer, intent(in) :: kept(:)
-      real(wp), intent(in) :: omega(:), loss_factor(:)
-      !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
-      real(wp), intent(in) :: drive(:, :)
       type(air_type), intent(in) :: air
       type(band_type), intent(in) :: band
       real(wp), intent(in) :: area(4)
       !> Sums of radiated power over rho0 c0 and of the squared velocity times area, m4/s2, and of their weights.
       real(wp), intent(out) :: power, velocity, total
+      !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
+      real(wp), intent(in), optional :: drive(:, :)
       type(transforms_type) :: transforms
       complex(wp), allocatable :: amplitude(:, :)
-      real(wp) :: ratio, frequency
-      real(wp) :: edge(2)
+      real(wp), allocatable :: square(:), resistance(:), response(:)
+      real(wp) :: omega(size(kept)), loss_factor(size(kept)), edge(2)
+      real(wp) :: ratio, frequency, w
       integer :: j, l, n
 
       power = 0.0_wp
       velocity = 0.0_wp
       total = 0.0_wp
+      omega = modes%omega(kept)
+      loss_factor = modes%loss_factor(kept)
+      if (.not. present(drive)) square = get_square_shapes(modes, kept)
       ratio = (band%upper/band%lower)**(1.0_wp/n_wavenumber)
       n = get_frequency_count(omega, loss_factor, band, ratio)
       do j = 1, n_wavenumber
          edge = band%lower*ratio**[j - 1, j]
          call get_transforms(modes, kept, area, 2*pi*sqrt(product(edge))/air%sound_speed, transforms)
+         if (.not. present(drive)) resistance = matmul(transforms%weight, sum(transforms%value**2, dim=3))
          do l = 1, n
             ! Geometric steps, whose widths are proportional to the frequency.
             frequency = edge(1)*ratio**((l - 0.5_wp)/n)
-            associate (w => 2*pi*frequency)
+            w = 2*pi*frequency
+            if (present(drive)) then
                amplitude = spread(cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*omega*loss_factor, wp), 2, &
                   size(drive, 2))*drive
-            end associate
-            power = power + frequency*get_power(transforms, amplitude)
-            velocity = velocity + frequency*get_square_velocity(modes, kept, amplitude)
-            total = total + frequency*size(drive, 2)
-         end do
-      end do
-   end subroutine add_strikes
-
-   !> Sums of a band over frequencies for modes that are orthogonal, averaged over all strike points.
-   subroutine add_modes(modes, kept, omega, loss_factor, square, air, band, area, power, velocity, total)
-      type(floor_modes_type), intent(in) :: modes
-      !> Numbers of the modes, their angular frequencies, rad/s, and loss factors: [n_mode].
-      integer, intent(in) :: kept(:)
-      real(wp), intent(in) :: omega(:), loss_factor(:)
-      !> Integrals of the squared shapes over the plate, m2/kg: [n_mode].
-      real(wp), intent(in) :: square(:)
-      type(air_type), intent(in) :: air
-      type(band_type), intent(in) :: band
-      real(wp), intent(in) :: area(4)
-      !> Sums as in `add_strikes`.
-      real(wp), intent(out) :: power, velocity, total
-      type(transforms_type) :: transforms
-      real(wp) :: resistance(size(kept)), response(size(kept))
-      real(wp) :: ratio, frequency
-      real(wp) :: edge(2)
-      integer :: j, l, n
-
-      power = 0.0_wp
-      velocity = 0.0_wp
-      total = 0.0_wp
-      ratio = (band%upper/band%lower)**(1.0_wp/n_wavenumber)
-      n = get_frequency_count(omega, loss_factor, band, ratio)
-      do j = 1, n_wavenumber
-         edge = band%lower*ratio**[j - 1, j]
-         call get_transforms(modes, kept, area, 2*pi*sqrt(product(edge))/air%sound_speed, transforms)
-         resistance = matmul(transforms%weight, sum(transforms%value**2, dim=3))
-         do l = 1, n
-            frequency = edge(1)*ratio**((l - 0.5_wp)/n)
-            associate (w => 2*pi*frequency)
+               power = power + frequency*get_power(transforms, amplitude)
+               velocity = velocity + frequency*get_square_velocity(modes, kept, amplitude)
+               total = total + frequency*size(drive, 2)
+            else
                response = square*w**2/((omega**2 - w**2)**2 + (w*omega*loss_factor)**2)
-            end associate
-            power = power + frequency*sum(response*resistance)
-            velocity = velocity + frequency*sum(response*square)
-            total = total + frequency*modes%stack%length*modes%stack%width
+               power = power + frequency*sum(response*resistance)
+               velocity = velocity + frequency*sum(response*square)
+               total = total + frequency*modes%stack%length*modes%stack%width
+            end if
          end do
       end do
-   end subroutine add_modes
+   end subroutine add_band
 
    !> Relative positions that fill a floor evenly (the R2 sequence of Roberts): [2, n].
    pure subroutine get_strike_points(n, strike)

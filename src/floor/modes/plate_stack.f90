@@ -4,7 +4,7 @@
 !> theory as static displacements. Its edges are held by springs against deflection and rotation, which may be rigid.
 module thud_plate_stack
    use thud_constants, only: pi
-   use thud_function_set, only: function_set_type, get_functions, get_overlap, new_cosines, new_polynomials, new_sines
+   use thud_function_set, only: cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
@@ -263,8 +263,8 @@ contains
       sides = [stack%length, stack%width]
       do i = 1, 2
          if (has_sines(plate, i)) then
-            deflection(i) = new_sines(sides(i), n(i))
-            rotation(i) = new_cosines(sides(i), n(i))
+            deflection(i) = function_set_type(sines, sides(i), n(i))
+            rotation(i) = function_set_type(cosines, sides(i), n(i))
             cycle
          end if
          lines = spread(0.0_wp, 1, 0)

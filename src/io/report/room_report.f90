@@ -7,7 +7,7 @@ module thud_room_report
    use thud_kinds, only: wp
    use thud_rating, only: class_limits, get_a_weighted_level, get_class, get_rounded, rating_names, rating_titles
    use thud_report, only: line
-   use thud_room, only: few_modes, meets_requirement, room_level_type
+   use thud_room, only: few_modes, get_required_interval, judge_requirement, room_level_type
    use thud_room_prediction, only: contribution_names
    use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, to_text
    implicit none (type, external)
@@ -122,8 +122,7 @@ contains
       integer :: i
 
       text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
-         //to_text(get_rounded(prediction%rated))//' dB ('//fixed(prediction%interval(1), 0)//' to ' &
-         //fixed(prediction%interval(2), 0)//'), statistical ' &
+         //to_text(get_rounded(prediction%rated))//' dB ('//get_range_text(prediction%interval)//'), statistical ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, '
       if (prediction%n_modal > 0) then
          text = text//'modal ' &
@@ -149,12 +148,21 @@ contains
          //' %, from the walls the rest.'//newline
       associate (room => case%room)
          if (room%required > 0.0_wp) text = text//'  Required of '//trim(room%required_rating)//': at most ' &
-            //to_text(room%required)//' dB: '//trim(merge('met    ', 'not met', meets_requirement(room, prediction))) &
-            //'.'//newline
+            //to_text(room%required)//' dB: '//trim(judge_requirement(room, prediction))//' (' &
+            //get_range_text(get_required_interval(room, prediction))//').'//newline
       end associate
       text = text//'  Statistical means over positions, by the ' &
          //trim(merge('contact force', 'blocked force', coupled))//'.'//newline
    end subroutine add_ratings
+
+   !> Ends of an interval of ratings, rounded as ratings are.
+   function get_range_text(ends) result(text)
+      !> The ends, dB: [2].
+      real(wp), intent(in) :: ends(2)
+      character(len=:), allocatable :: text
+
+      text = to_text(get_rounded(ends(1)))//' to '//to_text(get_rounded(ends(2)))
+   end function get_range_text
 
    !> The class of a rating, with the limit of the class.
    function get_class_text(rating) result(text)
@@ -185,7 +193,8 @@ contains
          //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none')
       if (case%room%required > 0.0_wp) text = text//line('required', to_text(case%room%required), 'dB') &
          //line('required_rating', quoted(case%room%required_rating), '') &
-         //line('met', to_text(meets_requirement(case%room, prediction)), '')
+         //line('required_interval', join(get_required_interval(case%room, prediction)), 'dB') &
+         //line('verdict', quoted(judge_requirement(case%room, prediction)), '')
       text = text//'/'//newline
    end function get_room_summary
 

@@ -30,7 +30,11 @@ export function show(variants, remove) {
   byId("room_section").hidden = !rooms.length;
   if (rooms.length) {
     plot(byId("room"), {
-      curves: rooms.map((variant) => bands(variant, variants.indexOf(variant), variant.answer.room)),
+      curves: rooms.flatMap((variant) => {
+        const [i, { room }] = [variants.indexOf(variant), variant.answer];
+        const modal = curve({ name: `${variant.name}, by modes` }, i, room.modal_level.map((_, k) => k), room.modal_level, { thin: true });
+        return [bands(variant, i, room), ...(room.modal_level.length ? [modal] : [])];
+      }),
       x: { title: "One-third-octave band", unit: "Hz", bands: names(rooms[0].answer.room) },
       y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
     });

@@ -1,0 +1,258 @@
+"""Sound of one impact in the room below a floor, from its predicted levels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from operator import itemgetter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import butter, resample, sosfilt
+
+from thud.base.checks import refuse_value, require_whole
+from thud.base.immutable import Immutable
+from thud.export.sound_levels import (
+    RATE,
+    REFERENCE_PRESSURE,
+    TIME_CONSTANT,
+    SoundLevels,
+    band_sections,
+    fast_histories,
+    get_deviation,
+    maximum_levels,
+    measured_levels,
+)
+from thud.floors.modal_room import positions_below
+from thud.floors.prediction import BANDS, RoomPrediction
+from thud.level.rating import rated_bands
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+# Samples per second of the sound, a multiple of those of its levels.
+RATIO = 8
+SAMPLE_RATE = RATIO * RATE
+# Order of the filters at the ends of the modal bands, and their frequencies over the band edges:
+# these attenuate neither edge much, nor does the sound beyond them exceed the predicted levels.
+ORDER = 16
+HIGH_PASS, LOW_PASS = 0.9, 1.03
+# Order of the filter of noise after its decay is applied.
+START_ORDER = 4
+# Fraction of the energy at which the sound ends.
+END = 1e-6
+# Maximum duration, s.
+MAX_SOUND = 30.0
+# Samples after the modal sound in which the filters decay.
+MARGIN = RATE // 10
+# Number of iterations of the gains of overlapping bands.
+ITERATIONS = 8
+# Deviation of octaves and A-weighted level below which a realization of the noise is used, dB, and
+# maximum number of realizations, of which the best is used otherwise.
+TOLERANCE = 0.25
+MAX_REALIZATIONS = 20
+# Deviation that raises a warning, dB.
+MAX_DEVIATION = 0.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FloorSound(Immutable):
+    """Sound of one impact in the room below a floor.
+
+    Attributes
+    ----------
+    name : str
+        Name of the floor.
+    prediction : RoomPrediction
+        The prediction that the sound represents.
+    n_modal : int
+        Number of bands, from the lowest, whose sound is that of the modes of floor and room; the
+        sound of the others is noise.
+    position : tuple of int or None
+        Numbers of the positions of ball and microphone, from 1; None without modal bands.
+    pressure : ndarray, shape (n_sample,)
+        Sound pressure, Pa, from the impact on.
+    level, reference : SoundLevels
+        Levels of the sound, and those that it should have: in modal bands the levels at the
+        position, in others the statistical ones.
+    """
+
+    name: str
+    prediction: RoomPrediction
+    n_modal: int
+    position: tuple[int, int] | None
+    pressure: Array
+    level: SoundLevels
+    reference: SoundLevels
+
+    def __repr__(self) -> str:
+        """Return the name of the floor, duration and level."""
+        duration = len(self.pressure) / SAMPLE_RATE
+        return f"<FloorSound {self.name}: {duration:.1f} s, L_AFmax {self.level.a_weighted:.1f} dB>"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on the prediction and on levels that deviate from it."""
+        result = list(self.prediction.warnings)
+        if self.prediction.n_modal and not self.n_modal:
+            result.append(
+                "the modes of the room do not include its walls and ceiling: the sound is noise "
+                "with the statistical levels in all bands"
+            )
+        if (deviation := get_deviation(self.level, self.reference)) > MAX_DEVIATION:
+            result.append(
+                f"the sound deviates from the prediction by {deviation:.1f} dB in an octave or in "
+                "the A-weighted level"
+            )
+        return tuple(f"{self.name}: {sentence}" for sentence in result)
+
+    @property
+    def description(self) -> str:
+        """Bands of the modal sound and of the noise."""
+        bands = rated_bands(BANDS)
+        parts = []
+        if self.position is not None:
+            parts.append(
+                f"modes of floor and room from {bands[0]:g} to {bands[self.n_modal - 1]:g} Hz at "
+                "ball position {} and microphone position {}".format(*self.position)
+            )
+        if self.n_modal < len(bands):
+            parts.append(f"noise from {bands[self.n_modal]:g} to {bands[-1]:g} Hz")
+        return ", ".join(parts)
+
+
+def new_floor_sound(
+    name: str, prediction: RoomPrediction, position: tuple[int, int] | None, seed: int
+) -> FloorSound:
+    """Return the sound of one floor; the arguments are those of `listen`."""
+    room = prediction.room
+    # The modes of the room do not include walls and ceiling.
+    n_modal = 0 if room.wall_lengths or room.ceiling_mass else prediction.n_modal
+    step = prediction.history_time[0]
+    square = _mean_square(prediction)
+    modal = np.zeros(0)
+    if n_modal:
+        position, modal = _modal_pressure(prediction, position)
+    else:
+        position = None
+    count = max(math.ceil(len(square) * step * RATE), len(modal) + MARGIN)
+    time = np.arange(1, count + 1) / RATE
+    modal = np.append(modal, np.zeros(count - len(modal)))
+    histories = REFERENCE_PRESSURE**2 * 10 ** (prediction.history / 10)
+    target = _interpolated(time, prediction.history_time, histories)
+    target[:n_modal] = fast_histories(modal, range(n_modal))
+    reference = maximum_levels(target)
+    modal = _limited(modal, n_modal)
+    middle = (np.arange(len(square)) + 0.5) * step
+    envelopes = np.sqrt(_interpolated(time, middle, square[:, n_modal:]))
+    # What the filter has removed may decay longest.
+    audible = np.flatnonzero((modal**2 > END * (modal**2).max()) | envelopes.any(axis=0))
+    end = audible[-1] + 1
+    pressure, level = _realization(modal[:end], envelopes[:, :end], reference, seed)
+    pressure = resample(pressure, RATIO * len(pressure))
+    return FloorSound(name, prediction, n_modal, position, pressure, level, reference)
+
+
+def _interpolated(time: Array, known_time: Array, values: Array) -> Array:
+    """Return columns of values at other times, as rows; zero at the impact and after the end."""
+    known_time = np.append(0.0, known_time)
+    rows = [np.interp(time, known_time, np.append(0.0, column), right=0.0) for column in values.T]
+    return np.array(rows).reshape(-1, len(time))
+
+
+def _realization(
+    modal: Array, envelopes: Array, reference: SoundLevels, seed: int
+) -> tuple[Array, SoundLevels]:
+    """Return the pressure with noise whose levels are near the reference, Pa, and its levels."""
+    tried = []
+    for i in range(MAX_REALIZATIONS if len(envelopes) else 1):
+        pressure = _with_noise(modal, envelopes, reference, (seed, i))
+        level = measured_levels(pressure)
+        tried.append((get_deviation(level, reference), pressure, level))
+        if tried[-1][0] < TOLERANCE:
+            break
+    _, pressure, level = min(tried, key=itemgetter(0))
+    return pressure, level
+
+
+def _mean_square(prediction: RoomPrediction) -> Array:
+    """Return the mean-square pressure of each band, Pa2, in steps of the history, until it is over.
+
+    It is the constant input in each step that gives the Fast detector the predicted history.
+    """
+    step = prediction.history_time[0]
+    kept = math.exp(-step / TIME_CONSTANT)
+    output = REFERENCE_PRESSURE**2 * 10 ** (prediction.history / 10)
+    before = np.vstack([np.zeros_like(output[:1]), output[:-1]])
+    square = np.maximum((output - kept * before) / (1 - kept), 0.0)
+    # The history ends 30 dB below the maximum of the slowest band; its last decay continues.
+    end = END * square.max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decay = np.log(square[-2] / square[-1])
+        steps = np.where(square[-1] > end, np.log(square[-1] / end) / decay, 0.0)
+    steps = np.where(np.isfinite(steps) & (steps > 0), steps, 0.0)
+    count = math.ceil(min(steps.max(), MAX_SOUND / step))
+    more = np.arange(1, count + 1)[:, None]
+    tail = np.where(steps > 0, square[-1] * np.exp(-more * np.where(steps > 0, decay, 0.0)), 0.0)
+    return np.vstack([square, tail])
+
+
+def _modal_pressure(
+    prediction: RoomPrediction, position: tuple[int, int] | None
+) -> tuple[tuple[int, int], Array]:
+    """Return the numbers of a position and the sound pressure of the modes there, Pa, at `RATE`."""
+    room = positions_below(prediction)
+    if position is None:
+        distance = ((room.level - room.mean) ** 2).sum(axis=2)
+        # Positions that are equal by symmetry differ by rounding: the first of them is chosen.
+        i, j = np.unravel_index(distance.round(6).argmin(), distance.shape)
+        position = int(i) + 1, int(j) + 1
+    if not isinstance(position, list | tuple) or len(position) != 2:  # noqa: PLR2004
+        refuse_value("position", position, "the numbers of the positions of ball and microphone")
+    require_whole("position: ball", position[0], 1, len(room.balls))
+    require_whole("position: microphone", position[1], 1, len(room.microphones))
+    pressure = room.pressure[position[0] - 1, position[1] - 1]
+    # The record is periodic.
+    samples = resample(pressure, round(len(pressure) * RATE / room.sample_rate))
+    return (position[0], position[1]), np.asarray(samples)
+
+
+def _limited(modal: Array, n_modal: int) -> Array:
+    """Return the modal pressure in its bands only: below 50 Hz it may be much louder."""
+    if not n_modal:
+        return modal
+    _, lower, upper = band_sections()
+    edges = HIGH_PASS * lower[0], LOW_PASS * upper[n_modal - 1]
+    for edge, kind, order in zip(edges, ("highpass", "lowpass"), (ORDER // 2, ORDER), strict=True):
+        modal = sosfilt(butter(order, edge, kind, fs=RATE, output="sos"), modal)
+    return modal
+
+
+def _with_noise(
+    modal: Array, envelopes: Array, reference: SoundLevels, seed: tuple[int, int]
+) -> Array:
+    """Return the modal pressure and the noise in the bands above, Pa, shape (n_sample,).
+
+    `envelopes` are the root-mean-square pressures in these bands, Pa, shape (n_noise, n_sample).
+    """
+    _, lower, upper = band_sections()
+    n_band, n_sample = len(lower), len(modal)
+    indices = range(n_band - len(envelopes), n_band)
+    white = np.fft.rfft(np.random.default_rng(seed).standard_normal(n_sample))
+    frequency = np.fft.rfftfreq(n_sample, 1 / RATE)
+    noise = np.empty_like(envelopes)
+    for row, band in enumerate(indices):
+        inside = (lower[band] <= frequency) & (frequency < upper[band])
+        samples = np.fft.irfft(white * inside, n_sample)
+        # This filter removes what the sudden start of the noise adds to other bands.
+        start = butter(START_ORDER, (lower[band], upper[band]), "bandpass", fs=RATE, output="sos")
+        noise[row] = sosfilt(start, envelopes[row] * samples / np.sqrt(np.mean(samples**2)))
+    gain = np.ones(len(noise))
+    for _ in range(ITERATIONS if len(noise) else 0):
+        maximum = fast_histories(modal + gain @ noise, indices).max(axis=1)
+        gain *= 10 ** (reference.third[indices.start :] / 20) / np.sqrt(
+            maximum / REFERENCE_PRESSURE**2
+        )
+    return np.asarray(modal + gain @ noise)

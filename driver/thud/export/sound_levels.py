@@ -1,0 +1,115 @@
+"""Maximum Fast levels of a sound pressure in the rated one-third-octave bands."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import lfilter, sosfilt
+
+from thud.base.immutable import Immutable
+from thud.floors.prediction import BANDS
+from thud.level.levels import get_bands
+from thud.level.rating import MAX_LEVEL, rated_bands, rating
+from thud.recordings.filters import band_filters
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+# Samples per second of the levels, which contain frequencies up to 1 kHz.
+RATE = 6000
+# Time constant of the Fast detector, s, and reference sound pressure, Pa.
+TIME_CONSTANT = 0.125
+REFERENCE_PRESSURE = 2e-5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SoundLevels(Immutable):
+    """Maximum Fast levels of a sound, dB re 20 uPa.
+
+    Attributes
+    ----------
+    third : ndarray, shape (12,)
+        Levels of the one-third-octave bands 50 to 630 Hz.
+    octave : ndarray, shape (4,)
+        Levels of the octaves 63 to 500 Hz; each is the maximum of the sum of its bands.
+    a_weighted : float
+        A-weighted level L_AFmax; as a reference, the maximum of the A-weighted sum of all bands.
+    """
+
+    third: Array
+    octave: Array
+    a_weighted: float
+
+    def __repr__(self) -> str:
+        """Return the A-weighted level."""
+        return f"<SoundLevels: L_AFmax {self.a_weighted:.1f} dB>"
+
+
+def fast_histories(pressure: Array, indices: Sequence[int]) -> Array:
+    """Return the squared pressure after the Fast detector in bands, Pa2, (n_band, n_sample)."""
+    sections, _, _ = band_sections()
+    rows = [_fast_history(sosfilt(sections[band], pressure)) for band in indices]
+    return np.array(rows).reshape(-1, len(pressure))
+
+
+def _fast_history(pressure: Array) -> Array:
+    """Return the squared pressure after the Fast detector, Pa2, shape (n_sample,)."""
+    kept = math.exp(-1 / (TIME_CONSTANT * RATE))
+    return np.asarray(lfilter([1 - kept], [1, -kept], pressure**2))
+
+
+def measured_levels(pressure: Array) -> SoundLevels:
+    """Return the levels of a sound pressure, Pa, shape (n_sample,)."""
+    level = maximum_levels(fast_histories(pressure, range(len(_weights()))))
+    # The weighting between the mid frequencies is interpolated.
+    bands = np.log(rated_bands(BANDS))
+    frequency = np.log(np.maximum(np.fft.rfftfreq(len(pressure), 1 / RATE), 1.0))
+    gain = np.exp(np.interp(frequency, bands, np.log(_weights()) / 2))
+    weighted = _fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)))
+    return replace(level, a_weighted=float(_level(weighted)))
+
+
+@lru_cache
+def band_sections() -> tuple[Array, Array, Array]:
+    """Return the filters of the rated one-third-octave bands, and their lower and upper edges."""
+    bands = get_bands(BANDS)
+    rated = np.isin(bands.nominal, rated_bands(BANDS))
+    return band_filters(BANDS, RATE)[rated], bands.lower[rated], bands.upper[rated]
+
+
+@lru_cache
+def _weights() -> Array:
+    """Return the factors of the A-weighting in the rated one-third-octave bands."""
+    n_band = len(rated_bands(BANDS))
+    alone = np.where(np.eye(n_band) > 0, 0.0, -MAX_LEVEL)
+    return np.array([10 ** (rating(levels, BANDS).a_weighted / 10) for levels in alone])
+
+
+def maximum_levels(histories: Array) -> SoundLevels:
+    """Return the maximum levels of histories of the squared pressure, Pa2, (12, n_sample)."""
+    octaves = histories.reshape(-1, 3, histories.shape[1]).sum(axis=1)
+    weighted = _weights() @ histories
+    return SoundLevels(_level(histories), _level(octaves), float(_level(weighted)))
+
+
+def _level(history: Array) -> Array:
+    """Return the maximum levels of histories of the squared pressure, dB."""
+    return np.asarray(10 * np.log10(history.max(axis=-1) / REFERENCE_PRESSURE**2))
+
+
+def summary(level: SoundLevels) -> Array:
+    """Return the levels of the octaves and the A-weighted level, dB."""
+    return np.append(level.octave, level.a_weighted)
+
+
+def get_deviation(level: SoundLevels, reference: SoundLevels) -> float:
+    """Return the largest difference of octaves and A-weighted levels, dB."""
+    return float(abs(summary(level) - summary(reference)).max())
