@@ -65,6 +65,7 @@ from .floors.tapping import (
     TappingLevel as TappingLevel,
     tapping_level as tapping_level,
 )
+from .floors.write_floor_modes import write_floor_modes as write_floor_modes
 from .impact.compression import (
     CompressionCurve as CompressionCurve,
     compress as compress,
@@ -163,6 +164,7 @@ from .base._schema import (
     MeasuredMobility as MeasuredMobility,
     MeasuredModes as MeasuredModes,
     ModalBall as ModalBall,
+    ModalFloor as ModalFloor,
     ModelName as ModelName,
     ModelOptions as ModelOptions,
     Modes as Modes,

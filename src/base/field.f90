@@ -80,6 +80,8 @@ module thud_field
       logical :: whole_entries = .false.
       !> The key belongs to the resolution or the output, and is no property of the source.
       logical :: is_numerical = .false.
+      !> The text is the path of a file, relative to the directory of the case or to the current one.
+      logical :: is_path = .false.
       !> At the value 0 the key is derived from others.
       logical :: derived_at_zero = .false.
       !> Number of allowed texts; 0 for free text.

@@ -6,8 +6,8 @@ module thud_new_field
    implicit none (type, external)
    private
 
-   public :: choice_field, in_group, integer_field, list_field, logical_field, owned_by, real_field, text_field, &
-      text_list_field
+   public :: choice_field, in_group, integer_field, list_field, logical_field, owned_by, path_field, real_field, &
+      text_field, text_list_field
 
 contains
 
@@ -75,6 +75,17 @@ contains
       field = field_type(key=key, meaning=meaning)
       field%text_value => variable
    end function text_field
+
+   !> Describes a key with the path of a file.
+   function path_field(key, variable, meaning) result(field)
+      character(len=*), intent(in) :: key
+      character(len=name_length), intent(in), target :: variable
+      character(len=*), intent(in) :: meaning
+      type(field_type) :: field
+
+      field = text_field(key, variable, meaning)
+      field%is_path = .true.
+   end function path_field
 
    !> Describes a key with a list of free texts.
    function text_list_field(key, variable, meaning) result(field)

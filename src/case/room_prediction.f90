@@ -82,7 +82,7 @@ contains
          level = level - floor%get_improvement(size(bands))
          call floor%get_radiator(bands%center, plate, conductance, error)
          if (.not. allocated(error)) call check_below(plate, case%room, error)
-         if (.not. allocated(error)) call floor%get_room_modes(floor%get_support(), plate, modes, error)
+         if (.not. allocated(error)) call floor%get_radiating_modes(plate, modes, error)
          if (allocated(error)) return
          radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)
          if (case%room%radiation == modal_radiation .or. floor%has_modal_conductance()) then
@@ -189,17 +189,20 @@ contains
 
       box = get_box(room, plate, prediction%bands)
       call get_positions(room, box, ball, microphone)
-      call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., modal)
-      prediction%n_modal = modal%n_band
       allocate (prediction%modal_level, source=prediction%level)
       allocate (prediction%modal_spread, source=prediction%spread)
       allocate (prediction%mean_spread, source=prediction%spread/sqrt(real(size(ball, 2), wp)))
-      prediction%mean_spread(:modal%n_band) = modal%mean_spread
-      prediction%modal_level(:modal%n_band) = modal%mean + change(:modal%n_band)
-      prediction%modal_spread(:modal%n_band) = modal%spread
+      if (floor%has_room_modes()) then
+         call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., modal)
+         prediction%n_modal = modal%n_band
+         prediction%mean_spread(:modal%n_band) = modal%mean_spread
+         prediction%modal_level(:modal%n_band) = modal%mean + change(:modal%n_band)
+         prediction%modal_spread(:modal%n_band) = modal%spread
+      end if
       allocate (prediction%edge_level(size(prediction%level), 2), source=spread(prediction%modal_level, 2, 2))
+      if (prediction%n_modal == 0 .or. floor%get_support() == '') return
       do i = 1, 2
-         if (floor%get_support() == supports(i) .or. modal%n_band == 0) cycle
+         if (floor%get_support() == supports(i)) cycle
          call floor%get_room_modes(supports(i), other_plate, other_modes, error, get_highest_frequency(box))
          if (allocated(error)) return
          call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., modal)

@@ -37,6 +37,8 @@ module thud_floor_model
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: get_room_modes
+      procedure, pass(options) :: get_radiating_modes
+      procedure, pass(options) :: has_room_modes
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
@@ -169,7 +171,27 @@ contains
       error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
    end subroutine get_room_modes
 
-   !> Support of the edges; empty for floors without modes.
+   !> Modes that give the radiation factor; by default those of the floor.
+   subroutine get_radiating_modes(options, plate, modes, error)
+      class(floor_model_type), intent(in) :: options
+      !> The plate that radiates.
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      !> Set if there are none, or they cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+
+      call options%get_room_modes(options%get_support(), plate, modes, error)
+   end subroutine get_radiating_modes
+
+   !> Whether the sound in the room below can be predicted by the modes of the floor; by default, if it radiates.
+   pure function has_room_modes(options) result(yes)
+      class(floor_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_room_modes
+
+   !> Support of the edges; empty if it cannot be chosen.
    pure function get_support(options) result(support)
       class(floor_model_type), intent(in) :: options
       character(len=name_length) :: support

@@ -1,18 +1,27 @@
-!> A floor given by its measured mobility: a sum of poles fitted by `thud.fit_mobility` or `thud-driver mobility`.
+!> A floor given by its measured mobility: a sum of poles fitted by `thud.fit_mobility` or `thud-driver mobility`,
+!> and, for the room below, by the plate that it was measured on.
 module thud_measured_mobility_floor
+   use thud_band, only: band_type
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
    use thud_floor_model, only: floor_model_type, reason_length
+   use thud_floor_modes, only: floor_modes_type
+   use thud_injected_energy, only: get_mean_conductances
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, real_field
    use thud_passivity, only: find_violations
+   use thud_plate, only: get_plate_fields, get_resistance, plate_type
+   use thud_plate_floor, only: plate_floor_type
    use thud_receiver, only: get_conductance, receiver_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: measured_mobility_floor_type
+
+   !> Minimum thickness of a plate that radiates, m.
+   real(wp), parameter :: min_thickness = 0.001_wp
 
    !> The floor.
    type, extends(floor_model_type) :: measured_mobility_floor_type
@@ -24,11 +33,16 @@ module thud_measured_mobility_floor
       type(list_type) :: residue_real, residue_imaginary
       !> First and last frequency of the measurement, Hz.
       real(wp) :: lowest_frequency = 10.0_wp, highest_frequency = 1000.0_wp
+      !> The plate that radiates; no thickness: none.
+      type(plate_floor_type) :: radiator = plate_floor_type(plate=plate_type(thickness=0.0_wp))
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: get_receiver
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: get_radiator
+      procedure, pass(options) :: get_radiating_modes
+      procedure, pass(options) :: has_room_modes
    end type measured_mobility_floor_type
 
 contains
@@ -51,7 +65,8 @@ contains
          real_field('lowest_frequency', options%lowest_frequency, 'Hz', 'lowest frequency of the measurement', &
          '(0, highest_frequency)'), &
          real_field('highest_frequency', options%highest_frequency, 'Hz', &
-         'highest frequency of the measurement', '(0, 1e7]')]
+         'highest frequency of the measurement', '(0, 1e7]'), &
+         get_plate_fields(options%radiator%plate, optional_plate=.true.)]
    end function get_fields
 
    !> Checks that the lists are equally long and the mobility is passive.
@@ -67,6 +82,9 @@ contains
                //to_text(options%damping_ratio%count)//', residue_real '//to_text(options%residue_real%count) &
                //' and residue_imaginary '//to_text(options%residue_imaginary%count) &
                //'; allowed: the same number of each, at least one')
+         else if (options%radiator%plate%thickness > 0.0_wp .and. options%radiator%plate%thickness < min_thickness) then
+            error = input_error('&measured_mobility: thickness = '//to_text(options%radiator%plate%thickness) &
+               //' m; allowed: 0, or from '//to_text(min_thickness)//' m on')
          else
             call get_receiver(options, receiver, error)
          end if
@@ -105,6 +123,50 @@ contains
             //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
       end if
    end subroutine get_receiver
+
+   !> The plate; its conductance is the mean real part of the mobility in one-third octaves around the frequencies, and
+   !> outside the measurement that of the infinite plate.
+   subroutine get_radiator(options, frequency, plate, conductance, error)
+      class(measured_mobility_floor_type), intent(in) :: options
+      real(wp), intent(in) :: frequency(:)
+      type(plate_type), intent(out) :: plate
+      real(wp), intent(out) :: conductance(:)
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: receiver
+      integer :: i
+
+      plate = options%radiator%plate
+      conductance = 0.0_wp
+      if (.not. plate%thickness > 0.0_wp) then
+         error = input_error('&measured_mobility: a mobility alone does not radiate into a room; allowed: with the plate ' &
+            //'that it was measured on (thickness above 0)')
+         return
+      end if
+      call get_receiver(options, receiver, error)
+      if (allocated(error)) return
+      conductance = get_mean_conductances(receiver, [(band_type(lower=frequency(i)*10**(-0.05_wp), &
+         upper=frequency(i)*10**0.05_wp), i=1, size(frequency))])
+      where (frequency < options%lowest_frequency .or. frequency > options%highest_frequency) &
+         conductance = 1/get_resistance(plate)
+   end subroutine get_radiator
+
+   !> Modes of the plate, simply supported: its radiation factor. The floor has another mobility, and other modes.
+   subroutine get_radiating_modes(options, plate, modes, error)
+      class(measured_mobility_floor_type), intent(in) :: options
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+
+      call options%radiator%get_radiating_modes(plate, modes, error)
+   end subroutine get_radiating_modes
+
+   !> The mobility of one point contains no shapes of modes.
+   pure function has_room_modes(options) result(yes)
+      class(measured_mobility_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_room_modes
 
    !> Frequency band of the measurement.
    subroutine get_validity(options, lowest, highest, reason)

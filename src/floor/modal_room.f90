@@ -153,7 +153,7 @@ contains
       room%n_band = count(box%bands%center <= get_crossover(box))
       if (present(max_frequency)) room%n_band = count(box%bands%center <= max_frequency)
       ! Bands that the modes of the floor do not reach are statistical.
-      room%n_band = min(room%n_band, count(box%bands%upper <= modes%limit/(2*pi)))
+      room%n_band = min(room%n_band, count(2*pi*box%bands%upper <= min(modes%limit, modes%known_limit)))
       do
          if (room%n_band == 0) exit
          highest = room_ratio*box%bands(room%n_band)%upper

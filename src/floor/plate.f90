@@ -47,16 +47,24 @@ module thud_plate
       character(len=name_length) :: edges = 'building'
       !> Sum over the edges of length times absorption coefficient, m.
       real(wp) :: edge_absorption = 0.0_wp
+      !> Total loss factors that are known at frequencies, Hz, and replace the sum of losses: [n].
+      real(wp), allocatable :: known_frequency(:), known_loss(:)
    end type plate_type
+
+   !> Range of frequencies over which known loss factors are averaged, as a ratio to its middle: a one-third octave.
+   real(wp), parameter :: averaged_ratio = 2**(1.0_wp/6)
 
 contains
 
    !> Keys and allowed ranges of the group `&plate`.
-   function get_plate_fields(plate) result(fields)
+   function get_plate_fields(plate, optional_plate) result(fields)
       !> The plate that the fields read and set.
       type(plate_type), intent(in), target :: plate
-      !> One field per component: [10].
+      !> A thickness of 0 means that there is no plate (default: false).
+      logical, intent(in), optional :: optional_plate
+      !> One field per key: [10].
       type(field_type), allocatable :: fields(:)
+      integer :: i
 
       fields = [ &
          real_field('length', plate%length, 'm', 'length of the floor', '[0.5, 100]'), &
@@ -73,6 +81,11 @@ contains
          [character(len=10) :: 'building', 'laboratory', 'absorption']), &
          real_field('edge_absorption', plate%edge_absorption, 'm', &
          'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
+      if (.not. present(optional_plate)) return
+      if (.not. optional_plate) return
+      i = findloc(fields%key, 'thickness', dim=1)
+      fields(i)%range = '[0, 2]'
+      fields(i)%meaning = 'thickness of the plate that radiates into a room; 0: none'
    end function get_plate_fields
 
    !> Mass per unit area, kg/m2.
@@ -227,6 +240,10 @@ contains
       real(wp) :: loss_factor
       real(wp) :: sigma, absorption
 
+      if (allocated(plate%known_loss)) then
+         loss_factor = get_known_loss(plate, frequency)
+         return
+      end if
       if (plate%edges == 'laboratory') then
          ! The laboratory loss includes radiation.
          loss_factor = plate%loss_factor + get_surface_mass(plate)/(485*sqrt(frequency))
@@ -240,5 +257,23 @@ contains
          + air%sound_speed/(pi**2*plate%length*plate%width*sqrt(frequency*get_critical_frequency(plate, air))) &
          *absorption
    end function get_total_loss
+
+   !> Mean of the known total loss factors around a frequency, or the nearest one.
+   pure function get_known_loss(plate, frequency) result(loss_factor)
+      type(plate_type), intent(in) :: plate
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      real(wp) :: loss_factor
+
+      associate (ratio => plate%known_frequency/frequency)
+         associate (near => ratio > 1/averaged_ratio .and. ratio < averaged_ratio)
+            if (any(near)) then
+               loss_factor = sum(plate%known_loss, mask=near)/count(near)
+            else
+               loss_factor = plate%known_loss(minloc(abs(log(ratio)), dim=1))
+            end if
+         end associate
+      end associate
+   end function get_known_loss
 
 end module thud_plate

@@ -261,7 +261,8 @@ contains
       character(len=:), allocatable :: text
 
       call read_text_file(path, text, error)
-      if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked)
+      if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked, &
+         path(:index(path, '/', back=.true.)))
       if (allocated(error)) error = input_error(path//': '//error%message)
    end subroutine load_case
 

@@ -28,6 +28,8 @@ LONGEST = 5.0
 PAGE, PAGE_SAMPLE = 2e-3, 1e-7
 # Chance that a key is drawn.
 CHANCE = 0.3
+# Floors that need a measurement or a file.
+GIVEN = ("measured_mobility", "modal_floor")
 
 
 def random_value(field: dict[str, Any], chance: random.Random) -> object:
@@ -48,7 +50,7 @@ def random_value(field: dict[str, Any], chance: random.Random) -> object:
 def random_values(chance: random.Random) -> dict[str, dict[str, Any]]:
     """Return a case as the page has it; records and steps vary by more than the sliders do."""
     model = chance.choices(list(MODELS), list(MODELS.values()))[0]
-    floor = chance.choice([None, *(name for name in FLOORS if name != "measured_mobility")])
+    floor = chance.choice([None, *(name for name in FLOORS if name not in GIVEN)])
     values: dict[str, dict[str, Any]] = {"model": {"name": model}}
     if floor:
         values["floor"] = {"name": floor}

@@ -105,7 +105,7 @@ def test_constructions_of_the_page_are_floors_of_the_library() -> None:
 
 def test_ends_of_sliders_are_allowed() -> None:
     # What is not complete without values has none to try.
-    empty = {"measured_modes", "hunt_crossley", "measured_mobility"}
+    empty = {"measured_modes", "hunt_crossley", "measured_mobility", "modal_floor"}
     refused = set()
     for group in form():
         choice = {group["part"]: {"name": group["name"]}} if group["part"] != group["name"] else {}

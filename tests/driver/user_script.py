@@ -69,6 +69,9 @@ tables = (
 )
 floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
 floors += [thud.Plate(screed_thickness=0.05), thud.JoistFloor(), thud.MeasuredMobility()]
+grid = {"x": [0.0, 1.0, 2.0, 3.0], "y": [0.0, 1.0, 2.0, 3.0]}
+thud.write_floor_modes(folder / "modes.csv", [50.0], 0.05, **grid, shape=[[[0.05] * 4] * 4])
+floors += [thud.ModalFloor(file=str(folder / "modes.csv"))]
 plates: list[thud.RectangularFloor] = [thud.LaminateFloor()]
 assert all(isinstance(plate, thud.RectangularFloor) for plate in plates)
 light: thud.Impact = thud.solve(ball, floor=floors[1])

@@ -33,6 +33,7 @@ __all__ = [
     "MeasuredMobility",
     "MeasuredModes",
     "ModalBall",
+    "ModalFloor",
     "ModelName",
     "ModelOptions",
     "Modes",
@@ -73,9 +74,11 @@ FloorName = Literal[
     "laminate_floor",
     "joist_floor",
     "measured_mobility",
+    "modal_floor",
 ]
 PlateEdges = Literal["building", "laboratory", "absorption"]
 JoistFloorSourceOn = Literal["sheathing", "joist", "position"]
+MeasuredMobilityEdges = Literal["building", "laboratory", "absorption"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
@@ -951,6 +954,29 @@ class MeasuredMobility(Group):
         Lowest frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
     highest_frequency : float
         Highest frequency of the measurement, Hz; 0 < highest_frequency <= 1e+07.
+    length : float
+        Length of the floor, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor, m; 0.5 <= width <= 100.
+    thickness : float
+        Thickness of the plate that radiates into a room; 0: none, m; 0 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    stiffness_ratio : float
+        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
+        stiffness_ratio <= 10000.
+    torsion_ratio : float
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
+        torsion_ratio <= 1.
+    loss_factor : float
+        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+    edges : str
+        Losses at the edges of the floor; "building", "laboratory", "absorption".
+    edge_absorption : float
+        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
+        <= 1000.
     """
 
     name: ClassVar[FloorName] = "measured_mobility"
@@ -961,6 +987,64 @@ class MeasuredMobility(Group):
     residue_imaginary: Sequence[float] = ()
     lowest_frequency: float = 10.0
     highest_frequency: float = 1000.0
+    length: float = 5.0
+    width: float = 4.0
+    thickness: float = 0.0
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    stiffness_ratio: float = 1.0
+    torsion_ratio: float = 1.0
+    loss_factor: float = 0.005
+    edges: MeasuredMobilityEdges = "building"
+    edge_absorption: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ModalFloor(Group):
+    """Floor ``modal_floor``.
+
+    Attributes
+    ----------
+    file : str
+        File of the modes: frequencies, loss factors, shapes on a grid.
+    source_x : float
+        Relative source position along the length; statistical levels in the room are means; 0 <
+        source_x < 1.
+    source_y : float
+        Relative source position along the width; 0 < source_y < 1.
+    residual_compliance : float
+        Static compliance at the source of the modes above those of the file; 0: that of the plate,
+        m/N; 0 <= residual_compliance <= 1.
+    thickness : float
+        Thickness of the plate that radiates into a room; 0: none, m; 0 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    stiffness_ratio : float
+        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
+        stiffness_ratio <= 10000.
+    torsion_ratio : float
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
+        torsion_ratio <= 1.
+    point_x : sequence of float
+        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Positions of these points along the width, m; 0 <= point_y <= 1000.
+    """
+
+    name: ClassVar[FloorName] = "modal_floor"
+    file: str = ""
+    source_x: float = 0.5
+    source_y: float = 0.5
+    residual_compliance: float = 0.0
+    thickness: float = 0.0
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    stiffness_ratio: float = 1.0
+    torsion_ratio: float = 1.0
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley | TwoMass
@@ -972,6 +1056,7 @@ FloorOptions = (
     | LaminateFloor
     | JoistFloor
     | MeasuredMobility
+    | ModalFloor
 )
 
 # Source models by name, the default first.
@@ -996,6 +1081,7 @@ FLOORS: dict[str, type[FloorOptions]] = {
     LaminateFloor.name: LaminateFloor,
     JoistFloor.name: JoistFloor,
     MeasuredMobility.name: MeasuredMobility,
+    ModalFloor.name: ModalFloor,
 }
 
 # Groups that every model uses.
@@ -1248,7 +1334,7 @@ KEYS = (
     Key("unknowns", "unknowns", "high", "list", "", "their maxima", (), -1e+30, 1e+30),
     Key("unknowns", "unknowns", "standard_deviation", "list", "", "standard deviations around the values of the case, truncated by low and high; 0: uniform", (), 0.0, 1e+30),
     Key("unknowns", "unknowns", "reason", "texts", "", "reasons of the ranges, with their sources"),
-    Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'laminate_floor', 'joist_floor', 'measured_mobility')),
+    Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'laminate_floor', 'joist_floor', 'measured_mobility', 'modal_floor')),
     Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "driving-point resistance: force divided by velocity", (), 1.0, 1000000000000000.0),
     Key("oscillator", "oscillator", "mass", "real", "kg", "moving mass under the source", (), 0.001, 1000000000000.0),
     Key("oscillator", "oscillator", "stiffness", "real", "N/m", "stiffness of the support", (), 0.0, 1000000000000000.0),
@@ -1413,6 +1499,27 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
     Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
+    Key("measured_mobility", "measured_mobility", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
+    Key("measured_mobility", "measured_mobility", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("measured_mobility", "measured_mobility", "thickness", "real", "m", "thickness of the plate that radiates into a room; 0: none", (), 0.0, 2.0),
+    Key("measured_mobility", "measured_mobility", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("measured_mobility", "measured_mobility", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("measured_mobility", "measured_mobility", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
+    Key("measured_mobility", "measured_mobility", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("measured_mobility", "measured_mobility", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
+    Key("measured_mobility", "measured_mobility", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
+    Key("measured_mobility", "measured_mobility", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
+    Key("modal_floor", "modal_floor", "file", "text", "", "file of the modes: frequencies, loss factors, shapes on a grid"),
+    Key("modal_floor", "modal_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
+    Key("modal_floor", "modal_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("modal_floor", "modal_floor", "residual_compliance", "real", "m/N", "static compliance at the source of the modes above those of the file; 0: that of the plate", (), 0.0, 1.0),
+    Key("modal_floor", "modal_floor", "thickness", "real", "m", "thickness of the plate that radiates into a room; 0: none", (), 0.0, 2.0),
+    Key("modal_floor", "modal_floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("modal_floor", "modal_floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("modal_floor", "modal_floor", "stiffness_ratio", "real", "", "ratio of the bending stiffness along the width to that along the length", (), 0.0001, 10000.0),
+    Key("modal_floor", "modal_floor", "torsion_ratio", "real", "", "ratio of the twisting stiffness to the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("modal_floor", "modal_floor", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
+    Key("modal_floor", "modal_floor", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
     Key("room", "room", "length", "real", "m", "length of the room; 0: that of the floor", (), 0.0, 100.0),
     Key("room", "room", "width", "real", "m", "width of the room; 0: that of the floor", (), 0.0, 100.0),
     Key("room", "room", "height", "real", "m", "height of the room; 0: from the volume, without it 2.5 m", (), 0.0, 100.0),

@@ -79,6 +79,11 @@ class RoomPrediction(RoomLevel, Displayed):
         return rating(self.modal_level, BANDS)
 
     @property
+    def has_edges(self) -> bool:
+        """Whether levels by modes are known for simply supported and for clamped edges."""
+        return self.n_modal > 0 and hasattr(self.floor, "support")
+
+    @property
     def rated_text(self) -> str:
         """Mean rating of both predictions with its interval, such as ``"57 dB (55 to 60)"``."""
         low, high = self.interval
@@ -147,6 +152,11 @@ class RoomPrediction(RoomLevel, Displayed):
                 f"have a standard deviation of {self.spread[few].max():.1f} to "
                 f"{self.spread[few].min():.1f} dB"
             )
+        if not self.n_modal:
+            result.append(
+                "there is no prediction by modes: the rating is that of the statistical one, and "
+                "its interval contains neither the edges nor the model"
+            )
         if self.force == "blocked" and abs(self.force_change) > MAX_CHANGE:
             result.append(
                 f"the floor is not rigid: its motion would change the peak force by about "
@@ -180,6 +190,9 @@ class RoomPrediction(RoomLevel, Displayed):
             [f"{value:{form}}" for value in column]
             for column, form in zip(columns, forms, strict=True)
         ]
+        # Columns by modes, where the sound is modal.
+        for i, count in ((1, self.n_modal), *((i, self.n_modal * self.has_edges) for i in (2, 3))):
+            cells[i][count:] = ["–"] * (len(self.frequency) - count)
         return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
@@ -192,9 +205,10 @@ class RoomPrediction(RoomLevel, Displayed):
         """Return the single-number ratings."""
         octaves = self.octave_rating
         required = self.requirement
+        modal = f"modal {self.modal_rating.rounded} dB" if self.n_modal else "no modal prediction"
         return (
             f"<RoomPrediction: L_iA,Fmax {self.rated_text}, ISO 717-2; "
-            f"statistical {self.rating.rounded} dB, modal {self.modal_rating.rounded} dB; octaves "
+            f"statistical {self.rating.rounded} dB, {modal}; octaves "
             f"{octaves.rounded} dB (KS F 2863-2, class {CLASSES[octaves.korean_class or 0]}), "
             f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)"
             f"{f'; {required}' if required else ''}>"

@@ -67,7 +67,8 @@ class RoomLevel(Immutable):
         Above the first `n_modal` bands, where three modes of the room overlap, they are
         statistical.
     simple_level, clamped_level : ndarray, shape (12,)
-        The same levels if the floor is simply supported or clamped.
+        The same levels if the floor is simply supported or clamped; without a choice of edges,
+        `modal_level`.
     n_modal : int
         Number of bands in which the sound is modal.
     size : tuple of float

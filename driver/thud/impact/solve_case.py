@@ -51,7 +51,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     floor
         Floor on which the ball is dropped in addition to a rigid floor, on which the standards
         assess the force. An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate`,
-        `LaminateFloor`, `JoistFloor` or `MeasuredMobility`.
+        `LaminateFloor`, `JoistFloor`, `MeasuredMobility` or `ModalFloor`.
     room
         Room below the floor, for `Impact.room_level`.
     verify

@@ -20,7 +20,7 @@ except ValueError as error:
         error,
     )
 
-from thud.base._schema import JoistFloor, LaminateFloor, Plate
+from thud.base._schema import JoistFloor, LaminateFloor, ModalFloor, Plate
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.plot.ball_figures import (
     animate as animate,
@@ -132,7 +132,7 @@ def case_figures(
         draws["modes"] = partial(mode_shapes, modes)
     if curve:
         draws["compression"] = curve.plot
-    if impact and isinstance(impact.case.floor, Plate | LaminateFloor | JoistFloor):
+    if impact and isinstance(impact.case.floor, Plate | LaminateFloor | JoistFloor | ModalFloor):
         draws["floor_modes"] = partial(plate_modes, impact.case.floor)
     if impact:
         draws["loss_factor"] = partial(draw_material, impact)

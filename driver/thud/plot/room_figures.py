@@ -83,12 +83,13 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     middle.set_ylim(bottom=0)
     middle.set_ylabel("Floor")
     modal = slice(0, prediction.n_modal)
-    if prediction.n_modal:
+    if prediction.has_edges:
         edges = np.array([prediction.simple_level, prediction.clamped_level])[:, modal]
         below.fill_between(
             x[modal], edges.min(axis=0), edges.max(axis=0), color=GRAY, linewidth=0,
             label="modal, simply supported to clamped",
         )  # fmt: skip
+    if prediction.n_modal:
         below.plot(
             x[modal], prediction.modal_level[modal], color=COLORS[1], marker="s", markersize=3.5,
             linewidth=1, linestyle="--",
@@ -128,12 +129,13 @@ def draw_ranges(prediction: RoomPrediction) -> Figure:
         label=f"statistical: {prediction.rating.rounded} dB",
     )  # fmt: skip
     modal = slice(0, prediction.n_modal)
-    if prediction.n_modal:
+    if prediction.has_edges:
         edges = np.array([prediction.simple_level, prediction.clamped_level])[:, modal]
         axes.fill_between(
             x[modal], edges.min(axis=0), edges.max(axis=0), color=COLORS[4], alpha=0.4,
             linewidth=0, label="simply supported to clamped",
         )  # fmt: skip
+    if prediction.n_modal:
         axes.plot(
             x[modal], prediction.modal_level[modal], color=COLORS[1], marker="s", markersize=3.5,
             linestyle="--", label=f"by modes: {prediction.modal_rating.rounded} dB",

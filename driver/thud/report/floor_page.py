@@ -119,7 +119,8 @@ ABOUT_BOTH = (
 )
 ABOUT_ONE = (
     "The only prediction is the statistical one, a mean over many floors and rooms of this kind: "
-    "in all bands the modes of the room overlap."
+    "the modes of the floor are not known, or those of the room overlap in all bands. The interval "
+    "contains neither the edges of the floor nor the model."
 )
 
 

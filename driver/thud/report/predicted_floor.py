@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from thud.base._schema import KEYS, JoistFloor, LaminateFloor, Plate, Room
+from thud.base._schema import (
+    KEYS,
+    JoistFloor,
+    LaminateFloor,
+    MeasuredMobility,
+    ModalFloor,
+    Plate,
+    Room,
+)
 from thud.base.errors import ThudError
 from thud.base.units import display_unit
 from thud.case.keys import humanize
@@ -69,6 +77,8 @@ _THICKNESSES = {
 # Thicknesses that a case does not state, for its drawing, m.
 _LAYER, _BOARD = 0.02, 0.0125
 _ASSUMED = "(thickness assumed)"
+# Maximum number of values of a key that are listed.
+_MAX_SHOWN = 12
 # Key that is the requirement, not an assumption.
 _REQUIRED = "required"
 
@@ -108,8 +118,15 @@ class PredictedFloor:
 
     @property
     def contributions(self) -> dict[str, tuple[float, float]]:
-        """Lower and upper deviation from the rating, dB, the largest contribution first."""
-        entries = self.prediction.contributions.items()
+        """Lower and upper deviation from the rating, dB, the largest contribution first.
+
+        Without a prediction by modes those of edges and model are not known.
+        """
+        entries = [
+            (name, ends)
+            for name, ends in self.prediction.contributions.items()
+            if self.prediction.n_modal or name not in {"edges", "model"}
+        ]
         return dict(sorted(entries, key=lambda entry: -max(map(abs, entry[1]))))
 
     @property
@@ -129,8 +146,9 @@ class PredictedFloor:
             _rating_entry("statistical prediction", "ISO 717-2", prediction.level),
         ]
         if prediction.n_modal:
+            result += [_rating_entry("prediction by modes", "ISO 717-2", prediction.modal_level)]
+        if prediction.has_edges:
             result += [
-                _rating_entry("prediction by modes", "ISO 717-2", prediction.modal_level),
                 _rating_entry("by modes, simply supported", "ISO 717-2", prediction.simple_level),
                 _rating_entry("by modes, clamped", "ISO 717-2", prediction.clamped_level),
             ]
@@ -242,10 +260,12 @@ def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
         [f"{value:z{form}}".replace("-", "−") for value in values(floor)]
         for form, values in COLUMNS.values()
     ]
+    prediction = floor.prediction
     for title, column in zip(COLUMNS, cells, strict=True):
         if title in _MODAL:
-            column[floor.prediction.n_modal :] = "–" * (len(column) - floor.prediction.n_modal)
-    bands = (f"{frequency:g}" for frequency in floor.prediction.frequency)
+            count = prediction.n_modal if title == _MODAL[0] or prediction.has_edges else 0
+            column[count:] = "–" * (len(column) - count)
+    bands = (f"{frequency:g}" for frequency in prediction.frequency)
     return [("band, Hz", *COLUMNS), *zip(bands, *cells, strict=True)]
 
 
@@ -306,6 +326,10 @@ def _effective_values(group: FloorOptions | Room, owner: str) -> Iterator[tuple[
 def _value_text(key: Key, value: object) -> str:
     """Return the value of a key with its unit."""
     numbers = value if isinstance(value, tuple) else (value,)
+    if len(numbers) > _MAX_SHOWN:
+        return f"{len(numbers)} values"
+    if key.kind == "text":
+        return str(value)
     if not all(isinstance(number, float) for number in numbers):
         return ", ".join(humanize(str(entry)) for entry in numbers)
     unit, size = display_unit(key.unit, max(map(abs, numbers), default=0.0))
@@ -325,7 +349,8 @@ def _variants(
 
     for key, title in _THICKNESSES.items():
         value = getattr(floor, key, 0.0)
-        if value:
+        # The mobility or the modes of a known floor do not follow its plate.
+        if value and not isinstance(floor, ModalFloor | MeasuredMobility):
             add(f"{title} +{1e3 * _ADDED:g} mm", replace(floor, **{key: value + _ADDED}))
     if isinstance(floor, LaminateFloor) and floor.layer_thickness:
         top, *others = floor.layer_thickness
@@ -355,8 +380,7 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     def add(material: str, thickness: float) -> None:
         layers.append(Layer(material, round(thickness, 6), 0.0))
 
-    assert isinstance(floor, Plate | LaminateFloor | JoistFloor)  # noqa: S101 - it radiates
-    if floor.screed_thickness:
+    if isinstance(floor, Plate | LaminateFloor | JoistFloor) and floor.screed_thickness:
         add(f"floating plate, {floor.screed_density:g} kg/m³", floor.screed_thickness)
         add(f"resilient layer {_ASSUMED}", _LAYER)
     below = floor.subceiling_thickness
@@ -366,7 +390,10 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     elif isinstance(floor, LaminateFloor):
         mass = prediction.mass_per_area - floor.added_mass
         add(f"laminate, {floor.density:g} kg/m³", mass / floor.density)
+    elif isinstance(floor, ModalFloor | MeasuredMobility):
+        add(f"plate like the floor, {floor.density:g} kg/m³", floor.thickness)
     else:
+        assert isinstance(floor, JoistFloor)  # noqa: S101 - no other floor radiates
         add(f"sheathing, {floor.sheathing_density:g} kg/m³", floor.sheathing_thickness)
         apart = f"{1e3 * floor.joist_width:g} mm wide, {floor.spacing:g} m apart"
         add(f"joists, {apart}", floor.joist_height)

@@ -2,16 +2,22 @@
 module thud_function_set
    use thud_constants, only: pi
    use thud_kinds, only: wp
+   use thud_lapack, only: dgetf2, dgetrs, dposv
    use thud_legendre, only: get_gauss_legendre, get_legendre
    use thud_matrix_product, only: get_transposed_product
    implicit none (type, external)
    private
 
-   public :: amplitudes, cosines, function_set_type, get_functions, get_overlap, get_quadrature, new_polynomials, sines
+   public :: amplitudes, cosines, function_set_type, get_functions, get_overlap, get_quadrature, new_polynomials, new_splines
+   public :: sines
 
    !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
-   !> rotations of simply supported plates, polynomials, and amplitudes of separate members without values between them.
-   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, amplitudes = 4
+   !> rotations of simply supported plates, polynomials, amplitudes of separate members without values between them, and
+   !> splines.
+   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, amplitudes = 4, splines = 5
+
+   !> Minimum number of nodes of a spline.
+   integer, parameter, public :: min_nodes = 4
 
    !> Functions that are orthonormal on [0, length].
    type :: function_set_type
@@ -21,8 +27,12 @@ module thud_function_set
       real(wp) :: length = 1.0_wp
       !> Number of functions.
       integer :: count = 0
-      !> Polynomials as sums of orthonormal Legendre polynomials: [0:degree, count].
+      !> Polynomials as sums of orthonormal Legendre polynomials: [0:degree, count]. Splines as sums of those that are 1 at
+      !> one node and 0 at the others: [count, count].
       real(wp), allocatable :: coefficient(:, :)
+      !> Nodes of splines, m: [count], and second derivatives there of the splines that are 1 at one node, 1/m2:
+      !> [count, count].
+      real(wp), allocatable :: node(:), curvature(:, :)
    end type function_set_type
 
 contains
@@ -91,6 +101,101 @@ contains
       where (abs(row) < 1.0e-12_wp*spread(maxval(abs(row), dim=2), 2, set%count)) row = 0.0_wp
    end function get_constraints
 
+   !> Cubic splines through nodes, not-a-knot at both ends: they interpolate a function that is sampled at the nodes,
+   !> whatever it does at the ends.
+   pure subroutine new_splines(node, set, transformation)
+      !> Nodes, ascending, from 0 to the length, m: [at least `min_nodes`].
+      real(wp), intent(in) :: node(:)
+      type(function_set_type), intent(out) :: set
+      !> Turns values at the nodes into coefficients of the functions, sqrt(m): [count, count].
+      real(wp), allocatable, intent(out) :: transformation(:, :)
+      real(wp), allocatable :: gram(:, :), point(:), weight(:), value(:, :)
+      integer :: i, n, info
+
+      n = size(node)
+      set = function_set_type(splines, node(n), n)
+      set%node = node
+      set%curvature = get_curvature(node)
+      allocate (set%coefficient(n, n), gram(n, n), source=0.0_wp)
+      do i = 1, n
+         set%coefficient(i, i) = 1.0_wp
+      end do
+      do i = 1, n - 1
+         ! Four points integrate products of two cubic functions exactly.
+         call get_quadrature(4, node(i), node(i + 1), point, weight)
+         value = get_functions(set, point, 0)
+         gram = gram + matmul(transpose(value), spread(weight, 2, n)*value)
+      end do
+      ! With the Cholesky factor U of the integrals of products, the functions inverse(U**T) N are orthonormal.
+      call dposv('U', n, n, gram, n, set%coefficient, n, info)
+      do i = 1, n - 1
+         gram(i + 1:, i) = 0.0_wp
+      end do
+      set%coefficient = matmul(set%coefficient, transpose(gram))
+      call move_alloc(gram, transformation)
+   end subroutine new_splines
+
+   !> Second derivatives at the nodes of the splines that are 1 at one node, 1/m2: [n, n].
+   pure function get_curvature(node) result(curvature)
+      real(wp), intent(in) :: node(:)
+      real(wp) :: curvature(size(node), size(node))
+      real(wp) :: system(size(node), size(node))
+      integer :: pivot(size(node))
+      integer :: i, n, info
+
+      n = size(node)
+      system = 0.0_wp
+      curvature = 0.0_wp
+      do i = 2, n - 1
+         associate (before => node(i) - node(i - 1), after => node(i + 1) - node(i))
+            system(i, i - 1:i + 1) = [before, 2*(before + after), after]
+            curvature(i, i - 1:i + 1) = 6*[1/before, -1/before - 1/after, 1/after]
+         end associate
+      end do
+      ! The third derivative is continuous at the second and at the last but one node.
+      system(1, :3) = get_jump(node(:3))
+      system(n, n - 2:) = get_jump(node(n - 2:))
+      call dgetf2(n, n, system, n, pivot, info)
+      call dgetrs('N', n, n, system, n, pivot, curvature, n, info)
+   contains
+
+      !> Factors of three second derivatives in the jump of the third derivative in the middle.
+      pure function get_jump(three) result(factor)
+         real(wp), intent(in) :: three(3)
+         real(wp) :: factor(3)
+
+         associate (before => three(2) - three(1), after => three(3) - three(2))
+            factor = [after, -before - after, before]
+         end associate
+      end function get_jump
+   end function get_curvature
+
+   !> Splines or their derivatives at positions: [n_position, count].
+   pure function get_spline_values(set, position, order) result(value)
+      type(function_set_type), intent(in) :: set
+      real(wp), intent(in) :: position(:)
+      integer, intent(in) :: order
+      real(wp) :: value(size(position), set%count)
+      real(wp) :: row(set%count), part(2), bend(2)
+      integer :: i, k
+
+      do i = 1, size(position)
+         k = min(max(count(set%node <= position(i)), 1), set%count - 1)
+         associate (h => set%node(k + 1) - set%node(k))
+            part(2) = (position(i) - set%node(k))/h
+            part(1) = 1 - part(2)
+            bend = h**2/6*(part**3 - part)
+            if (order == 1) bend = h/6*(3*part**2 - 1)*[-1, 1]
+            if (order == 2) bend = part
+            if (order == 1) part = [-1, 1]/h
+            if (order == 2) part = 0.0_wp
+         end associate
+         row = matmul(bend, set%curvature(k:k + 1, :))
+         row(k:k + 1) = row(k:k + 1) + part
+         value(i, :) = matmul(row, set%coefficient)
+      end do
+   end function get_spline_values
+
    !> The functions or their derivatives at positions: [n_position, count].
    pure function get_functions(set, position, order) result(value)
       type(function_set_type), intent(in) :: set
@@ -103,6 +208,10 @@ contains
       real(wp), allocatable :: legendre(:, :, :)
       integer :: i, j
 
+      if (set%kind == splines) then
+         value = get_spline_values(set, position, order)
+         return
+      end if
       if (set%kind == polynomials) then
          allocate (legendre(0:size(set%coefficient, 1) - 1, size(position), 0:2))
          do i = 1, size(position)
@@ -151,7 +260,7 @@ contains
       integer :: i, phase
 
       phase = first_order - second_order + merge(0, 1, first%kind == sines) - merge(0, 1, second%kind == sines)
-      if (all([first%kind, second%kind] /= polynomials) .and. mod(phase, 2) == 0 .and. .not. present(from)) then
+      if (all([first%kind, second%kind] < polynomials) .and. mod(phase, 2) == 0 .and. .not. present(from)) then
          overlap = 0.0_wp
          do i = 1, min(first%count, second%count)
             overlap(i, i) = merge(1, -1, mod(phase, 4) == 0)*(i*pi/first%length)**(first_order + second_order)

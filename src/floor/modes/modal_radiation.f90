@@ -85,8 +85,8 @@ module thud_modal_radiation
 
 contains
 
-   !> Radiation of a floor in bands, averaged over strike points and over the frequencies of each band. A single plate
-   !> without ribs has orthogonal modes: averaged over all strike points, their cross terms vanish.
+   !> Radiation of a floor in bands, averaged over strike points and over the frequencies of each band. Averaged over all
+   !> strike points, the cross terms of orthogonal modes vanish. In bands beyond the modes the plate takes their place.
    subroutine get_modal_radiation(modes, plate, air, bands, area, radiation, stated_strike)
       type(floor_modes_type), intent(in) :: modes
       !> The bearing plate, with its mass and total losses.
@@ -111,7 +111,7 @@ contains
       allocate (radiation%radiated(size(bands)))
       call get_strike_points(n_strike, strike)
       if (present(stated_strike)) strike = stated_strike
-      has_strikes = present(stated_strike) .or. .not. is_orthogonal(modes)
+      has_strikes = present(stated_strike) .or. .not. modes%is_orthogonal
       highest = 2*pi*maxval(bands%upper)/air%sound_speed
       associate (radiator => modes%modes%displacement(modes%stack%radiator))
          along = new_wave_series(radiator%x, area(1:2), highest)
@@ -135,8 +135,8 @@ contains
             call add_modes(shapes, omega, loss_factor, modes%stack%length*modes%stack%width, air, bands(i), &
                get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
          end if
-         if (.not. velocity > 0.0_wp) then
-            ! A plate without modes there.
+         if (.not. velocity > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
+            ! A plate without modes there, or without known ones.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
             radiation%conductance(i) = 1/get_resistance(plate)
             radiation%radiated(i) = 0.0_wp
@@ -148,15 +148,6 @@ contains
             *get_total_loss(plate, air, bands(i)%center)
       end do
    end subroutine get_modal_radiation
-
-   !> Whether the modes of a floor are orthogonal over its area: one plate without ribs.
-   pure function is_orthogonal(modes) result(yes)
-      type(floor_modes_type), intent(in) :: modes
-      logical :: yes
-
-      yes = size(modes%stack%plate) == 1
-      if (yes) yes = .not. allocated(modes%stack%plate(1)%ribs)
-   end function is_orthogonal
 
    !> Shapes of a plate in some modes.
    pure function get_shapes(modes, plate, kept) result(shapes)

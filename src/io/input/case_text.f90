@@ -1,11 +1,13 @@
 !> Cases as namelist files: reading, writing, and the description of all keys.
 module thud_case_text
+   use, intrinsic :: iso_fortran_env, only: int64
    use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case, set_room_source
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
    use thud_registry, only: floor_names
    use thud_suggestion, only: get_suggestion
+   use thud_system, only: get_file_size
    use thud_text, only: join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
    private
@@ -18,7 +20,7 @@ module thud_case_text
 contains
 
    !> Reads a case from the text of a namelist file and checks it.
-   subroutine read_case(text, default_name, case, error, unchecked)
+   subroutine read_case(text, default_name, case, error, unchecked, directory)
       character(len=*), intent(in) :: text
       !> Name of the case if the text has none.
       character(len=*), intent(in) :: default_name
@@ -27,6 +29,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Skip the check of ranges and of the case as a whole (default: false).
       logical, intent(in), optional :: unchecked
+      !> Directory of the case, with a slash at its end, in which files are searched first (default: the current one).
+      character(len=*), intent(in), optional :: directory
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
       integer :: i, j
@@ -54,6 +58,7 @@ contains
          if (allocated(error)) return
          call assign_group(groups(i), fields, error)
       end do
+      if (present(directory) .and. .not. allocated(error)) call resolve_paths(fields, directory, error)
       if (allocated(error)) return
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
@@ -64,6 +69,34 @@ contains
       end if
       if (.not. allocated(error)) call check_case(case, error)
    end subroutine read_case
+
+   !> Makes the paths of files beside a case relative to the current directory. Without such a file a path is relative to
+   !> the current directory already, as in the effective input beside the results.
+   subroutine resolve_paths(fields, directory, error)
+      !> All keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      character(len=*), intent(in) :: directory
+      !> Set if a path is too long.
+      type(error_type), allocatable, intent(out) :: error
+      integer(int64) :: bytes
+      integer :: i
+
+      do i = 1, size(fields)
+         if (.not. fields(i)%is_path) cycle
+         associate (path => fields(i)%text_value)
+            if (path == '' .or. path(1:1) == '/') cycle
+            call get_file_size(directory//trim(path), bytes)
+            if (bytes < 0) cycle
+            if (len(directory) + len_trim(path) > name_length) then
+               error = input_error('&'//trim(fields(i)%group)//': '//trim(fields(i)%key)//' = '//quoted(directory &
+                  //trim(path))//' is too long; allowed: up to '//to_text(name_length)//' characters with the directory ' &
+                  //'of the case')
+               return
+            end if
+            path = directory//path
+         end associate
+      end do
+   end subroutine resolve_paths
 
    !> Whether a file names the source model.
    pure function names_model(groups) result(named)

@@ -1,7 +1,7 @@
 !> The level in the room below as text: the file and the table on the screen.
 module thud_room_report
    use thud_band, only: get_band_name
-   use thud_case, only: case_type
+   use thud_case, only: case_type, get_floor_number
    use thud_csv, only: get_table_csv
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
@@ -69,9 +69,11 @@ contains
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=1) :: mark
+      logical :: has_edges
       real(wp) :: resistance
       integer :: i
 
+      has_edges = case%floors(get_floor_number(case))%model%get_support() /= ''
       text = '  '//padded('room below')//padded('statistical')//padded('modal')//padded('simple edges')//padded('clamped') &
          //'spread'//newline
       do i = 1, size(prediction%bands)
@@ -79,10 +81,15 @@ contains
          text = text//'  '//padded(get_band_name(prediction%bands(i))//' Hz') &
             //padded(fixed(prediction%level(i), 1)//' dB '//mark)
          if (i <= prediction%n_modal) then
-            text = text//padded(fixed(prediction%modal_level(i), 1)//' dB') &
-               //padded(fixed(prediction%edge_level(i, 1), 1)//' dB')//padded(fixed(prediction%edge_level(i, 2), 1)//' dB')
+            text = text//padded(fixed(prediction%modal_level(i), 1)//' dB')
          else
-            text = text//padded('-')//padded('-')//padded('-')
+            text = text//padded('-')
+         end if
+         if (i <= prediction%n_modal .and. has_edges) then
+            text = text//padded(fixed(prediction%edge_level(i, 1), 1)//' dB')//padded(fixed(prediction%edge_level(i, 2), 1) &
+               //' dB')
+         else
+            text = text//padded('-')//padded('-')
          end if
          text = text//fixed(prediction%spread(i), 1)//' dB'//newline
       end do
@@ -116,10 +123,16 @@ contains
 
       text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
          //to_text(get_rounded(prediction%rated))//' dB ('//get_range_text(prediction%interval)//'), statistical ' &
-         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, modal ' &
-         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
+         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, '
+      if (prediction%n_modal > 0) then
+         text = text//'modal ' &
+            //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
+      else
+         text = text//'no modal prediction: the interval contains neither edges nor model'//newline
+      end if
       text = text//'  Contributions:'
       do i = 1, size(contribution_names)
+         if (prediction%n_modal == 0 .and. any(contribution_names(i) == ['edges', 'model'])) cycle
          text = text//merge(',', ' ', i > 1)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
             //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
       end do

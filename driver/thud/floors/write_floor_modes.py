@@ -1,0 +1,100 @@
+"""Files of the modes of a floor, for `ModalFloor`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.checks import refuse, require_array, require_real
+from thud.base.files import replace_file
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+
+def write_floor_modes(  # noqa: PLR0913 - a mode, and a grid
+    path: str | os.PathLike[str],
+    frequency: ArrayLike,
+    loss_factor: ArrayLike,
+    *,
+    x: ArrayLike,
+    y: ArrayLike,
+    shape: ArrayLike,
+    modal_mass: ArrayLike = 1.0,
+) -> None:
+    """Write the modes of a floor to a file for `ModalFloor`.
+
+    Parameters
+    ----------
+    path
+        Path of the file, a CSV table; an existing file is replaced.
+    frequency
+        Natural frequencies, Hz, shape (n_mode,).
+    loss_factor
+        Total loss factors of the modes, with radiation and edges, or one for all.
+    x, y
+        Coordinates of a grid over the whole floor, m, from 0 to its sides, shapes (n_x,) and
+        (n_y,).
+    shape
+        Motion normal to the floor, of the side of the room, shape (n_mode, n_x, n_y): 1/sqrt(kg) if
+        the modes are normalized to a mass of 1 kg, else in the unit that belongs to `modal_mass`.
+    modal_mass
+        Modal masses, kg, or one for all.
+
+    Raises
+    ------
+    InputError
+        If the shapes of the arrays do not fit together, or a number is not finite; all other
+        checks follow when the file is read.
+    OSError
+        If the file cannot be written.
+    """
+    frequencies = _checked("frequency", frequency, 1)
+    n_mode = len(frequencies)
+    grid = _checked("x", x, 1), _checked("y", y, 1)
+    values = _checked("shape", shape, 3)
+    if values.shape != (n_mode, *map(len, grid)):
+        refuse(f"shape is an array {values.shape}", f"{(n_mode, *map(len, grid))}: modes, x and y")
+    rows = {
+        "frequency,Hz": frequencies,
+        "loss_factor,": _per_mode("loss_factor", loss_factor, n_mode),
+        "modal_mass,kg": _per_mode("modal_mass", modal_mass, n_mode),
+    }
+    points = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 2)
+    lines = [f"{title},{_joined(row)}" for title, row in rows.items()]
+    lines.append(f"x (m),y (m),{','.join(f'mode {i}' for i in range(1, n_mode + 1))}")
+    lines += map(_joined, np.hstack([points, values.reshape(n_mode, -1).T]))
+    replace_file(path, ("\n".join(lines) + "\n").encode())
+
+
+def _joined(row: Array) -> str:
+    """Return numbers with seven digits, separated by commas."""
+    return ",".join(f"{value:.7g}" for value in row)
+
+
+def _per_mode(name: str, values: ArrayLike, n_mode: int) -> Array:
+    """Return one value for each mode."""
+    array = require_real(name, require_array(name, values, (0, 1)))
+    if array.size not in {1, n_mode}:
+        refuse(f"{name} has {array.size} values", f"1, or {n_mode}, one for each mode")
+    return np.broadcast_to(_finite(name, array), (n_mode,))
+
+
+def _checked(name: str, values: ArrayLike, dimensions: int) -> Array:
+    """Return an array of finite numbers of a number of dimensions."""
+    array = require_array(name, values, range(4))
+    if array.ndim != dimensions:
+        refuse(f"{name} has {array.ndim} dimensions", f"{dimensions}")
+    return _finite(name, require_real(name, array))
+
+
+def _finite(name: str, array: Array) -> Array:
+    """Return an array, or refuse it if an entry is not finite."""
+    if not np.isfinite(array).all():
+        refuse(f"{name} has entries that are not finite", "finite numbers")
+    return array
