@@ -1,4 +1,4 @@
-"""Floor and room against pyva, the statistical energy analysis of Peiffer (2022), in the same run."""
+"""Floor and room against pyva, statistical energy analysis (Peiffer 2022), in the same run."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_energies_agree_above_the_critical_frequency(
     both: Any,  # noqa: ANN401
     oracle: Callable[..., None],
 ) -> None:
-    """Formulas of Leppington averaged over directions (pyva) against the modes that are there (thud)."""
+    """Formulas of Leppington (pyva) against the modes that are there (thud)."""
     found = both.prediction
     critical = SOUND_SPEED**2 * np.sqrt(12) / (2 * np.pi * 3500 * found.floor.thickness)
     above = both.frequency > 2 * critical
