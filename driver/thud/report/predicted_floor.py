@@ -16,6 +16,7 @@ from thud.base._schema import (
     MeasuredMobility,
     ModalFloor,
     Plate,
+    RectangularFloor,
     Room,
 )
 from thud.base.errors import ThudError
@@ -380,11 +381,12 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     def add(material: str, thickness: float) -> None:
         layers.append(Layer(material, round(thickness, 6), 0.0))
 
-    if isinstance(floor, Plate | LaminateFloor | JoistFloor) and floor.screed_thickness:
-        add(f"floating plate, {floor.screed_density:g} kg/m³", floor.screed_thickness)
+    built = floor if isinstance(floor, RectangularFloor) else None
+    if built and built.screed_thickness:
+        add(f"floating plate, {built.screed_density:g} kg/m³", built.screed_thickness)
         add(f"resilient layer {_ASSUMED}", _LAYER)
-    below = floor.subceiling_thickness
-    cavity = room.ceiling_depth if room.ceiling_mass else floor.cavity_depth * (below > 0)
+    below = built if built and built.subceiling_thickness else None
+    cavity = below.cavity_depth if below else room.ceiling_depth if room.ceiling_mass else 0.0
     if isinstance(floor, Plate):
         add(f"plate, {floor.density:g} kg/m³", floor.thickness)
     elif isinstance(floor, LaminateFloor):
@@ -401,7 +403,7 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     if cavity > 0:
         add("cavity", cavity)
     if below:
-        add(f"subceiling, {floor.subceiling_density:g} kg/m³", below)
+        add(f"subceiling, {below.subceiling_density:g} kg/m³", below.subceiling_thickness)
     if room.ceiling_mass:
         add(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)
     return layers

@@ -487,7 +487,8 @@ contains
       associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, r => motion%r, k => ribs%fastening, &
          amplitude => get_amplitudes(size(ribs%position)))
          associate (unit => matmul(transpose(amplitude), amplitude), length => get_overlap(x, 0, x, 0))
-            call add_stiffness(system, r, r, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), unit, ribs%loss_factor)
+            call add_stiffness(system, r, r, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), unit, &
+               ribs%loss_factor)
             call add_mass(system, r, r, ribs%mass, length, unit)
             call add_stiffness(system, w, w, k, length, at_ribs, ribs%loss_factor)
             call add_stiffness(system, r, r, k, length, unit, ribs%loss_factor)
