@@ -5,9 +5,10 @@ module thud_floor_modes
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_total_loss, plate_type
-   use thud_plate_stack, only: get_stack_modes, is_uncoupled, plate_stack_type
+   use thud_plate_stack, only: is_uncoupled, plate_stack_type
    use thud_receiver, only: receiver_type
    use thud_ritz_system, only: get_mode_values, modes_type
+   use thud_stack_modes, only: get_stack_modes
    implicit none (type, external)
    private
 

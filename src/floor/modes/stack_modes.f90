@@ -1,0 +1,406 @@
+!> Modes of plates above each other, with ribs and resilient layers, as a Ritz system. The rotations of plates that are not
+!> rigid in shear (Mindlin) are static displacements.
+module thud_stack_modes
+   use thud_function_set, only: amplitudes, cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
+   use thud_kinds, only: wp
+   use thud_lapack, only: dposv
+   use thud_plate_stack, only: get_counts, get_resolved_frequency, has_sines, layer_type, orthotropic_type, &
+      plate_stack_type, ribs_type, rigid_support
+   use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
+      solve_ritz_system
+   implicit none (type, external)
+   private
+
+   public :: get_stack_modes
+
+   !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
+   type :: plate_motion_type
+      type(product_type) :: deflection, rotation_x, rotation_y
+      integer :: w = 0, a = 0, b = 0
+      !> Deflection of the first ribs of a plate, which are fastened by springs, and its number; 0: that of the plate.
+      type(product_type) :: lifting
+      integer :: r = 0
+   end type plate_motion_type
+
+contains
+
+   !> Modes of a stack. The displacements of the plates are the first ones of the modes, in the same order.
+   subroutine get_stack_modes(stack, max_frequency, modes, resolved, failed)
+      type(plate_stack_type), intent(in) :: stack
+      !> Frequency up to which the modes are wanted, Hz.
+      real(wp), intent(in) :: max_frequency
+      type(modes_type), intent(out) :: modes
+      !> Frequency up to which the functions resolve the waves, Hz: less than the wanted one for large or soft plates.
+      real(wp), intent(out) :: resolved
+      !> The system has no solution.
+      logical, intent(out) :: failed
+      type(ritz_system_type) :: system
+      type(plate_motion_type) :: motion(size(stack%plate))
+      integer :: i
+
+      resolved = get_resolved_frequency(stack, max_frequency)
+      do i = 1, size(stack%plate)
+         motion(i) = new_motion(stack, stack%plate(i), resolved)
+         call add_displacement(system, motion(i)%deflection, motion(i)%w)
+      end do
+      do i = 1, size(stack%plate)
+         system%is_bearing = i == stack%bearing
+         if (maxval(stack%plate(i)%shear) > 0.0_wp) then
+            call add_displacement(system, motion(i)%rotation_x, motion(i)%a)
+            call add_displacement(system, motion(i)%rotation_y, motion(i)%b)
+            call add_shear_plate(system, stack%plate(i), motion(i))
+         else
+            call add_thin_plate(system, stack%plate(i), motion(i))
+         end if
+         call add_edges(system, stack%plate(i), motion(i))
+         if (has_fastening(stack%plate(i))) then
+            motion(i)%lifting = product_type(motion(i)%deflection%x, &
+               function_set_type(amplitudes, stack%width, size(stack%plate(i)%ribs(1)%position)))
+            call add_displacement(system, motion(i)%lifting, motion(i)%r)
+         end if
+         call add_ribs(system, stack%plate(i), motion(i))
+      end do
+      system%is_bearing = .false.
+      do i = 1, size(stack%plate) - 1
+         call add_layer(system, stack%layer(i), stack%plate(i), motion(i), motion(i + 1))
+      end do
+      call solve_ritz_system(system, modes, failed)
+   end subroutine get_stack_modes
+
+   !> Whether springs fasten the first ribs of a plate.
+   pure function has_fastening(plate) result(yes)
+      type(orthotropic_type), intent(in) :: plate
+      logical :: yes
+
+      yes = allocated(plate%ribs)
+      if (yes) yes = plate%ribs(1)%fastening > 0.0_wp
+   end function has_fastening
+
+   !> Amplitudes of separate ribs at positions that are symmetric about the middle, as sums and differences of mirrored ones,
+   !> so that modes remain even or odd: an orthogonal matrix, [n_rib, n_rib].
+   pure function get_amplitudes(n) result(matrix)
+      !> Number of ribs.
+      integer, intent(in) :: n
+      real(wp) :: matrix(n, n)
+      integer :: i
+
+      matrix = 0.0_wp
+      do i = 1, n/2
+         matrix([i, n + 1 - i], i) = sqrt(0.5_wp)
+         matrix([i, n + 1 - i], n + 1 - i) = [sqrt(0.5_wp), -sqrt(0.5_wp)]
+      end do
+      if (mod(n, 2) == 1) matrix((n + 1)/2, (n + 1)/2) = 1.0_wp
+   end function get_amplitudes
+
+   !> Functions of the deflection and the rotations of a plate.
+   pure function new_motion(stack, plate, frequency) result(motion)
+      type(plate_stack_type), intent(in) :: stack
+      type(orthotropic_type), intent(in) :: plate
+      !> Frequency up to which waves are resolved, Hz.
+      real(wp), intent(in) :: frequency
+      type(plate_motion_type) :: motion
+      type(function_set_type) :: deflection(2), rotation(2)
+      real(wp), allocatable :: lines(:)
+      real(wp) :: sides(2)
+      integer :: n(2)
+      integer :: i
+
+      n = get_counts(stack, plate, frequency)
+      sides = [stack%length, stack%width]
+      do i = 1, 2
+         if (has_sines(plate, i)) then
+            deflection(i) = function_set_type(sines, sides(i), n(i))
+            rotation(i) = function_set_type(cosines, sides(i), n(i))
+            cycle
+         end if
+         lines = spread(0.0_wp, 1, 0)
+         if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
+         if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
+         associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])
+            associate (fixed => [pack(ends, edge%deflection >= rigid_support), lines], &
+               clamped => pack(ends, edge%rotation >= rigid_support))
+               deflection(i) = new_polynomials(sides(i), n(i) + size(fixed) + size(clamped), [fixed, clamped], &
+                  [spread(0, 1, size(fixed)), spread(1, 1, size(clamped))])
+               rotation(i) = new_polynomials(sides(i), n(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
+            end associate
+         end associate
+      end do
+      motion%deflection = product_type(deflection(1), deflection(2))
+      motion%rotation_x = product_type(rotation(1), deflection(2), is_static=.true.)
+      motion%rotation_y = product_type(deflection(1), rotation(2), is_static=.true.)
+   end function new_motion
+
+   !> Stiffness and mass of a plate that is rigid in shear (Kirchhoff).
+   subroutine add_thin_plate(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+
+      associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, eta => plate%loss_factor)
+         call add_stiffness(system, w, w, plate%along, get_overlap(x, 2, x, 2), get_overlap(y, 0, y, 0), eta)
+         call add_stiffness(system, w, w, plate%across, get_overlap(x, 0, x, 0), get_overlap(y, 2, y, 2), eta)
+         call add_stiffness(system, w, w, plate%coupling, get_overlap(x, 0, x, 2), get_overlap(y, 2, y, 0), eta)
+         call add_stiffness(system, w, w, plate%coupling, get_overlap(x, 2, x, 0), get_overlap(y, 0, y, 2), eta)
+         call add_stiffness(system, w, w, 4*plate%torsion, get_overlap(x, 1, x, 1), get_overlap(y, 1, y, 1), eta)
+         call add_mass(system, w, w, plate%mass, get_overlap(x, 0, x, 0), get_overlap(y, 0, y, 0))
+         call add_mass(system, w, w, plate%inertia, get_overlap(x, 1, x, 1), get_overlap(y, 0, y, 0))
+         call add_mass(system, w, w, plate%inertia, get_overlap(x, 0, x, 0), get_overlap(y, 1, y, 1))
+      end associate
+   end subroutine add_thin_plate
+
+   !> Stiffness and mass of a plate with shear (Mindlin): the energy of bending is that of the rotations, the energy of
+   !> shear that of slope minus rotation.
+   subroutine add_shear_plate(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+
+      associate (x => motion%deflection%x, y => motion%deflection%y, turn_x => motion%rotation_x%x, &
+         turn_y => motion%rotation_y%y, w => motion%w, a => motion%a, b => motion%b, eta => plate%loss_factor)
+         call add_stiffness(system, a, a, plate%along, get_overlap(turn_x, 1, turn_x, 1), get_overlap(y, 0, y, 0), eta)
+         call add_stiffness(system, b, b, plate%across, get_overlap(x, 0, x, 0), get_overlap(turn_y, 1, turn_y, 1), eta)
+         call add_stiffness(system, a, b, plate%coupling, get_overlap(turn_x, 1, x, 0), get_overlap(y, 0, turn_y, 1), eta)
+         call add_stiffness(system, a, a, plate%torsion, get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 1, y, 1), eta)
+         call add_stiffness(system, b, b, plate%torsion, get_overlap(x, 1, x, 1), get_overlap(turn_y, 0, turn_y, 0), eta)
+         call add_stiffness(system, a, b, plate%torsion, get_overlap(turn_x, 0, x, 1), get_overlap(y, 1, turn_y, 0), eta)
+         associate (s => plate%shear)
+            call add_stiffness(system, w, w, s(1), get_overlap(x, 1, x, 1), get_overlap(y, 0, y, 0), eta)
+            call add_stiffness(system, a, a, s(1), get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 0, y, 0), eta)
+            call add_stiffness(system, w, a, -s(1), get_overlap(x, 1, turn_x, 0), get_overlap(y, 0, y, 0), eta)
+            call add_stiffness(system, w, w, s(2), get_overlap(x, 0, x, 0), get_overlap(y, 1, y, 1), eta)
+            call add_stiffness(system, b, b, s(2), get_overlap(x, 0, x, 0), get_overlap(turn_y, 0, turn_y, 0), eta)
+            call add_stiffness(system, w, b, -s(2), get_overlap(x, 0, x, 0), get_overlap(y, 1, turn_y, 0), eta)
+         end associate
+         call add_mass(system, w, w, plate%mass, get_overlap(x, 0, x, 0), get_overlap(y, 0, y, 0))
+         call add_mass(system, a, a, plate%inertia, get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 0, y, 0))
+         call add_mass(system, b, b, plate%inertia, get_overlap(x, 0, x, 0), get_overlap(turn_y, 0, turn_y, 0))
+      end associate
+   end subroutine add_shear_plate
+
+   !> Springs along the edges of a plate that are not rigid. Equal edges are one term, which keeps the symmetry.
+   subroutine add_edges(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+      integer :: i
+
+      do i = 1, 2
+         call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection)
+         associate (rotation => plate%edge(2*i - 1:2*i)%rotation)
+            if (motion%a == 0) then
+               call add_ends(system, i, motion%w, motion%deflection, 1, rotation)
+            else if (i == 1) then
+               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation)
+            else
+               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation)
+            end if
+         end associate
+      end do
+   end subroutine add_edges
+
+   !> Springs along both edges across one direction.
+   subroutine add_ends(system, direction, number, shape, order, spring)
+      type(ritz_system_type), intent(inout) :: system
+      !> 1: edges x = constant, 2: edges y = constant.
+      integer, intent(in) :: direction
+      !> Number of the displacement and its functions.
+      integer, intent(in) :: number
+      type(product_type), intent(in) :: shape
+      !> Order of the derivative that the springs resist.
+      integer, intent(in) :: order
+      !> Stiffness per length.
+      real(wp), intent(in) :: spring(2)
+      real(wp) :: ends(2)
+      integer :: i, n
+
+      ends = [0.0_wp, merge(shape%x%length, shape%y%length, direction == 1)]
+      n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp)
+      do i = 1, 3 - n
+         if (.not. spring(i) < rigid_support) cycle
+         associate (at => ends(i:i + n - 1))
+            if (direction == 1) then
+               call add_stiffness(system, number, number, spring(i), get_point_matrix(shape%x, at, order), &
+                  get_overlap(shape%y, 0, shape%y, 0), 0.0_wp)
+            else
+               call add_stiffness(system, number, number, spring(i), get_overlap(shape%x, 0, shape%x, 0), &
+                  get_point_matrix(shape%y, at, order), 0.0_wp)
+            end if
+         end associate
+      end do
+   end subroutine add_ends
+
+   !> Sum over positions of products of derivatives of functions: [count, count].
+   pure function get_point_matrix(set, position, order) result(matrix)
+      type(function_set_type), intent(in) :: set
+      !> Positions, m: [n_position].
+      real(wp), intent(in) :: position(:)
+      !> Order of the derivatives.
+      integer, intent(in) :: order
+      real(wp) :: matrix(set%count, set%count)
+
+      associate (value => get_functions(set, position, order))
+         matrix = matmul(transpose(value), value)
+      end associate
+   end function get_point_matrix
+
+   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection. Those that springs fasten
+   !> have a deflection of their own.
+   subroutine add_ribs(system, plate, motion)
+      type(ritz_system_type), intent(inout) :: system
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: motion
+      integer :: i
+
+      if (.not. allocated(plate%ribs)) return
+      do i = 1, size(plate%ribs)
+         associate (ribs => plate%ribs(i), w => motion%w, x => motion%deflection%x, y => motion%deflection%y)
+            if (ribs%along_width) then
+               associate (at_ribs => get_point_matrix(x, ribs%position, 0), slope => get_point_matrix(x, ribs%position, 1))
+                  call add_stiffness(system, w, w, 1.0_wp, at_ribs, get_beam_stiffness(ribs, y, motion%rotation_y%y), &
+                     ribs%loss_factor)
+                  call add_stiffness(system, w, w, ribs%torsion, slope, get_overlap(y, 1, y, 1), ribs%loss_factor)
+                  call add_mass(system, w, w, ribs%mass, at_ribs, get_overlap(y, 0, y, 0))
+                  call add_mass(system, w, w, ribs%inertia, slope, get_overlap(y, 0, y, 0))
+               end associate
+            else
+               associate (at_ribs => get_point_matrix(y, ribs%position, 0), slope => get_point_matrix(y, ribs%position, 1))
+                  call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
+                  call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
+                  if (i == 1 .and. motion%r > 0) then
+                     call add_own_motion(system, ribs, motion, at_ribs)
+                     cycle
+                  end if
+                  call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, &
+                     ribs%loss_factor)
+                  call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
+               end associate
+            end if
+         end associate
+      end do
+   end subroutine add_ribs
+
+   !> Bending and mass of ribs along the length that springs fasten to a plate.
+   subroutine add_own_motion(system, ribs, motion, at_ribs)
+      type(ritz_system_type), intent(inout) :: system
+      type(ribs_type), intent(in) :: ribs
+      type(plate_motion_type), intent(in) :: motion
+      !> Products of the plate's functions, summed over the ribs: [count, count].
+      real(wp), intent(in) :: at_ribs(:, :)
+
+      associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, r => motion%r, k => ribs%fastening, &
+         amplitude => get_amplitudes(size(ribs%position)))
+         associate (unit => matmul(transpose(amplitude), amplitude), length => get_overlap(x, 0, x, 0))
+            call add_stiffness(system, r, r, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), unit, &
+               ribs%loss_factor)
+            call add_mass(system, r, r, ribs%mass, length, unit)
+            call add_stiffness(system, w, w, k, length, at_ribs, ribs%loss_factor)
+            call add_stiffness(system, r, r, k, length, unit, ribs%loss_factor)
+            call add_stiffness(system, w, r, -k, length, &
+               matmul(transpose(get_functions(y, ribs%position, 0)), amplitude), ribs%loss_factor)
+         end associate
+      end associate
+   end subroutine add_own_motion
+
+   !> Stiffness of a rib over the functions of its deflection. With shear (Timoshenko), its rotation takes the values of
+   !> least energy.
+   function get_beam_stiffness(ribs, deflection, rotation) result(stiffness)
+      type(ribs_type), intent(in) :: ribs
+      type(function_set_type), intent(in) :: deflection, rotation
+      !> The stiffness, N/m times m: [deflection%count, deflection%count].
+      real(wp) :: stiffness(deflection%count, deflection%count)
+      real(wp) :: rotated(rotation%count, rotation%count)
+      real(wp), dimension(rotation%count, deflection%count) :: coupling, followed
+      integer :: info
+
+      if (.not. ribs%shear > 0.0_wp) then
+         stiffness = ribs%bending*get_overlap(deflection, 2, deflection, 2)
+         return
+      end if
+      rotated = ribs%bending*get_overlap(rotation, 1, rotation, 1) + ribs%shear*get_overlap(rotation, 0, rotation, 0)
+      coupling = ribs%shear*get_overlap(rotation, 0, deflection, 1)
+      followed = coupling
+      call dposv('U', rotation%count, deflection%count, rotated, rotation%count, followed, rotation%count, info)
+      stiffness = ribs%shear*get_overlap(deflection, 1, deflection, 1) - matmul(transpose(coupling), followed)
+   end function get_beam_stiffness
+
+   !> Springs between two plates; those along lines are at the ribs of the upper plate if it has ribs that springs fasten.
+   subroutine add_layer(system, layer, plate, upper, lower)
+      type(ritz_system_type), intent(inout) :: system
+      type(layer_type), intent(in) :: layer
+      !> The upper plate.
+      type(orthotropic_type), intent(in) :: plate
+      type(plate_motion_type), intent(in) :: upper, lower
+      integer :: i
+
+      if (layer%stiffness > 0.0_wp) then
+         call add_between(layer%stiffness, layer%loss_factor)
+      end if
+      if (allocated(layer%line_y)) then
+         if (upper%r > 0) then
+            call add_below_ribs(get_amplitudes(size(plate%ribs(1)%position)))
+         else
+            call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
+         end if
+      end if
+      if (.not. allocated(layer%point)) return
+      do i = 1, size(layer%point)
+         associate (point => layer%point(i))
+            call add_between(point%stiffness, point%loss_factor, x=[point%x], y=[point%y])
+         end associate
+      end do
+   contains
+
+      !> Adds springs at all positions, at lines y, or at a point.
+      subroutine add_between(stiffness, loss_factor, x, y)
+         real(wp), intent(in) :: stiffness, loss_factor
+         real(wp), intent(in), optional :: x(:), y(:)
+
+         call add_pair(system, upper, upper, stiffness, loss_factor, x, y)
+         call add_pair(system, lower, lower, stiffness, loss_factor, x, y)
+         call add_pair(system, upper, lower, -stiffness, loss_factor, x, y)
+      end subroutine add_between
+
+      !> Adds the springs along lines between ribs and the lower plate.
+      subroutine add_below_ribs(amplitude)
+         !> Amplitudes of the ribs: [n_rib, n_rib].
+         real(wp), intent(in) :: amplitude(:, :)
+
+         associate (x => upper%lifting%x, k => layer%line_stiffness, eta => layer%line_loss_factor)
+            call add_pair(system, lower, lower, k, eta, y=layer%line_y)
+            call add_stiffness(system, upper%r, upper%r, k, get_overlap(x, 0, x, 0), &
+               matmul(transpose(amplitude), amplitude), eta)
+            call add_stiffness(system, upper%r, lower%w, -k, get_overlap(x, 0, lower%deflection%x, 0), &
+               matmul(transpose(amplitude), get_functions(lower%deflection%y, layer%line_y, 0)), eta)
+         end associate
+      end subroutine add_below_ribs
+   end subroutine add_layer
+
+   !> Stiffness of springs between the deflections of two plates, or of one plate with itself.
+   subroutine add_pair(system, first, second, stiffness, loss_factor, x, y)
+      type(ritz_system_type), intent(inout) :: system
+      type(plate_motion_type), intent(in) :: first, second
+      !> Stiffness per area, per length or of a point, and loss factor.
+      real(wp), intent(in) :: stiffness, loss_factor
+      !> Positions of the springs, m (default: everywhere).
+      real(wp), intent(in), optional :: x(:), y(:)
+
+      call add_stiffness(system, first%w, second%w, stiffness, &
+         get_product(first%deflection%x, second%deflection%x, x), &
+         get_product(first%deflection%y, second%deflection%y, y), loss_factor)
+   end subroutine add_pair
+
+   !> Products of two sets, summed over positions or, without these, integrated: [first%count, second%count].
+   pure function get_product(first, second, position) result(matrix)
+      type(function_set_type), intent(in) :: first, second
+      !> Positions, m.
+      real(wp), intent(in), optional :: position(:)
+      real(wp) :: matrix(first%count, second%count)
+
+      if (present(position)) then
+         matrix = matmul(transpose(get_functions(first, position, 0)), get_functions(second, position, 0))
+      else
+         matrix = get_overlap(first, 0, second, 0)
+      end if
+   end function get_product
+
+end module thud_stack_modes
