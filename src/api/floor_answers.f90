@@ -1,5 +1,6 @@
 !> Answers on floors and the rooms below them; see `thud_answer`.
 module thud_floor_answers
+   use thud_ascending, only: get_ascending_order
    use thud_band, only: band_type, find_bands
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type, get_floor_number
@@ -225,7 +226,7 @@ contains
       end associate
       if (allocated(error)) return
       order = pack([(i, i=1, size(modes%omega))], modes%omega < min(2*pi*request%get_number('highest'), modes%limit))
-      call sort_by(modes%omega, order)
+      order = order(get_ascending_order(modes%omega(order)))
       call bundle%add_array('frequency', [size(order)], modes%omega(order)/(2*pi))
       call bundle%add_array('loss_factor', [size(order)], modes%loss_factor(order))
       call bundle%add_number('limit', modes%limit/(2*pi))
@@ -238,22 +239,6 @@ contains
          call bundle%add_array('shape', shape(shapes), shapes)
       end associate
    end subroutine answer_floor_modes
-
-   !> Sorts numbers by the values that they stand for, ascending (insertion; blocks of modes are sorted already).
-   pure subroutine sort_by(value, order)
-      real(wp), intent(in) :: value(:)
-      integer, intent(inout) :: order(:)
-      integer :: i, k, number
-
-      do i = 2, size(order)
-         number = order(i)
-         do k = i - 1, 1, -1
-            if (value(order(k)) <= value(number)) exit
-            order(k + 1) = order(k)
-         end do
-         order(k + 1) = number
-      end do
-   end subroutine sort_by
 
    !> Modes of a case's floor, the plate that radiates, and the room below as a box.
    subroutine get_modes_and_box(case, modes, plate, box, error)

@@ -80,7 +80,7 @@ def test_zarr_is_written_in_a_memory_that_does_not_grow(
         tracemalloc.stop()
 
     monkeypatch.setattr(Blocks, "_write_zarr", traced)
-    monkeypatch.setattr(samples.SampleStudy, "block_size", 1000)
+    monkeypatch.setattr(samples.SampleStudy, "block_size", 500)
     parameters = {"height": {"low": 0.9, "high": 1.1}}
     for count in (1000, 6000):
         study = {"name": f"of_{count}", "format": "zarr", "parameters": parameters}

@@ -73,9 +73,11 @@ def held(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
 
 @pytest.fixture(scope="module")
 def examples(held: dict[str, object]) -> dict[type, Any]:
-    """Return an object of each public type."""
+    """Return an object of each public type that is no mere base of others."""
     return {
-        kind: next(one for one in held.values() if isinstance(one, kind)) for kind in public_types()
+        kind: next(one for one in held.values() if isinstance(one, kind))
+        for kind in public_types()
+        if kind is not thud.RectangularFloor
     }
 
 

@@ -7,7 +7,7 @@ import re
 import thud
 
 # Characters of a sentence without the path of its file.
-LONGEST = 480
+LONGEST = 500
 # What a number that is none, a parser or an interpreter leaves in a sentence.
 INNER = re.compile(
     r"\b([nN]a[nN]|-?[iI]nf(inity)?)\b|\*\*\*|Traceback|<class |object at 0x"

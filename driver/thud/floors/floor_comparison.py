@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base._schema import RATINGS
 from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
@@ -51,8 +50,8 @@ class FloorComparison(Displayed, Page):
         """Return header and rows of text, with a column for each floor."""
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         titles = (
-            "", "floor", "force", "mean of both predictions, L_iA,Fmax (ISO 717-2)",
-            "by modes, dB", *(f"statistical, {title}, dB" for title in RATINGS.values()),
+            "", "floor", "force", "L_iA,Fmax (ISO 717-2)", "by modes, dB", "statistical, dB",
+            "of octaves (KS F 2863-2), dB", "standardized (ISO 16283-2), dB",
             "required, dB", *octaves, "energy, 50 to 630 Hz, mJ",
             "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
@@ -130,7 +129,7 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         prediction.force,
         prediction.rated_text,
         str(prediction.modal_rating.rounded) if prediction.n_modal else "",
-        *(_rated(rating) for rating in prediction.ratings.values()),
+        *(_rated(prediction.ratings[name]) for name in ("thirds", "octaves", "standardized")),
         _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
         f"{1e3 * prediction.energy.sum():.3g}",

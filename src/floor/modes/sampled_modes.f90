@@ -1,6 +1,7 @@
 !> Modes of a floor from samples on a grid in a file: splines through the samples.
 module thud_sampled_modes
    use, intrinsic :: iso_fortran_env, only: int64
+   use thud_ascending, only: get_ascending_order
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_file, only: read_text_file
@@ -69,6 +70,7 @@ contains
       type(floor_modes_type), intent(out) :: modes
       type(function_set_type) :: set_x, set_y
       real(wp), allocatable :: by_x(:, :), by_y(:, :)
+      integer, allocatable :: order(:)
       integer :: i, n_x, n_y, n_mode
 
       n_x = size(table%x)
@@ -80,8 +82,9 @@ contains
       modes%stack%width = table%y(n_y)
       allocate (modes%stack%plate(1), modes%stack%layer(0))
       modes%stack%plate(1) = orthotropic_type()
-      modes%omega = 2*pi*table%frequency
-      modes%loss_factor = table%loss_factor
+      order = get_ascending_order(table%frequency)
+      modes%omega = 2*pi*table%frequency(order)
+      modes%loss_factor = table%loss_factor(order)
       ! There is no mode above the highest one.
       modes%limit = maxval(modes%omega)*(1 + epsilon(1.0_wp))
       modes%sum_limit = modes%limit
@@ -98,7 +101,8 @@ contains
             shape%y = [(i, i=1, n_y)]
             allocate (shape%coefficient(n_x*n_y, n_mode))
             do i = 1, n_mode
-               shape%coefficient(:, i) = reshape(matmul(matmul(by_x, table%shape(:, :, i)), transpose(by_y)), [n_x*n_y])
+               shape%coefficient(:, i) = reshape(matmul(matmul(by_x, table%shape(:, :, order(i))), transpose(by_y)), &
+                  [n_x*n_y])
             end do
             modes%is_orthogonal = are_orthogonal(shape%coefficient)
          end associate
