@@ -61,7 +61,8 @@ module thud_modal_room
       integer :: n_band = 0
       !> Maximum Fast levels, dB re 20 uPa: [n_band, n_microphone, n_ball].
       real(wp), allocatable :: level(:, :, :)
-      !> Energy mean over the positions, dB, standard deviation of the levels, and that of their mean, dB: [n_band].
+      !> Energy mean over the positions, dB, standard deviation of the levels, and that of their mean, dB, without balls on
+      !> rigid supports: [n_band].
       real(wp), allocatable :: mean(:), spread(:), mean_spread(:)
       !> Sound pressure, Pa: [n_sample, n_microphone, n_ball], at this many samples per second.
       real(wp), allocatable :: pressure(:, :, :)
@@ -145,7 +146,7 @@ contains
       real(wp), intent(in), optional :: max_frequency
       real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), frequency(:)
       complex(wp), allocatable :: spectrum(:), sound(:, :, :)
-      integer, allocatable :: lx(:), ly(:), kept(:)
+      integer, allocatable :: lx(:), ly(:), kept(:), moving(:)
       type(answers_type) :: answers
       real(wp) :: highest, duration, slowest
       integer :: i, j, n_sample, n_line
@@ -198,8 +199,10 @@ contains
             end do
          end do
       end if
+      ! Balls on a rigid support move nothing: nobody drops them there.
+      moving = pack([(j, j=1, size(drive, 2))], maxval(abs(drive), dim=1) > 1.0e-6_wp*maxval(abs(drive)))
       do i = 1, room%n_band
-         associate (level => room%level(i, :, :))
+         associate (level => room%level(i, :, moving))
             room%mean(i) = 10*log10(sum(10**(level/10))/size(level))
             room%spread(i) = sqrt(get_variance(reshape(level, [size(level)])))
             ! Balls and microphones are samples of their own.

@@ -23,6 +23,9 @@ module thud_rectangular_floor
    !> Supports of the edges.
    character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic', 'walls']
 
+   !> Minimum distance of the source from a rigid line, m: the radius of the contact.
+   real(wp), parameter :: min_distance = 0.05_wp
+
    !> Numbers of octaves and one-third-octave bands of a rating.
    integer, parameter :: octave_bands = 4, third_bands = 12
 
@@ -156,6 +159,10 @@ contains
       call check_positions(options%line_y, 'line_y', base%plate%width)
       call check_positions(options%screed%bridge_x, 'bridge_x', base%plate%length)
       call check_positions(options%screed%bridge_y, 'bridge_y', base%plate%width)
+      associate (source => options%get_source())
+         call check_source(options%line_x, 'line_x', source(1)*base%plate%length)
+         call check_source(options%line_y, 'line_y', source(2)*base%plate%width)
+      end associate
       if (allocated(error)) return
       if (all(options%covering_improvement%count /= [0, octave_bands, third_bands])) then
          error = input_error('&'//trim(base%group)//': covering_improvement has ' &
@@ -164,9 +171,9 @@ contains
       else if (options%covering_improvement%count > 0 .and. options%covering_stiffness > 0.0_wp) then
          error = input_error('&'//trim(base%group)//': covering_stiffness and covering_improvement describe the same ' &
             //'covering twice; allowed: one of them')
-      else if (options%support == 'free' .and. options%line_x%count + options%line_y%count == 0) then
-         error = input_error('&'//trim(base%group)//': support = free needs supports at line_x or line_y; ' &
-            //'allowed: at least one')
+      else if (is_loose() .and. options%line_x%count + options%line_y%count == 0) then
+         error = input_error('&'//trim(base%group)//': support = '//trim(options%support) &
+            //' without any stiffness needs supports at line_x or line_y; allowed: at least one')
       else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
          error = input_error('&'//trim(base%group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
             //' values and bridge_y '//to_text(options%screed%bridge_y%count)//'; allowed: the same number of both')
@@ -182,6 +189,27 @@ contains
          error = input_error('&'//trim(base%group)//': '//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
       end subroutine check_edges
 
+      !> Whether no edge is held against deflection.
+      function is_loose() result(yes)
+         logical :: yes
+         type(edge_type) :: edge(4)
+
+         edge = get_edges(options, options%support)
+         yes = all(edge%deflection <= 0.0_wp)
+      end function is_loose
+
+      !> Checks that the source does not lie on a rigid line.
+      subroutine check_source(list, key, source)
+         type(list_type), intent(in) :: list
+         character(len=*), intent(in) :: key
+         !> Position of the source across the lines, m.
+         real(wp), intent(in) :: source
+
+         if (allocated(error) .or. all(abs(list%values(:list%count) - source) >= min_distance)) return
+         error = input_error('&'//trim(base%group)//': the source, at '//to_text(source)//' m, lies on a support of '//key &
+            //'; allowed: sources at least '//to_text(min_distance)//' m from it')
+      end subroutine check_source
+
       !> Checks that positions lie between two edges.
       subroutine check_positions(list, key, side)
          type(list_type), intent(in) :: list
@@ -189,9 +217,9 @@ contains
          !> Distance of the edges, m.
          real(wp), intent(in) :: side
 
-         if (allocated(error) .or. all(list%values(:list%count) < side)) return
-         error = input_error('&'//trim(base%group)//': '//key//' = '//to_text(maxval(list%values(:list%count))) &
-            //' m lies outside the floor; allowed: below '//to_text(side)//' m')
+         if (allocated(error)) return
+         if (any(list%values(:list%count) >= side)) error = input_error('&'//trim(base%group)//': '//key//' = ' &
+            //to_text(maxval(list%values(:list%count)))//' m lies outside the floor; allowed: below '//to_text(side)//' m')
       end subroutine check_positions
    end subroutine check_build_up
 

@@ -231,6 +231,21 @@ def test_masses_and_unequal_spacings_do_not_matter(path: Path) -> None:
     assert thud.mobility(FLOOR, frequency) == pytest.approx(same, rel=1e-12)
 
 
+def test_order_of_the_modes_does_not_matter(path: Path) -> None:
+    x, y = grid(21, 17)
+    modes = slab(600.0, x, y)
+    floor = thud.ModalFloor(file=str(path), thickness=THICKNESS, density=DENSITY)
+    levels = []
+    for order in (slice(None), np.argsort(np.sin(np.arange(len(modes.frequency))))):
+        modes.write(
+            path, frequency=modes.frequency[order], loss_factor=modes.loss_factor[order],
+            shape=modes.shape[order],
+        )  # fmt: skip
+        found = thud.predict_level(floor=floor, room=ROOM)
+        levels.append(np.append(found.level, found.modal_level))
+    assert levels[1] == pytest.approx(levels[0], abs=1e-6)
+
+
 @pytest.mark.usefixtures("path")
 def test_samples_of_floors_share_the_file() -> None:
     # Each thread reads the file for itself.

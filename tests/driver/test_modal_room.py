@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -152,3 +153,36 @@ def test_room_below_a_part_of_a_slab_hears_that_part(shell: thud.Impact) -> None
     same = thud.predict_level(shell, slab, left), thud.predict_level(shell, mirrored, right)
     n = same[0].n_modal
     assert same[0].modal_level[:n] == pytest.approx(same[1].modal_level[:n], abs=1e-6)
+
+
+def test_positions_on_a_wall_below_are_no_samples(shell: thud.Impact) -> None:
+    """The middle of the standard positions lies on the wall, where the ball moves nothing."""
+    slab = thud.Plate(line_x=(2.5,), source_x=0.2)
+    found = thud.predict_level(shell, slab, thud.Room(height=2.5))
+    low, high = found.contributions["positions"]
+    assert -4 < low < 0 < high < 4
+    levels = thud.modal_room(found.source).level
+    on_wall = levels.max(axis=(1, 2)) < levels.max() - 100
+    assert on_wall.any()
+    kept = 10 ** (levels[~on_wall] / 10)
+    assert thud.modal_room(found.source).mean == pytest.approx(
+        10 * np.log10(kept.mean(axis=(0, 1))), abs=1e-6
+    )
+
+
+@pytest.mark.parametrize(
+    ("floor", "words"),
+    [
+        ({"line_x": (2.5,)}, ("source", 2.5, "line_x")),
+        ({"line_y": (2.04,)}, ("source", "line_y")),
+        (
+            {"support": "elastic", "support_stiffness": (0.0,), "support_rotation": (1e6,)},
+            ("support = elastic", "line_x or line_y"),
+        ),
+    ],
+)
+def test_floors_that_cannot_carry_the_ball_are_refused(
+    floor: dict[str, Any], words: tuple[str | float, ...]
+) -> None:
+    with pytest.raises(thud.InputError, match=naming("&plate", *words)):
+        thud.solve(floor=thud.Plate(**floor))

@@ -34,7 +34,7 @@ def screen_text(floor: PredictedFloor) -> str:
         floor.name,
         f"  L_iA,Fmax {floor.prediction.rated_text}, ISO 717-2",
         *(f"    {text:>6}  {title}" for title, _, _, text in floor.ratings[1:-1]),
-        f"  Octaves, KS F 2863-2: {floor.ratings[-1][3]}",
+        f"  Statistical, of octaves, KS F 2863-2: {floor.ratings[-1][3]}",
         *([f"  {required}"] if required else []),
         "  Contributions to the interval, dB:",
         *(
