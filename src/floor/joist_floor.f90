@@ -142,8 +142,8 @@ contains
       class(joist_floor_type), intent(in) :: options
       type(ribs_type) :: blocking
 
+      allocate (blocking%position, source=options%blocking_x%values(:options%blocking_x%count))
       associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height)
-         blocking%position = options%blocking_x%values(:options%blocking_x%count)
          blocking%along_width = .true.
          blocking%bending = options%blocking_stiffness
          if (.not. blocking%bending > 0.0_wp) blocking%bending = e*b*h**3/12

@@ -14,9 +14,8 @@ module thud_laminate_floor
 
    public :: laminate_floor_type
 
-   !> Thicknesses, m, and directions of the default layers, degrees.
+   !> Thicknesses of the default layers, m.
    real(wp), parameter :: default_thickness(*) = [0.04_wp, 0.02_wp, 0.04_wp, 0.02_wp, 0.04_wp]
-   real(wp), parameter :: default_angle(*) = [0.0_wp, 90.0_wp, 0.0_wp, 90.0_wp, 0.0_wp]
 
    !> The floor; the defaults are five layers of spruce (strength class C24).
    type, extends(rectangular_floor_type) :: laminate_floor_type
