@@ -28,8 +28,7 @@ HEAD_TIME = 10
 LOG_INTERVAL = 60.0
 
 
-# Maximum number of connections, a quarter of the allowed open files: until surplus connections are
-# closed there may be twice as many, and tasks also open files.
+# Maximum number of connections, a quarter of the allowed open files: tasks also open files.
 _FILES, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
 MAX_CONNECTIONS = 500 if _FILES == resource.RLIM_INFINITY else min(500, _FILES // 4)
 
@@ -43,7 +42,8 @@ def run_server(application: Starlette, listener: socket.socket, folder: Path) ->
         application,
         http=_Connection,
         log_level="warning",
-        backlog=MAX_CONNECTIONS,
+        # As many are accepted at once; surplus connections close one or two rounds later.
+        backlog=max(1, MAX_CONNECTIONS // 4),
         timeout_keep_alive=HEAD_TIME,
         timeout_graceful_shutdown=1,
     )
