@@ -205,10 +205,10 @@ contains
          associate (level => room%level(i, :, moving))
             room%mean(i) = 10*log10(sum(10**(level/10))/size(level))
             room%spread(i) = sqrt(get_variance(reshape(level, [size(level)])))
-            ! Balls and microphones are samples of their own.
+            ! Balls and microphones are samples of their own; n of them estimate a variance with n - 1 degrees of freedom.
             associate (n_microphone => size(level, 1), n_ball => size(level, 2))
-               room%mean_spread(i) = sqrt(get_variance(sum(level, dim=1)/n_microphone)/n_ball &
-                  + get_variance(sum(level, dim=2)/n_ball)/n_microphone)
+               room%mean_spread(i) = sqrt(get_variance(sum(level, dim=1)/n_microphone)/max(n_ball - 1, 1) &
+                  + get_variance(sum(level, dim=2)/n_ball)/max(n_microphone - 1, 1))
             end associate
          end associate
       end do

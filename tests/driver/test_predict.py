@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from conftest import ErrorsOf
 
-TABLES = ["bands.csv", "contributions.csv", "ratings.csv"]
+TABLES = ["bands.csv", "contributions.csv", "paths.csv", "ratings.csv"]
 DECK = "concrete 180, screed on 15 MN/m3, ceiling"
 
 
@@ -116,6 +116,25 @@ def test_interval_is_that_of_the_listed_contributions(
     sizes = np.abs(ends).max(axis=0)
     assert (np.diff(sizes) <= 0).all()
     assert f"{rated:.0f} dB ({low:.0f} to {high:.0f})" == floor.prediction.rated_text
+
+
+def test_fractions_of_the_paths_are_stated(tmp_path: Path) -> None:
+    """The A-weighted fractions are means of those of the bands, weighted by their energies."""
+    room = thud.Room(wall_lengths=(5.0, 4.0))
+    prediction = thud.predict_level(floor=thud.Plate(), room=room)
+    floor = PredictedFloor("walls", "walls", prediction)
+    shares = prediction.rated_shares
+    assert shares.sum() == pytest.approx(1.0)
+    bands = prediction.path_shares
+    assert (shares > bands.min(axis=0)).all()
+    assert (shares < bands.max(axis=0)).all()
+    text = f"floor {100 * shares[0]:.2g} %, wall 1 (5 m) {100 * shares[1]:.2g} %"
+    assert text in " ".join(screen_text(floor).split())
+    assert text in floor_page(floor, "", "")
+    rows = read_table(contents([floor], tmp_path, report=False)["paths.csv"])
+    stated = [float(row["fraction of the energy"]) for row in rows]
+    assert stated == pytest.approx([*bands.ravel(), *shares])
+    assert {row["path"] for row in rows} == {"floor", "wall 1 (5 m)", "wall 2 (4 m)"}
 
 
 def test_page_states_ratings_contributions_and_sources(floor: PredictedFloor, page: Path) -> None:
@@ -256,6 +275,7 @@ def test_workbook_has_every_table(floor: PredictedFloor, tmp_path: Path) -> None
         "bands.csv",
         "ratings.csv",
         "contributions.csv",
+        "paths.csv",
     ]
     rows = list(book["bands"].iter_rows(values_only=True))
     column = rows[0].index("statistical, dB")

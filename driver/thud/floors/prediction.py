@@ -100,6 +100,18 @@ class RoomPrediction(RoomLevel, Displayed):
         return radiated / np.maximum(self.loss_factor, internal + 2 * radiated)
 
     @property
+    def rated_shares(self) -> Array:
+        """Fractions of the A-weighted energy from the floor and from each wall, (1 + n_wall,).
+
+        The energy from the floor is that which it radiates directly or through the ceiling. The
+        levels are the statistical ones.
+        """
+        # A path without energy is silent, 300 dB below the others.
+        paths = 10 * np.log10(np.maximum(self.path_shares, 1e-30)).T
+        ratings = np.array([rating(self.level + path, BANDS).a_weighted for path in paths])
+        return np.asarray(10 ** ((ratings - self.rating.a_weighted) / 10))
+
+    @property
     def octave_rating(self) -> Rating:
         """Single-number rating of the octave levels in the room, with the Korean class."""
         return rating(self.octave_level, BANDWIDTHS[0])

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 WORKBOOK = "predictions.xlsx"
 # Names of the tables; the last is part of the report.
-_TABLES = ("bands", "ratings", "contributions", "changes")
+_TABLES = ("bands", "ratings", "contributions", "paths", "changes")
 # Maximum number of characters in a line on the screen.
 _WIDTH = 80
 
@@ -36,6 +36,7 @@ def screen_text(floor: PredictedFloor) -> str:
         *(f"    {text:>6}  {title}" for title, _, _, text in floor.ratings[1:-1]),
         f"  Statistical, of octaves, KS F 2863-2: {floor.ratings[-1][3]}",
         *([f"  {required}"] if required else []),
+        *([f"  A-weighted energy by path: {floor.path_shares}"] if len(floor.paths) > 1 else []),
         "  Contributions to the interval, dB:",
         *(
             f"    {deviation_text(ends):<13} {contribution_title(name)}"

@@ -216,7 +216,7 @@ def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
         ("Reverberation", f"T = {time} s, of the {humanize(room.reverberation_of)} room"),
         (
             "Flanking walls",
-            f"{len(room.wall_lengths)} described" if room.wall_lengths else "none described",
+            f"A-weighted energy: {floor.path_shares}" if room.wall_lengths else "none described",
         ),
         ("Ceiling", _ceiling(prediction)),
         ("Source", f"{source.mass:.3g} kg, {source.impact_velocity:.3g} m/s; limits of the {kind}"),

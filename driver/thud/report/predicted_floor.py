@@ -164,6 +164,18 @@ class PredictedFloor:
         return result
 
     @property
+    def paths(self) -> list[str]:
+        """Titles of the paths of the sound: the floor and each wall."""
+        lengths = self.prediction.room.wall_lengths
+        return ["floor", *(f"wall {i} ({length:g} m)" for i, length in enumerate(lengths, start=1))]
+
+    @property
+    def path_shares(self) -> str:
+        """Fractions of the A-weighted energy by path, in percent."""
+        shares = zip(self.paths, self.prediction.rated_shares, strict=True)
+        return ", ".join(f"{path} {100 * share:.2g} %" for path, share in shares)
+
+    @property
     def assumptions(self) -> list[tuple[str, str, str]]:
         """Quantity, value with unit, and source of the main and the stated values."""
         rows = [(meaning, value, source) for _, meaning, value, source in self._values() if source]
@@ -276,6 +288,7 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
     ratings: list[Cells] = [("floor", "rating", "standard", "value, dB", "text")]
     head = ("floor", "contribution", "lower, dB", "upper, dB")
     contributions: list[Cells] = [head]
+    paths: list[Cells] = [("floor", "band, Hz", "path", "fraction of the energy")]
     changed: list[Cells] = [("floor", "change", "difference, dB")]
     for floor in floors:
         prediction = floor.prediction
@@ -293,9 +306,12 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
         if required:
             ratings.append((floor.name, "required", "", required.required, str(required)))
         contributions += [(floor.name, name, *ends) for name, ends in floor.contributions.items()]
+        shares = [*prediction.path_shares, prediction.rated_shares]
+        for band, row in zip([*prediction.frequency, "A"], shares, strict=True):
+            paths += [(floor.name, band, *path) for path in zip(floor.paths, row, strict=True)]
         if changes:
             changed += [(floor.name, *change) for change in floor.changes]
-    result = {"bands": bands, "ratings": ratings, "contributions": contributions}
+    result = {"bands": bands, "ratings": ratings, "contributions": contributions, "paths": paths}
     return {**result, "changes": changed} if changes else result
 
 
