@@ -705,3 +705,16 @@ def test_samples_that_exceed_the_memory_are_told_before_they_are_computed() -> N
     mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
     with pytest.raises(thud.InputError, match=f"{2**60} samples"):
         thud.sweep({"parameters": {"height": height, "mass": mass}}, allow_large=True)
+
+
+def test_samples_state_sources_that_do_not_conform() -> None:
+    """The shell reads low from 125 Hz on; the source of a room whose case names none conforms."""
+    case = {"floor": {"name": "plate"}, "room": {}}
+    study = {
+        "design": {"kind": "grid"},
+        "parameters": {"plate.thickness": {"low": 0.14, "high": 0.2, "count": 2}},
+    }
+    shell = thud.sweep({"case": {**case, "model": {"name": "hollow_sphere"}}, **study})
+    assert "2 of 2 samples do not conform" in " ".join(shell.warnings)
+    assert "statistical predictions" in " ".join(shell.notes)
+    assert thud.sweep({"case": case, **study}).warnings == ()

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NO_ERRORS = "The samples state no numerical errors; a run of a single case states its own."
+_STATISTICAL = (
+    "the ratings of samples are statistical predictions; thud-driver predict also states that by "
+    "modes, and the interval of the rating"
+)
 
 
 class StudyResult(Displayed):
@@ -63,22 +67,31 @@ class SampleResult(StudyResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Number of samples without results, and the most frequent reason."""
+        """Samples without results and the most frequent reason, and sources without conformity."""
         failed = self.dataset["status"].values != 0
-        if not failed.any():
-            return ()
-        ((reason, _),) = Counter(self.dataset["reason"].values[failed]).most_common(1)
-        count = f"{failed.sum()} of {failed.size} samples have no results"
-        return (f"{count}; most frequent reason: {reason}",)
+        result = []
+        if failed.any():
+            ((reason, _),) = Counter(self.dataset["reason"].values[failed]).most_common(1)
+            count = f"{failed.sum()} of {failed.size} samples have no results"
+            result.append(f"{count}; most frequent reason: {reason}")
+        if "room_rating" in self.dataset:
+            others = ~failed & ~self.dataset["conforms"].values
+            if others.any():
+                result.append(
+                    f"the sources of {others.sum()} of {failed.size} samples do not conform: their "
+                    "levels in the room are not those of a standard source"
+                )
+        return tuple(result)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Accuracy of the surrogate, and the number of verdicts that it leaves undecided."""
-        if "surrogate" not in self.dataset.attrs:
-            return ()
-        undecided = self.dataset["undecided"]
-        share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
-        return (f"{self.dataset.attrs['surrogate']}; it leaves {share}",)
+        """Accuracy of the surrogate with its undecided verdicts, and the kind of ratings."""
+        result = [_STATISTICAL] if "room_rating" in self.dataset else []
+        if "surrogate" in self.dataset.attrs:
+            undecided = self.dataset["undecided"]
+            share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
+            result.append(f"{self.dataset.attrs['surrogate']}; it leaves {share}")
+        return tuple(result)
 
     def table(self) -> str:
         """Return the result as text; it says that the samples of a model state no errors."""
