@@ -349,7 +349,9 @@ def _value_text(key: Key, value: object) -> str:
         return str(value)
     if not all(isinstance(number, float) for number in numbers):
         return ", ".join(humanize(str(entry)) for entry in numbers)
-    unit, size = display_unit(key.unit, max(map(abs, numbers), default=0.0))
+    # A reverberation time of 500 ms would be unusual.
+    largest = max(map(abs, numbers), default=0.0)
+    unit, size = ("s", 1.0) if key.unit == "s" else display_unit(key.unit, largest)
     text = ", ".join(f"{number / size:.5g}" for number in numbers)
     return f"{text} {unit.replace('m2', 'm²').replace('m3', 'm³')}".strip()
 
