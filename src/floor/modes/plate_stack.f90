@@ -101,7 +101,7 @@ contains
       ! Rotations take about as long as two plates.
       if (any([(maxval(stack%plate(i)%shear) > 0.0_wp, i=1, size(stack%plate))])) limit = limit/2
       frequency = max_frequency
-      do while (sum([(product(get_counts(stack, stack%plate(i), frequency)), i=1, size(stack%plate))]) > limit)
+      do while (sum([(product(real(get_counts(stack, stack%plate(i), frequency), wp)), i=1, size(stack%plate))]) > limit)
          frequency = 0.95_wp*frequency
       end do
    end function get_resolved_frequency
@@ -171,6 +171,8 @@ contains
       real(wp), intent(in) :: frequency
       integer :: n(2)
       real(wp) :: sides(2), stiffness(2)
+      ! More functions than any stack may have.
+      real(wp), parameter :: many = 1.0e6_wp
       real(wp) :: half, inertia
       integer :: i
 
@@ -185,6 +187,7 @@ contains
                half = sides(i)/2*(inertia/b)**0.25_wp
             end if
          end associate
+         half = min(half, many)
          if (has_sines(plate, i)) then
             n(i) = 4 + int(2*half/pi)
          else

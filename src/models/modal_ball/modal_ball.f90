@@ -26,7 +26,7 @@ module thud_modal_ball
    use thud_sphere_modes, only: basis_type, family_type, get_families, get_static_family, limit_family, new_basis
    use thud_static_step, only: new_static_step, static_step_type
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
-   use thud_text, only: to_text
+   use thud_text, only: fixed, to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
@@ -408,7 +408,7 @@ contains
          allowed = 'longer than that'
          if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(settling_time)//' s after the last contact; allowed: '//trim(allowed))
+            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact; allowed: '//trim(allowed))
       else if (state%floor_moves) then
          if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_dof)), state%velocity)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
