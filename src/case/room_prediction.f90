@@ -101,7 +101,8 @@ contains
    end subroutine predict
 
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
-   !> that of the simply supported floor without further supports: its waves are so short that these matter little.
+   !> that of the simply supported floor without further supports, its floating plate simply supported, too: its waves are so
+   !> short that these matter little. The power through bridges is that of infinite plates there.
    subroutine get_radiation(room, floor, plate, modes, bands, radiation, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
@@ -126,7 +127,8 @@ contains
       if (allocated(error)) return
       call get_modal_radiation(simple_modes, plate, room%air, bands(n + 1:), get_area(room, plate), beyond)
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor]
-      radiation%conductance = [radiation%conductance, beyond%conductance]
+      radiation%conductance = [radiation%conductance, &
+         beyond%conductance + floor%get_bridge_conductance(bands(n + 1:)%center)]
    end subroutine get_radiation
 
    !> Part of a floor above a room: its ends along length and width, m.

@@ -42,6 +42,7 @@ module thud_floor_model
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
+      procedure, pass(options) :: get_bridge_conductance
       procedure, pass(options) :: has_subceiling
    end type floor_model_type
 
@@ -216,6 +217,17 @@ contains
 
       yes = .false.
    end function has_modal_conductance
+
+   !> Power into the bearing plate through the bridges of a floating plate per mean-square force, m/(N s): [n]; by default
+   !> none.
+   function get_bridge_conductance(options, frequency) result(conductance)
+      class(floor_model_type), intent(in) :: options
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      real(wp) :: conductance(size(frequency))
+
+      conductance = 0.0_wp
+   end function get_bridge_conductance
 
    !> Whether a subceiling is a part of the floor; by default not.
    pure function has_subceiling(options) result(yes)

@@ -1,12 +1,12 @@
 !> A rectangular plate, isotropic or orthotropic, bare or with a floating plate.
 module thud_plate_floor
-   use thud_double_plate, only: double_plate_type, get_lower_conductance
+   use thud_double_plate, only: get_lower_conductance
    use thud_error, only: error_type
    use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_plate, only: get_plate_fields, get_resistance, plate_type
    use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
-   use thud_screed, only: get_screed_plate, new_orthotropic
+   use thud_screed, only: new_orthotropic
    implicit none (type, external)
    private
 
@@ -41,7 +41,7 @@ contains
    end function get_base
 
    !> The plate itself; its conductance, averaged over positions, is that of the infinite plate, or the power through the
-   !> layer of a floating plate with both plates infinite.
+   !> layer and the bridges of a floating plate with both plates infinite.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(plate_floor_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)
@@ -51,10 +51,8 @@ contains
 
       plate = options%plate
       if (options%screed%thickness > 0.0_wp) then
-         associate (screed => options%screed)
-            conductance = get_lower_conductance(double_plate_type(get_screed_plate(screed, plate), plate, &
-               screed%layer_stiffness, screed%layer_loss_factor), frequency)
-         end associate
+         conductance = get_lower_conductance(options%get_double_plate(plate), frequency) &
+            + options%get_bridge_conductance(frequency)
       else
          conductance = 1/get_resistance(plate)
       end if

@@ -3,6 +3,7 @@ module thud_rectangular_floor
    use thud_edge_walls, only: edge_walls_type, get_edge_wall_fields, get_wall_edge, get_wall_limit
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
+   use thud_double_plate, only: double_plate_type, get_plate_bridge_conductance => get_bridge_conductance
    use thud_floor_model, only: floor_model_type, reason_length, uncoupled_support
    use thud_floor_modes, only: floor_modes_type, get_floor_modes, new_floor_receiver
    use thud_kinds, only: wp
@@ -79,6 +80,8 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
+      procedure, pass(options) :: get_double_plate
+      procedure, pass(options) :: get_bridge_conductance
       procedure, pass(options) :: has_subceiling
       procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
@@ -350,6 +353,10 @@ contains
          stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base%stiffness]
          stack%plate(1)%edge = get_screed_edge(options%screed)
          stack%layer = [get_screed_layer(options%screed)]
+         if (is_uncoupled) then
+            stack%plate(1)%edge = edge_type(rigid_support, 0.0_wp)
+            if (allocated(stack%layer(1)%point)) deallocate (stack%layer(1)%point)
+         end if
       else
          stack%plate = [base%stiffness]
          allocate (stack%layer(0))
@@ -476,6 +483,32 @@ contains
       base = options%get_base()
       yes = .not. base%is_homogeneous
    end function has_modal_conductance
+
+   !> The floating plate on a bearing plate.
+   pure function get_double_plate(options, lower) result(plates)
+      class(rectangular_floor_type), intent(in) :: options
+      !> The bearing plate.
+      type(plate_type), intent(in) :: lower
+      type(double_plate_type) :: plates
+
+      associate (screed => options%screed)
+         plates = double_plate_type(get_screed_plate(screed, lower), lower, screed%layer_stiffness, &
+            screed%layer_loss_factor, screed%bridge_x%count, screed%bridge_stiffness)
+      end associate
+   end function get_double_plate
+
+   !> Power through bridges into the homogeneous bearing plate.
+   function get_bridge_conductance(options, frequency) result(conductance)
+      class(rectangular_floor_type), intent(in) :: options
+      real(wp), intent(in) :: frequency(:)
+      real(wp) :: conductance(size(frequency))
+      type(base_floor_type) :: base
+
+      conductance = 0.0_wp
+      if (options%screed%thickness <= 0.0_wp) return
+      base = options%get_base()
+      conductance = get_plate_bridge_conductance(options%get_double_plate(base%plate), frequency)
+   end function get_bridge_conductance
 
    !> Frequency band in which all plates are thin.
    subroutine get_validity(options, lowest, highest, reason)

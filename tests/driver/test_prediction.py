@@ -629,3 +629,34 @@ def test_finished_room_decays_as_stated_below_a_light_floor(shell: thud.Impact) 
     )
     # The floor alone absorbed so much at 50 Hz that both times gave one level.
     assert long.level[0] > short.level[0] + 1.5
+
+
+@pytest.mark.parametrize("edges", ["free", "strip"])
+def test_edges_of_floating_plates_do_not_silence_high_bands(edges: str) -> None:
+    """Functions of free edges end below 250 Hz; the power of the bands above was lost."""
+    deck = thud.LaminateFloor(
+        layer_thickness=(0.04,) * 5, screed_thickness=0.05, layer_stiffness=1e9
+    )
+    room = thud.Room(height=2.5)
+    simple = thud.predict_level(floor=deck, room=room).level
+    other = thud.predict_level(floor=replace(deck, screed_edges=edges), room=room).level
+    assert np.abs(other - simple).max() < 1.0
+
+
+@pytest.mark.parametrize(
+    "floor", [thud.Plate(thickness=0.2), thud.LaminateFloor(layer_thickness=(0.04,) * 5)]
+)
+def test_bridges_act_in_both_predictions_and_in_every_band(floor: thud.Plate) -> None:
+    floor = replace(floor, screed_thickness=0.05)
+    room = thud.Room(height=2.5)
+    without = thud.predict_level(floor=floor, room=room)
+    positions = {"bridge_x": (1.2, 2.4, 3.1, 4.3), "bridge_y": (1.1, 2.7, 0.6, 1.9)}
+    soft = replace(floor, **positions, bridge_stiffness=1e3)
+    stiff = replace(floor, **positions, bridge_stiffness=1e9)
+    assert thud.predict_level(floor=soft, room=room).level == pytest.approx(without.level, abs=0.5)
+    found = thud.predict_level(floor=stiff, room=room)
+    above = without.frequency > 150.0
+    assert (found.level - without.level)[above].min() > 3.0
+    # No step where the modes end.
+    assert np.diff(found.level[above]).min() > -8.0
+    assert found.modal_rating.a_weighted > without.modal_rating.a_weighted
