@@ -1,9 +1,9 @@
 !> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
+   use thud_double_plate, only: double_plate_type, get_plate_bridge_conductance => get_bridge_conductance
    use thud_edge_walls, only: edge_walls_type, get_edge_wall_fields, get_wall_edge, get_wall_limit
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
-   use thud_double_plate, only: double_plate_type, get_plate_bridge_conductance => get_bridge_conductance
    use thud_floor_model, only: floor_model_type, reason_length, uncoupled_support
    use thud_floor_modes, only: floor_modes_type, get_floor_modes, new_floor_receiver
    use thud_kinds, only: wp
