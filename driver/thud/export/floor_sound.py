@@ -96,11 +96,6 @@ class FloorSound(Immutable):
     def warnings(self) -> tuple[str, ...]:
         """Sentences on the prediction and on levels that deviate from it."""
         result = list(self.prediction.warnings)
-        if self.prediction.n_modal and not self.n_modal:
-            result.append(
-                "the modes of the room do not include its walls and ceiling: the sound is noise "
-                "with the statistical levels in all bands"
-            )
         if (deviation := get_deviation(self.level, self.reference)) > MAX_DEVIATION:
             result.append(
                 f"the sound deviates from the prediction by {deviation:.1f} dB in an octave or in "
@@ -127,9 +122,7 @@ def new_floor_sound(
     name: str, prediction: RoomPrediction, position: tuple[int, int] | None, seed: int
 ) -> FloorSound:
     """Return the sound of one floor; the arguments are those of `listen`."""
-    room = prediction.room
-    # The modes of the room do not include walls and ceiling.
-    n_modal = 0 if room.wall_lengths or room.ceiling_mass else prediction.n_modal
+    n_modal = prediction.n_modal
     step = prediction.history_time[0]
     square = _mean_square(prediction)
     modal = np.zeros(0)
@@ -143,8 +136,8 @@ def new_floor_sound(
     histories = REFERENCE_PRESSURE**2 * 10 ** (prediction.history / 10)
     target = _interpolated(time, prediction.history_time, histories)
     target[:n_modal] = fast_histories(modal, range(n_modal))
-    reference = maximum_levels(target)
     modal = _limited(modal, n_modal)
+    reference = maximum_levels(target, modal, n_modal)
     middle = (np.arange(len(square)) + 0.5) * step
     envelopes = np.sqrt(_interpolated(time, middle, square[:, n_modal:]))
     # What the filter has removed may decay longest.
@@ -214,8 +207,15 @@ def _modal_pressure(
     require_whole("position: ball", position[0], 1, len(room.balls))
     require_whole("position: microphone", position[1], 1, len(room.microphones))
     pressure = room.pressure[position[0] - 1, position[1] - 1]
+    # Walls and a ceiling change the levels of the modes.
+    change = prediction.modal_level[: prediction.n_modal] - room.mean
+    frequency = np.fft.rfftfreq(len(pressure), 1 / room.sample_rate)
+    gain = np.interp(
+        np.log(np.maximum(frequency, 1.0)), np.log(prediction.frequency[: len(change)]), change
+    )
+    changed = np.fft.irfft(np.fft.rfft(pressure) * 10 ** (gain / 20), len(pressure))
     # The record is periodic.
-    samples = resample(pressure, round(len(pressure) * RATE / room.sample_rate))
+    samples = resample(changed, round(len(pressure) * RATE / room.sample_rate))
     return (position[0], position[1]), np.asarray(samples)
 
 

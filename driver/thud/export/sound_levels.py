@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -41,7 +41,7 @@ class SoundLevels(Immutable):
     octave : ndarray, shape (4,)
         Levels of the octaves 63 to 500 Hz; each is the maximum of the sum of its bands.
     a_weighted : float
-        A-weighted level L_AFmax; as a reference, the maximum of the A-weighted sum of all bands.
+        A-weighted level L_AFmax; as a reference, that of the modal sound and of bands of noise.
     """
 
     third: Array
@@ -68,13 +68,17 @@ def _fast_history(pressure: Array) -> Array:
 
 def measured_levels(pressure: Array) -> SoundLevels:
     """Return the levels of a sound pressure, Pa, shape (n_sample,)."""
-    level = maximum_levels(fast_histories(pressure, range(len(_weights()))))
+    n_band = len(_weights())
+    return maximum_levels(fast_histories(pressure, range(n_band)), pressure, n_band)
+
+
+def _weighted_history(pressure: Array) -> Array:
+    """Return the A-weighted squared pressure after the Fast detector, Pa2, shape (n_sample,)."""
     # The weighting between the mid frequencies is interpolated.
     bands = np.log(rated_bands(BANDS))
     frequency = np.log(np.maximum(np.fft.rfftfreq(len(pressure), 1 / RATE), 1.0))
     gain = np.exp(np.interp(frequency, bands, np.log(_weights()) / 2))
-    weighted = _fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)))
-    return replace(level, a_weighted=float(_level(weighted)))
+    return _fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)))
 
 
 @lru_cache
@@ -93,10 +97,14 @@ def _weights() -> Array:
     return np.array([10 ** (rating(levels, BANDS).a_weighted / 10) for levels in alone])
 
 
-def maximum_levels(histories: Array) -> SoundLevels:
-    """Return the maximum levels of histories of the squared pressure, Pa2, (12, n_sample)."""
+def maximum_levels(histories: Array, pressure: Array, n_known: int) -> SoundLevels:
+    """Return the maximum levels of histories of the squared pressure, Pa2, (12, n_sample).
+
+    `pressure` is the sound pressure, Pa, shape (n_sample,), of the first `n_known` bands; the
+    A-weighting of the other bands is that at their mid frequencies.
+    """
     octaves = histories.reshape(-1, 3, histories.shape[1]).sum(axis=1)
-    weighted = _weights() @ histories
+    weighted = _weighted_history(pressure) + _weights()[n_known:] @ histories[n_known:]
     return SoundLevels(_level(histories), _level(octaves), float(_level(weighted)))
 
 
