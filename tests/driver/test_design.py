@@ -171,7 +171,6 @@ def test_places_without_results_stay_empty() -> None:
 @pytest.mark.parametrize(
     "parameters",
     [
-        {"height": {"values": [1, 2]}},
         {"height": {"values": [1, 2]}, "mass": {"values": [2, 2]}},
         {"height": {"values": [1, 2]}, "momentum_flux": {"values": ["none", "retarding"]}},
         {name: {"values": [1, 2]} for name in ("height", "mass", "gravity")},
@@ -226,7 +225,41 @@ def test_map_of_a_room_has_the_limits_of_the_korean_classes(room_design: thud.De
     drawn = {f"class {i}, {x} dB": x for i, x in enumerate((37, 41, 45, 49), 1)}
     inside = [name for name, x in drawn.items() if found.min() < x < found.max()]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == inside
-    assert "octaves" in figure.legends[0].get_title().get_text()
+    # Colors and lines are of the same rating.
+    assert "octaves" in figure.axes[1].get_ylabel()
+
+
+def test_map_of_a_room_answers_which_floors_meet_its_requirement(tmp_path: Path) -> None:
+    """The color was another rating than that of the lines, and the requirement was ignored."""
+    room = thud.Room(volume=50.0, required=50.0, required_rating="thirds")
+    case = thud.construction("concrete 180, screed on 10 MN/m3").case(
+        thud.Case(model=thud.HollowSphere(), room=room)
+    )
+    thud.write_case(case, tmp_path / "deck.nml")
+    parameters = {"thickness": {"low": 140, "high": 300, "count": 5, "unit": "mm"}}
+    study = {"case": str(tmp_path / "deck.nml"), "parameters": parameters}
+    result = thud.design(study)
+    found = result.dataset["room_rating"]
+    assert result.room_rating is not None
+    assert result.room_rating.values == pytest.approx(found.values)
+    met = found <= 50.0
+    assert 0 < int(met.sum()) < 5
+    rows = dict(result.rows())
+    assert rows["meets 50 dB"] == f"{int(met.sum())} of 5"
+    assert rows["samples whose source conforms"] == "0"
+    smallest = 1e3 * float(result.dataset["thickness"][met.values].min())
+    texts = [row for row in result.rows() if row[0] == "  at thickness, mm"]
+    assert float(texts[0][1]) == pytest.approx(smallest)
+    figure = result.plot()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["required, 50 dB"]
+    two = thud.design({**study, "parameters": {**parameters, "volume": {"values": [40, 60]}}})
+    assert two.plot().legends[0].get_texts()[0].get_text() == "required, 50 dB"
+
+
+def test_design_of_one_parameter_is_a_curve() -> None:
+    result = thud.design({"parameters": {"height": {"values": [0.9, 1, 1.1]}}})
+    (axes,) = result.plot().axes
+    assert axes.get_lines()[0].get_ydata() == pytest.approx(result.dataset["margin"].values)
 
 
 def test_map_without_a_room_has_no_classes() -> None:

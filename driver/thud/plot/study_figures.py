@@ -14,10 +14,9 @@ from matplotlib.ticker import (
     StrMethodFormatter,
 )
 
-from thud.base._schema import CLASS_LIMITS
+from thud.base._schema import CLASS_LIMITS, RATINGS
 from thud.base.units import display_unit
 from thud.case.keys import humanize
-from thud.impact.quantities import RATING
 from thud.level.assessment import octave_limits
 from thud.level.levels import FORCES, get_bands
 from thud.level.rating import CLASSES
@@ -287,9 +286,11 @@ def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive if all octave levels lie within their limits. For a case with a room the
-    figure shows the rating of its standardized levels instead, and the limits of the classes of
-    KS F 2863-2 by the rating of its octaves.
+    figure shows the statistical rating of the room instead, with the required one and, if it is
+    that of octaves, the limits of the classes of KS F 2863-2. One parameter is drawn as a curve.
     """
+    if len(result.axes) == 1:
+        return _draw_design_curve(result)
     dataset = result.dataset
     figure, axes = empty_axes(2.9)
     names: tuple[AxisName, AxisName] = ("x", "y")
@@ -298,13 +299,11 @@ def draw_design(result: Design) -> Figure:
         for which, name in zip(names, result.axes, strict=True)
     ]
     x, y = (dataset[name].values * scale for name, scale in zip(result.axes, scales, strict=True))
-    if RATING in dataset:
-        rating = np.ma.masked_invalid(dataset[RATING].transpose(*result.axes).values.T)
-        _draw_rating(figure, axes, (x, y), rating)
-        octave_rating = result.octave_rating
-        if octave_rating is not None:
-            classes = octave_rating.transpose(*result.axes).values.T
-            _draw_classes(axes, (x, y), np.ma.masked_invalid(classes))
+    room_rating = result.room_rating
+    if room_rating is not None:
+        rating = np.ma.masked_invalid(room_rating.transpose(*result.axes).values.T)
+        _draw_rating(figure, axes, (x, y), rating, RATINGS[result.rating_name])
+        _draw_limits(axes, (x, y), rating, _rating_limits(result))
         axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
         axes.grid(visible=False)
         return figure
@@ -341,7 +340,11 @@ def draw_design(result: Design) -> Figure:
 
 
 def _draw_rating(
-    figure: Figure, axes: Axes, position: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
+    figure: Figure,
+    axes: Axes,
+    position: tuple[Values, Values],
+    rating: np.ma.MaskedArray[Any, Any],
+    title: str,
 ) -> None:
     """Draw the rating as colors, with lines at round values."""
     steps = np.asarray(MaxNLocator(8).tick_values(float(rating.min()), float(rating.max())))
@@ -351,24 +354,62 @@ def _draw_rating(
     if inside.size:
         lines = axes.contour(*position, rating, inside, colors="black", linewidths=0.5)
         axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
-    figure.colorbar(filled, ax=axes, ticks=steps, label="Standardized L_iA,Fmax, dB re 20 µPa")
+    figure.colorbar(filled, ax=axes, ticks=steps, label=f"{title},\nstatistical, dB re 20 µPa")
 
 
-def _draw_classes(
-    axes: Axes, position: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
+def _rating_limits(result: Design) -> list[tuple[str, float]]:
+    """Return name and value, dB, of the requirement, and of the classes if these apply."""
+    limits = [(f"required, {result.required:g} dB", result.required)] if result.required else []
+    if result.rating_name == "octaves":
+        limits += [
+            (f"class {number}, {limit:g} dB", limit)
+            for number, limit in zip(CLASSES[1:], CLASS_LIMITS, strict=True)
+            if limit != result.required
+        ]
+    return limits
+
+
+def _draw_limits(
+    axes: Axes,
+    position: tuple[Values, Values],
+    rating: np.ma.MaskedArray[Any, Any],
+    limits: list[tuple[str, float]],
 ) -> None:
-    """Draw the limits of the Korean classes as lines, with a legend if there is one."""
-    for i, (number, limit) in enumerate(zip(CLASSES[1:], CLASS_LIMITS, strict=True)):
+    """Draw limits of a rating that are within it as lines, with a legend if there is one."""
+    for i, (name, limit) in enumerate(limits):
         if rating.count() and rating.min() < limit < rating.max():
+            style: dict[str, Any] = {"color": COLORS[1], "linewidth": 1.4, "linestyle": LINES[i]}
             axes.contour(
                 *position, rating, [limit], colors=COLORS[1], linewidths=1.4, linestyles=[LINES[i]]
             )
-            axes.plot(
-                [], [], color=COLORS[1], linewidth=1.4, linestyle=LINES[i],
-                label=f"class {number}, {limit:g} dB",
-            )  # fmt: skip
+            axes.plot([], [], label=name, **style)
     if axes.get_legend_handles_labels()[0]:
-        legend_above(axes, title="Limits of KS F 2863-2 (octaves, not standardized)")
+        legend_above(axes, title="Limits of the rating")
+
+
+def _draw_design_curve(result: Design) -> Figure:
+    """Draw the rating of the room, or the margin of the ball, against one parameter."""
+    figure, axes = empty_axes(2.4)
+    (name,) = result.axes
+    x = result.dataset[name].values * show_parameter(axes, "x", result.dataset[name])
+    rating = result.room_rating
+    if rating is None:
+        values, limits = result.dataset["margin"], [("octave limits", 0.0)]
+        axes.set_ylabel(f"Margin ({FORCE_NAMES[result.dataset.attrs['assessed_force']]}), dB")
+    else:
+        values = rating
+        limits = [
+            (title, limit)
+            for title, limit in _rating_limits(result)
+            if float(rating.min()) - 1 < limit < float(rating.max()) + 1
+        ]
+        axes.set_ylabel(f"{RATINGS[result.rating_name]},\nstatistical, dB re 20 µPa")
+    axes.plot(x, values.values, **line_style(0), **marker_style(0, 3))
+    for i, (title, limit) in enumerate(limits):
+        axes.axhline(limit, color=COLORS[1], linewidth=1.4, linestyle=LINES[i], label=title)
+    if limits:
+        legend_above(axes)
+    return figure
 
 
 def _draw_margin(

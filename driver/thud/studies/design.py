@@ -1,4 +1,4 @@
-"""Maps of the balls that conform to the standards, over two parameters."""
+"""Balls that conform to the standards, or floors that meet a rating, over one or two parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 import xarray as xr
 
-from thud.base._schema import CLASS_LIMITS
+from thud.base._schema import CLASS_LIMITS, RATINGS, Room
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import DENSITY, value_in
@@ -26,37 +26,45 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from thud.base._schema import RoomRequiredRating
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
 
-_AXES = 2
+MAX_AXES = 2
 
 
 @dataclass(frozen=True, eq=False)
 class Design(SampleResult):
-    """Margin and verdict as functions of two parameters.
+    """Margin and verdict, or the rating of a room, as functions of one or two parameters.
 
     Attributes
     ----------
     dataset : Dataset
-        Every sample, on a grid of the two parameters in ascending order. ``margin`` is the smallest
+        Every sample, on a grid of the parameters in ascending order. ``margin`` is the smallest
         signed distance of the octave levels from their limits, dB, negative outside; ``conforms``
-        is the verdict by all criteria. If the case has a room, the figure shows
-        ``standardized_rating``, dB, instead, and the limits of `octave_rating`.
+        is the verdict by all criteria. If the case has a room, the figure shows `room_rating`
+        instead.
     axes : tuple of str
-        The two parameters.
+        The parameters, one or two.
     mark : tuple of float or None
         Position of the ball of `mark_name`; None if it is outside the map.
     mark_name : str
         ``"paper's ball"`` or ``"case"``.
+    rating_name : str
+        Rating of the room that `required` refers to: ``"octaves"``, ``"thirds"`` or
+        ``"standardized"``.
+    required : float
+        Highest rating that is allowed, dB; 0 if none is stated.
     """
 
     dataset: xr.Dataset
-    axes: tuple[str, str]
-    mark: tuple[float, float] | None
+    axes: tuple[str, ...]
+    mark: tuple[float, ...] | None
     mark_name: str
+    rating_name: RoomRequiredRating = "octaves"
+    required: float = 0.0
 
     def __repr__(self) -> str:
         """Return the axes, and how many samples conform."""
@@ -82,31 +90,69 @@ class Design(SampleResult):
         for index in np.ndindex(result.shape):
             if np.isfinite(values[index]).all():
                 result[index] = rating(values[index]).a_weighted
-        return xr.DataArray(result, dims=level.dims[:-1])
+        dims = level.dims[:-1]
+        return xr.DataArray(result, {name: self.dataset[name] for name in dims}, dims)
+
+    @property
+    def room_rating(self) -> xr.DataArray | None:
+        """Statistical rating `rating_name` of the levels in the room, dB; None without a room."""
+        if self.rating_name == "octaves" or ROOM_LEVEL not in self.dataset:
+            return self.octave_rating
+        return self.dataset[RATING if self.rating_name == "standardized" else "room_rating"]
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: how many samples conform, and the best sample."""
         margin = self.dataset["margin"]
         rows: list[tuple[str, ...]] = [("quantity", "value"), ("samples", f"{margin.size}")]
+        room_rating = self.room_rating
+        if room_rating is not None:
+            return rows + self._room_rows(room_rating)
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
         if "undecided" in self.dataset:
             rows.append(
                 ("undecided because of the surrogate", f"{int(self.dataset['undecided'].sum())}")
             )
-        if (octave_rating := self.octave_rating) is not None:
+        if margin.notnull().any():
+            rows += self._place("largest margin, dB", margin, margin.argmax(...))
+        return rows
+
+    def _room_rows(self, room_rating: xr.DataArray) -> list[tuple[str, ...]]:
+        """Return rows on the rating of the room: classes, requirement, and the best samples."""
+        size = room_rating.size
+        title = RATINGS[self.rating_name]
+        rows: list[tuple[str, ...]] = [
+            ("samples whose source conforms", f"{int(self.dataset['conforms'].sum())}"),
+            ("rating, statistical", title),
+        ]
+        octave_rating = self.octave_rating
+        if octave_rating is not None and self.rating_name == "octaves":
             count = int((octave_rating <= CLASS_LIMITS[-1]).sum())
             rows.append((f"class {len(CLASS_LIMITS)} or better (KS F 2863-2)", str(count)))
-        label, sign, quantity = "largest margin, dB", 1, margin
-        if RATING in self.dataset:
-            label, sign, quantity = "lowest standardized rating, dB", -1, self.dataset[RATING]
-        if quantity.notnull().any():
-            best = quantity.isel((sign * quantity).argmax(...))
-            rows.append((label, f"{float(best):z.2f}"))
-            for name in self.axes:
-                power = self.dataset[name].attrs["shown_exponent"]
-                unit = self.dataset[name].attrs["shown_unit"]
-                rows.append((f"  at {name}, {unit}", f"{float(best[name]) * 10.0**power:.4g}"))
+        met = room_rating <= self.required
+        if self.required:
+            rows.append((f"meets {self.required:g} dB", f"{int(met.sum())} of {size}"))
+            if met.any():
+                best = room_rating.where(met).stack(sample=self.axes).dropna("sample")
+                smallest = best.isel(sample=best[self.axes[0]].argmin("sample"))
+                rows.append((f"smallest {self.axes[0]} that meets it", ""))
+                rows += self._coordinates(smallest)
+        if room_rating.notnull().any():
+            rows += self._place("lowest rating, dB", room_rating, room_rating.argmin(...))
+        return rows
+
+    def _place(self, title: str, quantity: xr.DataArray, index: Any) -> list[tuple[str, ...]]:  # noqa: ANN401
+        """Return the rows of the value at an index, and of its parameters."""
+        best = quantity.isel(index)
+        return [(title, f"{float(best):z.2f}"), *self._coordinates(best)]
+
+    def _coordinates(self, best: xr.DataArray) -> list[tuple[str, ...]]:
+        """Return the rows of the parameters of a sample."""
+        rows: list[tuple[str, ...]] = []
+        for name in self.axes:
+            attributes = self.dataset[name].attrs
+            value = float(best[name]) * 10.0 ** attributes["shown_exponent"]
+            rows.append((f"  at {name}, {attributes['shown_unit']}", f"{value:.4g}"))
         return rows
 
     def plot(self) -> Figure:
@@ -123,16 +169,23 @@ class DesignKind(SampleKind[Design]):
     designs = ("grid",)
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
-        """Return a study of two numeric parameters."""
+        """Return a study of one or two numeric parameters."""
         result = super().complete(study, content, folder)
-        if len(result.parameters) != _AXES or not all(map(_is_axis, result.parameters)):
-            refuse("[parameters] do not make a map", "two numeric parameters of two or more values")
+        if len(result.parameters) > MAX_AXES or not all(map(_is_axis, result.parameters)):
+            refuse(
+                "[parameters] do not make a map",
+                "one or two numeric parameters of two or more values",
+            )
         return result
 
     def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Design:
         """Return the map of all samples."""
-        first, second = (parameter.coordinate_name for parameter in study.parameters)
-        return Design(dataset.load().sortby([first, second]), (first, second), *_mark(study))
+        axes = tuple(parameter.coordinate_name for parameter in study.parameters)
+        room = study.case.room or Room()
+        return Design(
+            dataset.load().sortby(list(axes)), axes, *_mark(study),
+            rating_name=room.required_rating, required=room.required,
+        )  # fmt: skip
 
 
 KIND = DesignKind()
@@ -141,10 +194,10 @@ KIND = DesignKind()
 def design(
     study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Design:
-    """Compute which geometries and materials conform to the standards.
+    """Compute which balls conform to the standards, or which floors meet a rating.
 
-    The study has two numeric parameters with two values or more; arguments and errors are those of
-    `sweep`.
+    The study has one or two numeric parameters with two values or more; arguments and errors are
+    those of `sweep`.
     """
     return KIND.run(study, output, **options)
 
@@ -153,7 +206,7 @@ def _is_axis(parameter: Parameter) -> bool:
     return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
 
 
-def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
+def _mark(study: SampleStudy) -> tuple[tuple[float, ...] | None, str]:
     """Return the mark: the paper's ball if all other keys have its values, else the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
@@ -168,8 +221,8 @@ def _mark(study: SampleStudy) -> tuple[tuple[float, float] | None, str]:
         position is not None and low <= float(position) <= high
         for position, (low, high) in zip(positions, ends, strict=True)
     )
-    x, y = positions
-    return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "case"
+    mark = tuple(map(float, positions)) if inside else None
+    return mark, "paper's ball" if of_paper else "case"
 
 
 def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
