@@ -84,7 +84,7 @@ contains
          if (.not. allocated(error)) call check_below(plate, case%room, error)
          if (.not. allocated(error)) call floor%get_radiating_modes(plate, modes, error)
          if (allocated(error)) return
-         radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)
+         radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)*get_area_ratio(case%room, plate)
          if (case%room%radiation == modal_radiation .or. floor%has_modal_conductance()) then
             call get_radiation(case%room, floor, plate, modes, bands, radiation, error)
             if (allocated(error)) return
@@ -141,6 +141,17 @@ contains
          area = [room%corner_x, room%corner_x + completed%length, room%corner_y, room%corner_y + completed%width]
       end associate
    end function get_area
+
+   !> Area of a floor above a room over that of the floor.
+   pure function get_area_ratio(room, plate) result(ratio)
+      type(room_type), intent(in) :: room
+      type(plate_type), intent(in) :: plate
+      real(wp) :: ratio
+
+      associate (area => get_area(room, plate))
+         ratio = (area(2) - area(1))*(area(4) - area(3))/(plate%length*plate%width)
+      end associate
+   end function get_area_ratio
 
    !> The room as a box.
    pure function get_box(room, plate, bands) result(box)

@@ -13,7 +13,6 @@ module thud_warnings
    use thud_plate, only: plate_type
    use thud_registry, only: floor_names, model_names
    use thud_room, only: get_completed_room, room_type
-   use thud_room, only: get_completed_room, room_type
    use thud_sampling, only: get_rate_limit
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
@@ -241,7 +240,7 @@ contains
          //fixed(usual_height(1), 1)//' to '//fixed(usual_height(2), 1)//' m')
       if (abs(room%length*room%width/(plate%length*plate%width) - 1) > same_area) call add(warnings, '&room: a room of ' &
          //fixed(room%length*room%width, 1)//' m2 below a floor of '//fixed(plate%length*plate%width, 1) &
-         //' m2: the prediction lets the whole floor radiate into the room')
+         //' m2: only the part of the floor above the room radiates into it')
    end subroutine add_height_warning
 
    !> Adds warnings on density, modulus and Poisson's ratio of the ball, for models that use them.

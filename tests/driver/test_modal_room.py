@@ -186,3 +186,14 @@ def test_floors_that_cannot_carry_the_ball_are_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=naming("&plate", *words)):
         thud.solve(floor=thud.Plate(**floor))
+
+
+def test_improvement_by_a_covering_is_in_neither_level() -> None:
+    """The statistical level beside the modal room had an improvement that the modes did not."""
+    room = thud.Room(volume=50.0)
+    plain = thud.Plate(thickness=0.18)
+    covered = replace(plain, covering_improvement=(10.0, 15.0, 20.0, 25.0))
+    bare = thud.modal_room(thud.solve(floor=plain, room=room))
+    found = thud.modal_room(thud.solve(floor=covered, room=room))
+    assert found.mean == pytest.approx(bare.mean)
+    assert found.statistical == pytest.approx(bare.statistical)

@@ -53,6 +53,8 @@ ITERATIONS = 8
 # maximum number of realizations, of which the best is used otherwise.
 TOLERANCE = 0.25
 MAX_REALIZATIONS = 20
+# Change of the modal levels by walls, ceiling or covering that is applied, dB.
+MIN_CHANGE = 0.01
 # Deviation that raises a warning, dB.
 MAX_DEVIATION = 0.5
 
@@ -207,16 +209,40 @@ def _modal_pressure(
     require_whole("position: ball", position[0], 1, len(room.balls))
     require_whole("position: microphone", position[1], 1, len(room.microphones))
     pressure = room.pressure[position[0] - 1, position[1] - 1]
-    # Walls and a ceiling change the levels of the modes.
-    change = prediction.modal_level[: prediction.n_modal] - room.mean
-    frequency = np.fft.rfftfreq(len(pressure), 1 / room.sample_rate)
-    gain = np.interp(
-        np.log(np.maximum(frequency, 1.0)), np.log(prediction.frequency[: len(change)]), change
-    )
-    changed = np.fft.irfft(np.fft.rfft(pressure) * 10 ** (gain / 20), len(pressure))
     # The record is periodic.
-    samples = resample(changed, round(len(pressure) * RATE / room.sample_rate))
+    samples = resample(pressure, round(len(pressure) * RATE / room.sample_rate))
+    change = prediction.modal_level[: prediction.n_modal] - room.mean
+    if np.abs(change).max() > MIN_CHANGE:
+        level = room.level[position[0] - 1, position[1] - 1]
+        samples = _changed(samples, prediction.frequency[: len(change)], level, change)
     return (position[0], position[1]), np.asarray(samples)
+
+
+def _changed(modal: Array, frequency: Array, level: Array, change: Array) -> Array:
+    """Return the modal pressure with the levels of its bands changed by walls, ceiling or covering.
+
+    The gain is interpolated over the logarithm of frequency, and iterated as the filters overlap.
+    """
+    # Twice the length, so that no sound returns from the end to the impact.
+    count = 2 * len(modal)
+    spectrum = np.fft.rfft(modal, count)
+    lines = np.log(np.maximum(np.fft.rfftfreq(count, 1 / RATE), 1.0))
+    gain = change.copy()
+    for _ in range(ITERATIONS):
+        response = _minimum_phase(np.interp(lines, np.log(frequency), gain) * np.log(10) / 20)
+        changed = np.fft.irfft(spectrum * response, count)[: len(modal)]
+        maximum = fast_histories(changed, range(len(gain))).max(axis=1)
+        gain += level + change - 10 * np.log10(maximum / REFERENCE_PRESSURE**2)
+    return np.asarray(changed)
+
+
+def _minimum_phase(log_gain: Array) -> NDArray[np.complex128]:
+    """Return the causal response with the logarithm of its magnitude at equal steps (cepstrum)."""
+    cepstrum = np.fft.irfft(log_gain)
+    half = len(cepstrum) // 2
+    cepstrum[1:half] *= 2
+    cepstrum[half + 1 :] = 0
+    return np.asarray(np.exp(np.fft.rfft(cepstrum)))
 
 
 def _limited(modal: Array, n_modal: int) -> Array:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import RectangularFloor
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.display import Displayed
@@ -125,8 +126,8 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
 ) -> ModalRoom:
     """Compute modal levels below a floor for pairs of positions, up to the crossover of the room.
 
-    Walls and ceilings of `room` are left out, in the prediction beside it, too. The energy of floor
-    modes decays at the rate omega eta, the energy of room modes at 6 ln 10/T.
+    Walls and ceilings of `room` and a stated improvement by a covering are left out, in the
+    prediction beside it, too. The energy of floor modes decays at the rate omega eta, the energy of room modes at 6 ln 10/T.
 
     Parameters
     ----------
@@ -167,9 +168,12 @@ def positions_below(
     max_frequency: float | None = None,
 ) -> ModalRoom:
     """Compute the `modal_room` for the impact, floor and room of a prediction."""
-    bare = replace(prediction.room, wall_lengths=(), ceiling_mass=0.0)
-    if prediction.room != bare:
-        prediction = predict_level(prediction.source, prediction.floor, bare)
+    room = replace(prediction.room, wall_lengths=(), ceiling_mass=0.0)
+    floor = prediction.floor
+    if isinstance(floor, RectangularFloor):
+        floor = replace(floor, covering_improvement=())
+    if (floor, room) != (prediction.floor, prediction.room):
+        prediction = predict_level(prediction.source, floor, room)
     source = prediction.source
     case = replace(source.case, modes=None, floor=prediction.floor, room=prediction.room)
     size = prediction.size

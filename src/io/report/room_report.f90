@@ -190,7 +190,13 @@ contains
       text = newline//'&room_summary'//newline//line('rating', join_quoted(rating_names), '') &
          //line('meaning', join_quoted(rating_titles), '')//line('level', join(prediction%rating), 'dB') &
          //line('rounded', join(real(get_rounded(prediction%rating), wp)), 'dB') &
-         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none')
+         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none') &
+         //line('rated', to_text(prediction%rated), 'dB, mean of both predictions, ISO 717-2') &
+         //line('interval', join(prediction%interval), 'dB')
+      if (prediction%n_modal > 0) text = text//line('modal', &
+         to_text(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level)), 'dB, by the modes, ISO 717-2')
+      text = text//line('contribution', join_quoted(contribution_names), '') &
+         //line('lower', join(prediction%contribution(1, :)), 'dB')//line('upper', join(prediction%contribution(2, :)), 'dB')
       if (case%room%required > 0.0_wp) text = text//line('required', to_text(case%room%required), 'dB') &
          //line('required_rating', quoted(case%room%required_rating), '') &
          //line('required_interval', join(get_required_interval(case%room, prediction)), 'dB') &
