@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from conftest import ErrorsOf
+
 PUBLISHED = REPOSITORY / "inputs" / "floors" / "field_levels.csv"
 OCTAVES = (63.0, 125.0, 250.0, 500.0)
 # A survey that raises no warning.
