@@ -147,7 +147,8 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         str(prediction.modal_rating.rounded) if prediction.n_modal else "",
         str(prediction.rating.rounded),
         prediction.octave_text,
-        "not stated" if prediction.source_note else prediction.class_text,
+        # In few words, as the columns are as wide as their cells.
+        "not stated" if prediction.source_note else prediction.class_text.partition(" (")[0],
         str(prediction.standardized_rating.rounded),
         _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
@@ -164,11 +165,11 @@ def _source(prediction: RoomPrediction) -> str:
 
 
 def _required(prediction: RoomPrediction) -> str:
-    """Return the requirement of a room and the verdict; empty without one."""
+    """Return the requirement of a room and the verdict, its reason aside; empty without one."""
     required = prediction.requirement
     if required is None:
         return ""
-    return f"{required.required:g} ({required.rating}): {required.verdict}"
+    return f"{required.required:g} ({required.rating}): {required.verdict.partition(':')[0]}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:
