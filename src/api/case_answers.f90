@@ -33,7 +33,7 @@ contains
       call bundle%add_text('compiler', trim(get_compiler()))
    end subroutine describe_library
 
-   !> The full input of the namelist file `path`.
+   !> The full input of the namelist file `path`, which may have a room without a floor.
    subroutine answer_effective_case(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -43,7 +43,7 @@ contains
       character(len=:), allocatable :: path, text
 
       call request%get_text('path', path)
-      call load_case(path, case, error)
+      call load_case(path, case, error, room_alone=.true.)
       if (allocated(error)) return
       call get_case_text(case, text)
       call bundle%add_text('case', text)

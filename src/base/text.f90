@@ -8,8 +8,8 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, flush_right, is_number, is_utf8, join, join_quoted, lower_case, newline, padded, quoted, replaced
-   public :: shortened, split, tab, to_text
+   public :: byte_order_mark, fixed, flush_right, is_number, is_utf8, join, join_quoted, lower_case, newline, padded
+   public :: quoted, replaced, shortened, split, tab, to_text
 
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
@@ -19,6 +19,9 @@ module thud_text
 
    !> Horizontal tab.
    character(len=*), parameter :: tab = achar(9)
+
+   !> UTF-8 byte order mark, with which some editors begin a text.
+   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
    !> Length sufficient for any number.
    integer, parameter :: number_length = 40

@@ -104,8 +104,10 @@ contains
          results%floor, results%room, error)
       if (.not. allocated(error)) call get_warnings(case, results%impact%history, results%warning, results%on_floor)
       if (case%has_impact .and. case%has_room .and. scope%room .and. scope%levels .and. .not. allocated(error)) then
-         call add_source_warning(results%impact%assessment%criteria(:, findloc(force_names == 'floor', .true., dim=1)), &
-            results%warning)
+         associate (criteria => results%impact%assessment%criteria(:, findloc(force_names == 'floor', .true., dim=1)))
+            results%room%source_conforms = all(conforms(criteria(:octave_count)))
+            call add_source_warning(criteria, results%warning)
+         end associate
       end if
    end subroutine compute
 

@@ -97,6 +97,8 @@ module thud_room
       type(band_type), allocatable :: bands(:)
       !> Power into the floor per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
+      !> The octave levels of the source conform to the standards.
+      logical :: source_conforms = .true.
       !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
       !> Volume of the room, m3, and its length, width and height, m.
@@ -235,6 +237,10 @@ contains
             //to_text(completed%width)//' x '//to_text(completed%height)//' m (not stated: those of the floor), ' &
             //'contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
             //to_text(product)//' m3, or without volume or height')
+      else if (.not. room%corner_x > 0.0_wp .and. completed%length > plate%length*(1 + 1.0e-9_wp)) then
+         error = get_side_error('length', 'long', completed%length, plate%length)
+      else if (.not. room%corner_y > 0.0_wp .and. completed%width > plate%width*(1 + 1.0e-9_wp)) then
+         error = get_side_error('width', 'wide', completed%width, plate%width)
       else if (room%corner_x + completed%length > plate%length*(1 + 1.0e-9_wp)) then
          error = input_error('&room: corner_x + length = '//to_text(room%corner_x + completed%length)//' m lies beyond ' &
             //'the floor; allowed: up to its length, '//to_text(plate%length)//' m')
@@ -252,6 +258,18 @@ contains
             //'room; allowed: up to '//to_text(completed%height)//' m')
       end if
    end subroutine check_below
+
+   !> Error of a room that is larger than its floor.
+   function get_side_error(key, adjective, room_side, floor_side) result(error)
+      !> Key of the side, and its adjective.
+      character(len=*), intent(in) :: key, adjective
+      !> Sides of room and floor, m.
+      real(wp), intent(in) :: room_side, floor_side
+      type(error_type) :: error
+
+      error = input_error('&room: the room is '//to_text(room_side)//' m '//adjective//', the floor '//to_text(floor_side) &
+         //' m: state '//key//' of the floor; allowed: at least '//to_text(room_side)//' m')
+   end function get_side_error
 
    !> Checks that a room below a subceiling describes nothing that contradicts it.
    subroutine check_below_subceiling(room, error)
@@ -359,12 +377,13 @@ contains
       !> A room with a requirement.
       type(room_type), intent(in) :: room
       type(room_level_type), intent(in) :: prediction
-      character(len=9) :: verdict
+      character(len=38) :: verdict
 
       associate (ends => get_rounded(get_required_interval(room, prediction)))
          verdict = 'undecided'
          if (ends(2) <= room%required) verdict = 'met'
          if (ends(1) > room%required) verdict = 'not met'
+         if (.not. prediction%source_conforms) verdict = 'undecided: the source does not conform'
       end associate
    end function judge_requirement
 

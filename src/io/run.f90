@@ -251,18 +251,20 @@ contains
    end subroutine extend
 
    !> Reads a case from a namelist file.
-   subroutine load_case(path, case, error, unchecked)
+   subroutine load_case(path, case, error, unchecked, room_alone)
       character(len=*), intent(in) :: path
       type(case_type), intent(out) :: case
       !> Set if the file is not a valid case.
       type(error_type), allocatable, intent(out) :: error
       !> Skip the check of ranges and of the case as a whole (default: false).
       logical, intent(in), optional :: unchecked
+      !> Allow a room without a floor (default: false).
+      logical, intent(in), optional :: room_alone
       character(len=:), allocatable :: text
 
       call read_text_file(path, text, error)
       if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked, &
-         path(:index(path, '/', back=.true.)))
+         path(:index(path, '/', back=.true.)), room_alone)
       if (allocated(error)) error = input_error(path//': '//error%message)
    end subroutine load_case
 

@@ -102,3 +102,8 @@ def test_errors_of_a_file_name_the_file(case_file: CaseFile) -> None:
         thud.read_case(path)
     with pytest.raises(thud.InputError, match=naming("nowhere.nml")):
         thud.read_case("nowhere.nml")
+
+
+def test_file_may_begin_with_a_byte_order_mark(case_file: CaseFile) -> None:
+    plain = thud.read_case(case_file(MINIMAL))
+    assert thud.read_case(case_file(f"\N{ZERO WIDTH NO-BREAK SPACE}{MINIMAL}")) == plain

@@ -15,6 +15,7 @@ from test_figure_look import assert_clean
 import thud
 from thud import cli
 from thud.base import files
+from thud.report.predicted_floor import PredictedFloor
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +34,9 @@ MINE = """\
 name = "mine"
 kind = "concrete"
 floor = "plate"
-layers = [{ material = "concrete", thickness = 0.2, density = 2400 }]
+layers = [
+  { material = "concrete", thickness = 0.2, density = 2400 },
+  { material = "gypsum board", thickness = 0.0125, density = 960 }]
 
 [keys]
 thickness = { value = 0.2, source = "drawing" }
@@ -264,8 +267,8 @@ def test_file_of_a_user_is_a_construction(tmp_path: Path) -> None:
         ("ceiling_mass", "volume", ("room", "volume", "ceiling_mass")),
         ("value = 12,", "value = -12,", ("room", "ceiling_mass", "-12.0")),
         ("[room]\n", "[rooms]\n", ("rooms", "room")),
-        ("density = 2400 }]", "density = 0 }]", ("layer", 1, "density", 0)),
-        (", density = 2400 }]", "}]", ("layer", 1, "density")),
+        ("density = 960 }]", "density = 0 }]", ("layer", 2, "density", 0)),
+        (", density = 960 }]", "}]", ("layer", 2, "density")),
         ("[keys]\n", "[keys\n", ("TOML",)),
     ],
     ids=lambda value: str(value)[:20],
@@ -357,3 +360,95 @@ def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert files.inputs_folder() == tmp_path / "inputs"
     (tmp_path / "driver/thud/inputs").mkdir(parents=True)
     assert files.inputs_folder() == tmp_path / "driver/thud/inputs"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "parts"),
+    [
+        (
+            "thickness = 0.2, density",
+            "thickness = 0.3, density",
+            ("concrete 0.3 m", "thickness = 0.2"),
+        ),
+        ("value = 0.2,", "value = 0.15,", ("concrete 0.2 m", "thickness = 0.15")),
+        ("value = 12,", "value = 45,", ("gypsum board 0.0125 m", "ceiling_mass = 45")),
+    ],
+)
+def test_layers_that_contradict_the_keys_are_refused(
+    old: str, new: str, parts: tuple[str, ...], tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(MINE.replace(old, new))
+    with pytest.raises(thud.InputError, match=naming(path, "kg/m2", *parts)):
+        thud.construction(path)
+
+
+def test_construction_has_the_sides_of_the_case() -> None:
+    deck = thud.construction("concrete 180")
+    plate = thud.Plate(length=7.0, width=6.0)
+
+    def sides(floor: thud.Plate | None, **room: float) -> tuple[float, float]:
+        case = deck.case(thud.Case(floor=floor, room=thud.Room(**room)))  # type: ignore[arg-type]
+        assert isinstance(case.floor, thud.Plate)
+        thud.case.case.check_case(case)
+        return case.floor.length, case.floor.width
+
+    assert sides(None) == (5.0, 4.0)
+    assert sides(None, length=6.2, width=5.0) == (6.2, 5.0)
+    assert sides(plate) == (7.0, 6.0)
+    assert sides(plate, length=6.2) == (7.0, 6.0)
+    assert sides(plate, length=6.2, width=5.0) == (6.2, 5.0)
+    assert sides(plate, length=6.2, width=5.0, corner_x=0.5) == (7.0, 6.0)
+
+
+def test_report_states_that_the_sides_are_those_of_the_case() -> None:
+    deck = thud.construction("concrete 180")
+    prediction = thud.predict_level(floor=deck, room=thud.Room(length=6.2, width=5.0))
+    rows = PredictedFloor("deck", "deck", prediction, deck).assumptions
+    assert ("length of the floor", "6.2 m", "that of the case") in rows
+
+
+def test_room_alone_is_that_of_the_constructions(tmp_path: Path, errors_of: ErrorsOf) -> None:
+    path = tmp_path / "room.nml"
+    path.write_text("&room length = 6.2 width = 5 /\n")
+    options = ["--construction", "concrete 180", "-q", "-o", str(tmp_path / "out")]
+    assert cli.main(["predict", str(path), *options]) == 0
+    assert "room," not in (tmp_path / "out/ratings.csv").read_text(encoding="utf-8")
+    assert "&floor" in errors_of("predict", path)
+    assert "&floor" in errors_of("run", path)
+
+
+def test_room_larger_than_its_floor_names_the_floor(tmp_path: Path, errors_of: ErrorsOf) -> None:
+    path = tmp_path / "large.nml"
+    for keys, words in (
+        ("length = 6.2", "the room is 6.2 m long, the floor 5.0 m: state length of the floor"),
+        ("width = 4.5", "the room is 4.5 m wide, the floor 4.0 m: state width of the floor"),
+        ("length = 4.5 corner_x = 1", "corner_x + length = 5.5 m"),
+    ):
+        path.write_text(f"&floor name = 'plate' /\n&plate /\n&room {keys} /\n")
+        assert words in errors_of("floor", path)
+
+
+def test_construction_is_a_floor_of_a_prediction() -> None:
+    deck = thud.construction("concrete 180, ceiling")
+    prediction = thud.predict_level(floor=deck, room=thud.Room())
+    assert prediction.floor == deck.floor
+    assert prediction.room.ceiling_mass == deck.room["ceiling_mass"]
+    with pytest.raises(thud.InputError, match="room"):
+        thud.predict_level(floor=deck)
+
+
+@pytest.mark.parametrize(
+    "name", ["Concrete 180 Screed on 15 MN/m3", "CONCRETE 180,  screed on 15 mn/m3"]
+)
+def test_names_ignore_case_and_commas(name: str) -> None:
+    assert thud.construction(name).name == "concrete 180, screed on 15 MN/m3"
+    assert len(thud.constructions(name)) >= 1
+
+
+def test_construction_keeps_its_sides_if_those_of_the_case_are_not_allowed() -> None:
+    joists = thud.construction("joists, 1 board")
+    small = thud.Case(floor=thud.Plate(length=0.3, width=0.3), room=thud.Room(volume=50.0))
+    assert joists.case(small).floor == joists.floor
+    large = replace(small, floor=thud.Plate(length=4.5, width=6.0))
+    assert joists.case(large).floor == replace(joists.floor, length=4.5, width=6.0)  # type: ignore[call-arg]

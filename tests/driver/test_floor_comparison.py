@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import math
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -146,9 +147,8 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
         str(thin.rating.rounded),
         str(thick.rating.rounded),
     )
-    assert rows["of octaves (KS F 2863-2), dB"] == tuple(
-        f"{one.octave_rating.rounded}, class none" for one in (thin, thick)
-    )
+    assert rows["statistical, of octaves (KS F 2863-2)"] == (thin.octave_text, thick.octave_text)
+    assert rows["class (KS F 2863-2)"] == ("no class", "no class")
     assert rows["63 Hz octave, dB"] == (
         f"{thin.octave_level[0]:.1f}",
         f"{thick.octave_level[0]:.1f}",
@@ -164,12 +164,13 @@ def test_floors_without_a_tapping_level_leave_its_cell_empty(
         "thick": found.predictions["thick"],
         "light": thud.predict_level(shell, light, thud.Room()),
         "joists": thud.predict_level(shell, thud.JoistFloor(), thud.Room()),
+        "ceiling": thud.predict_level(shell, thud.Plate(), thud.Room(ceiling_mass=9.0)),
     }
     page = thud.compare_floors(predictions)
     assert list(page.predictions.values()) == list(predictions.values())
     tapping = thud.tapping_level(thud.Plate(thickness=0.22))
     *_, energy, last = page.rows()
-    assert last[1:] == (f"{tapping.weighted} ({tapping.adaptation})", "", "")
+    assert last[1:] == (f"{tapping.weighted} ({tapping.adaptation})", "–", "–", "–")
     assert float(energy[1]) == pytest.approx(1e3 * predictions["thick"].energy.sum(), rel=5e-3)
 
 
@@ -281,3 +282,72 @@ def test_page_of_rooms_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) 
         for code, output in shown:
             exec(code, {})  # noqa: S102 - the page's own
             assert capsys.readouterr().out == output
+
+
+@pytest.mark.parametrize(
+    ("keys", "room", "words"),
+    [
+        ({"screed_thickness": 0.05}, {}, "a floating floor"),
+        ({"covering_stiffness": 1e7}, {}, "a covering"),
+        ({"covering_improvement": (5.0,) * 12}, {}, "a covering"),
+        ({"subceiling_thickness": 0.0125}, {}, "a subceiling"),
+        ({}, {"ceiling_mass": 9.0}, "a ceiling"),
+    ],
+)
+def test_tapping_level_is_of_bare_plates(
+    keys: dict[str, Any], room: dict[str, float], words: str
+) -> None:
+    with pytest.raises(thud.InputError, match=f"bare plates, but this one has {words}; allowed"):
+        thud.tapping_level(thud.Plate(**keys), thud.Room(**room))
+
+
+def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:
+    """Class and verdict are not stated, whatever the level."""
+    floor, room = thud.Plate(screed_thickness=0.05), thud.Room(required=49.0)
+    case = thud.Case(floor=floor, room=room)
+    conforming = thud.predict_level(thud.solve(case))
+    low = thud.predict_level(thud.solve(replace(case, drop=thud.Drop(height=0.1))))
+    assert low.octave_rating.korean_class
+    assert low.requirement is not None
+    assert low.requirement.verdict == "undecided: the source does not conform"
+    assert low.class_text == "class not stated: the source does not conform"
+    assert "does not conform" in repr(low)
+    assert "does not conform" not in repr(conforming)
+    page = thud.compare_floors({"low": low, "standard": conforming})
+    rows = {row[0]: row[1:] for row in page.rows()}
+    assert rows["source"] == ("the source does not conform", "")
+    assert rows["class (KS F 2863-2)"] == ("not stated", conforming.class_text)
+    assert rows["required, dB"][0] == "49 (octaves): undecided"
+    text = html.unescape(page.html())
+    assert all(f"<li>{warning}</li>" in text for warning in page.warnings)
+
+
+def test_class_is_that_of_the_statistical_rating_with_its_interval() -> None:
+    prediction = thud.predict_level(
+        floor=thud.Plate(screed_thickness=0.05), room=thud.Room(required=49.0)
+    )
+    octaves, required = prediction.octave_rating, prediction.requirement
+    assert required is not None
+    low, high = required.interval
+    assert prediction.octave_text == f"{octaves.rounded} dB ({low:.0f} to {high:.0f})"
+    assert low < 49 < high
+    assert prediction.class_text == "no class; interval: class 4 to no class"
+    assert "no class" in repr(octaves)
+
+
+def test_tyre_has_no_rating_of_the_ball() -> None:
+    tyre = thud.read_case(REPOSITORY / "inputs/tyre.nml")
+    floor, room = thud.Plate(screed_thickness=0.05), thud.Room(required=60.0)
+    prediction = thud.predict_level(thud.solve(replace(tyre, floor=floor, room=room)))
+    titles = [row[0] for row in thud.compare_floors({"tyre": prediction}).rows()]
+    texts = [*titles, repr(prediction), str(prediction.requirement)]
+    assert not [text for text in texts if re.search("ISO|KS F|L_iA|class", text)]
+    assert "A-weighted level" in titles
+    assert "own limit 60 dB, undecided" in str(prediction.requirement)
+
+
+def test_case_without_floor_names_no_model(errors_of: ErrorsOf, tmp_path: Path) -> None:
+    (tmp_path / "bare.nml").write_text("&ball /\n")
+    message = errors_of("floor", tmp_path / "bare.nml")
+    assert "no &floor and no &room; allowed: cases with &floor and &room" in message
+    assert "&model" not in message

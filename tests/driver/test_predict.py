@@ -76,7 +76,7 @@ def test_tables_have_the_numbers_of_the_prediction(floor: PredictedFloor, tmp_pa
     bands = read_table(files["bands.csv"])
     assert [float(row["band, Hz"]) for row in bands] == prediction.frequency.tolist()
     expected = {
-        "energy, mJ": 1e3 * prediction.energy,
+        "energy into the bearing floor, µJ": 1e6 * prediction.energy,
         "radiation factor": prediction.radiation_factor,
         "loss factor": prediction.loss_factor,
         "T, s": prediction.reverberation_time,
@@ -142,7 +142,7 @@ def test_page_states_ratings_contributions_and_sources(floor: PredictedFloor, pa
     # The index of the rating is in an element of its own.
     plain = text.replace("L iA,Fmax ", "L_iA,Fmax")
     assert floor.prediction.rated_text in text
-    assert f"{floor.prediction.octave_rating.rounded} dB, no class" in text
+    assert f"{floor.prediction.octave_text}, no class" in text
     assert str(floor.prediction.requirement) in plain
     for ends in floor.prediction.contributions.values():
         assert deviation_text(ends) in text
@@ -333,3 +333,46 @@ def test_bad_input_is_one_sentence(tmp_path: Path, errors_of: ErrorsOf) -> None:
     assert "bare" in message
     assert "&floor" in message
     assert not (tmp_path / "out").exists()
+
+
+def test_source_that_does_not_conform_is_beside_the_rating(tmp_path: Path) -> None:
+    case = thud.Case(floor=thud.Plate(), room=thud.Room(volume=66.092), drop=thud.Drop(height=0.1))
+    floor = PredictedFloor("low", "low", thud.predict_level(thud.solve(case)))
+    note = "the source does not conform"
+    headline = screen_text(floor).splitlines()[1]
+    assert headline == f"  L_iA,Fmax {floor.prediction.rated_text}, ISO 717-2, {note}"
+    page = floor_page(floor, "", "")
+    box = page.partition('class="verdict">')[2].partition("</div>")[0]
+    assert note.capitalize() in box
+    assert f"class not stated: {note}" in box
+    ratings = read_table(contents([floor], tmp_path, report=False)["ratings.csv"])
+    assert note in ratings[0]["text"]
+    assert not [row for row in ratings if re.search(r"class \d", row["text"])]
+
+
+def test_numbers_of_the_report_have_no_exponent_and_few_digits() -> None:
+    plate = thud.Plate(screed_thickness=0.05, layer_stiffness=6e6, covering_stiffness=1e5)
+    prediction = thud.predict_level(floor=plate, room=thud.Room(volume=66.092))
+    floor = PredictedFloor("soft", "soft", prediction)
+    text = floor_page(floor, "", "")
+    assert "66.1 m³" in text
+    assert "dropped from 1 m, 4.43 m/s" in text
+    assert not re.search(r"\d+e[-+−]\d", text)
+    assert not re.search(r"\de[-+−]\d", str(band_rows(floor)))
+    for value, row in zip(prediction.energy, band_rows(floor)[1:], strict=True):
+        assert float(row[2]) == pytest.approx(1e6 * value, rel=5e-3)
+
+
+def test_reports_of_other_floors_are_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "thud.report.floor_files.page_contents", lambda floor, _: {f"{floor.file}.html": b"page"}
+    )
+    words = ["-q", "-o", str(tmp_path / "out"), "--construction"]
+    assert cli.main(["predict", "--report", *words, "concrete 140"]) == 0
+    (tmp_path / "out/mine.pdf").write_bytes(b"of the user")
+    assert cli.main(["predict", *words, "concrete 160"]) == 0
+    assert {*names_in(tmp_path / "out")} == {
+        ".thud", "mine.pdf", "predictions.xlsx", *TABLES
+    }  # fmt: skip

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from conftest import ErrorsOf
+
 PUBLISHED = REPOSITORY / "inputs" / "floors" / "field_levels.csv"
 OCTAVES = (63.0, 125.0, 250.0, 500.0)
 # A survey that raises no warning.
@@ -191,10 +193,11 @@ def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
 
 
 def test_column_that_hardly_is_a_position_raises_a_warning(tmp_path: Path) -> None:
-    rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
-    (tmp_path / "levels.csv").write_text(f"frequency,first,Abklingzeit\n{rows}")
-    assert any("59 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").warnings)
+    rows = "".join(f"{f},60,30\n" for f in (63, 125, 250, 500))
+    (tmp_path / "levels.csv").write_text(f"frequency,first,Umgebung\n{rows}")
+    assert any("30 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").warnings)
     # A known title is no position.
+    rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
     (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
     found = thud.read_room_levels(tmp_path / "levels.csv", volume=50.0)
     assert (len(found.positions), found.standardized is None) == (1, False)
@@ -418,3 +421,16 @@ def test_missing_package_of_workbooks_is_named(
     monkeypatch.setitem(sys.modules, "openpyxl", None)
     with pytest.raises(thud.InputError, match=naming("openpyxl", "pip install")):
         thud.read_room_levels(tmp_path / "levels.xlsx")
+
+
+@pytest.mark.parametrize("others", [(), (62.0,), (62.0, 61.0)])
+@pytest.mark.parametrize("value", [0.5, 15.0])
+def test_misspelled_title_is_no_position(
+    others: tuple[float, ...], value: float, tmp_path: Path, errors_of: ErrorsOf
+) -> None:
+    path = tmp_path / "levels.csv"
+    titles = ",".join(f"P{i}" for i in range(len(others) + 1))
+    cells = ",".join(f"{level}" for level in (60.0, *others))
+    rows = "".join(f"{f},{value},{cells}\n" for f in (63, 125, 250, 500))
+    path.write_text(f"frequency,backgruond,{titles}\n{rows}")
+    assert "column 'backgruond'" in errors_of("rate", path, "-o", tmp_path / "out")

@@ -138,6 +138,10 @@ class Results:
             if is_directory(path) or not (self.replace or _is_listed(path, listed)):
                 refuse_foreign(path)
 
+    def written(self) -> list[str]:
+        """Return the names of files that an earlier call of the command has written."""
+        return [name for name, entry in self._listed().items() if entry.command == self.command]
+
     def write(
         self, contents: Mapping[str, bytes], stale: Iterable[str] = (), marker: bytes | None = None
     ) -> list[Path]:

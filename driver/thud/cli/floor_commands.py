@@ -30,7 +30,7 @@ from thud.cli.command import (
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from thud.case.case import Case
     from thud.floors.constructions import Construction
@@ -89,7 +89,8 @@ def predict(options: argparse.Namespace) -> int:
         for name, prediction in comparison.predictions.items()
     ]
     written = contents(floors, results.folder, report=options.report)
-    results.write(written, stale=file_names(names.values()))
+    # The results of other floors belong to an earlier call.
+    results.write(written, stale=results.written())
     if not options.quiet:
         print("\n\n".join(map(screen_text, floors)))
     print_notes(comparison.warnings)
@@ -99,7 +100,7 @@ def predict(options: argparse.Namespace) -> int:
 
 
 def _floor_cases(
-    paths: Iterable[str], names: Iterable[str]
+    paths: Iterable[str], names: Sequence[str]
 ) -> tuple[dict[str, Case], dict[str, Construction]]:
     """Return the cases of files, and of constructions with the source and room of the first.
 
@@ -109,6 +110,7 @@ def _floor_cases(
 
     cases: dict[str, Case] = {}
     chosen: dict[str, Construction] = {}
+    first: Case | None = None
 
     def add(name: str, origin: str, case: Case) -> None:
         if name in cases:
@@ -117,8 +119,10 @@ def _floor_cases(
 
     for path in paths:
         case = read_case(path)
-        add(case.name, path, case)
-    first = next(iter(cases.values()), None)
+        first = first or case
+        # A room alone is that of the constructions.
+        if case.floor or not names:
+            add(case.name, path, case)
     for name in names:
         entry = construction(name)
         add(entry.name, f"--construction {name}", entry.case(first))
@@ -140,8 +144,8 @@ _FLOORS = (
         action="append",
         default=[],
         metavar="NAME|FILE.toml",
-        help="also a construction of the library or of a file, with ball, drop, model and room "
-        "of the first case (default: a ball that conforms); may be repeated",
+        help="also a construction of the library or of a file, with ball, drop, model, room and "
+        "sides of the first case (default: a ball that conforms); may be repeated",
     ),
 )
 FLOOR = Command(

@@ -10,7 +10,16 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.base._schema import FLOORS, KEYS, FloorOptions, Room
+from thud.base._schema import (
+    FLOORS,
+    KEYS,
+    FloorOptions,
+    JoistFloor,
+    LaminateFloor,
+    Plate,
+    RectangularFloor,
+    Room,
+)
 from thud.base.checks import (
     refuse,
     refuse_unknown,
@@ -35,6 +44,8 @@ if TYPE_CHECKING:
 CEILING_KEYS = tuple(
     key.name for key in KEYS if key.owner == "room" and key.name.startswith("ceiling_")
 )
+# Density of layers that the keys need not contain, kg/m3, and tolerance of masses.
+MAX_LIGHT, MASS_TOLERANCE = 250.0, 0.02
 _TEXTS = ("name", "kind", "floor", "note")
 _OPTIONAL = ("note", "room")
 _UNITS = {(key.owner, key.name): key.unit for key in KEYS}
@@ -92,7 +103,9 @@ class Construction(Displayed):
         ----------
         source
             Case whose ball, drop, model and room are used; by default that of a room below which no
-            source is named: a rubber ball that conforms, and a room of 50 m3 with 0.5 s.
+            source is named: a rubber ball that conforms, and a room of 50 m3 with 0.5 s. The floor
+            takes length and width of its room, or of its floor if the room does not state both or
+            is in a corner of the floor, unless the construction is not allowed with these.
 
         Raises
         ------
@@ -104,13 +117,23 @@ class Construction(Displayed):
             source = Case(room=Room())
         # The ceiling of the source is not part of this construction.
         ceiling = {key: getattr(Room(), key) for key in CEILING_KEYS} | self.room
-        return replace(
+        result = replace(
             source,
             name="_".join(re.findall(r"\w+", self.name)),
             modes=None,
             floor=self.floor,
             room=replace(source.room or Room(), **ceiling),
         )
+        sides = _sides(source)
+        if not sides or not isinstance(self.floor, RectangularFloor):
+            return result
+        length, width = sides
+        resized = replace(result, floor=replace(self.floor, length=length, width=width))
+        try:
+            check_case(resized)
+        except InputError:
+            return result
+        return resized
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and a row of text for each stated key."""
@@ -160,7 +183,7 @@ class Constructions(Displayed):
         Raise InputError if there is none.
         """
         require_kind("text", text, str)
-        words = text.lower().split()
+        words = _words(text)
         chosen = tuple(
             entry for entry in self.entries if all(word in _searched(entry) for word in words)
         )
@@ -180,13 +203,17 @@ class Constructions(Displayed):
         ]
 
     def __getitem__(self, name: str) -> Construction:
-        """Return a construction; raise InputError if its name is not known."""
-        if name not in self.names:
+        """Return a construction by its name, in which case and commas do not matter.
+
+        Raise InputError if the name is not known.
+        """
+        names = [_words(known) for known in self.names]
+        if _words(name) not in names:
             refuse(
                 f"construction = {shown(name)} is not known{suggestion(name, self.names)}",
                 "names that thud-driver floor --list shows, or the path of a TOML file",
             )
-        return self.entries[self.names.index(name)]
+        return self.entries[names.index(_words(name))]
 
     def __iter__(self) -> Iterator[Construction]:
         """Iterate over the constructions."""
@@ -265,7 +292,23 @@ def _order(name: str) -> list[tuple[int, str]]:
 
 def _searched(entry: Construction) -> str:
     materials = " ".join(layer.material for layer in entry.layers)
-    return f"{entry.name} {entry.kind} {materials}".lower()
+    return " ".join(_words(f"{entry.name} {entry.kind} {materials}"))
+
+
+def _words(text: str) -> list[str]:
+    """Return the words of a text in lower case, without commas."""
+    return text.lower().replace(",", " ").split()
+
+
+def _sides(case: Case) -> tuple[float, float] | None:
+    """Return length and width of the room of a case, else those of its floor; None if unknown."""
+    room = case.room or Room()
+    in_corner = room.corner_x or room.corner_y
+    for owner in (case.floor if in_corner else room, case.floor):
+        length, width = getattr(owner, "length", 0.0), getattr(owner, "width", 0.0)
+        if length and width:
+            return length, width
+    return None
 
 
 def read_construction(path: Path) -> Construction:
@@ -301,7 +344,7 @@ def _new_construction(content: Mapping[str, Any]) -> Construction:
     case = tables_case(groups if room else {**groups, "room": {}})
     check_case(case if room else replace(case, room=None))
     assert case.floor is not None  # noqa: S101 - the tables have a floor
-    return Construction(
+    result = Construction(
         name=content["name"],
         kind=content["kind"],
         floor=case.floor,
@@ -310,6 +353,47 @@ def _new_construction(content: Mapping[str, Any]) -> Construction:
         sources={key: source for key, (_, source) in (keys | room).items()},
         note=content.get("note", ""),
     )
+    _require_masses(result)
+    return result
+
+
+def _require_masses(entry: Construction) -> None:
+    """Raise InputError if the masses per unit area of layers and keys contradict each other.
+
+    Light layers, such as resilient ones, need not be in the keys.
+    """
+    mass = _mass_of_keys(entry)
+    if mass is None:
+        return
+    heavy = [layer for layer in entry.layers if layer.density > MAX_LIGHT]
+    least = sum(layer.thickness * layer.density for layer in heavy)
+    if least * (1 - MASS_TOLERANCE) <= mass <= entry.mass_per_area * (1 + MASS_TOLERANCE):
+        return
+    layers = ", ".join(f"{layer.material} {layer.thickness:g} m" for layer in heavy or entry.layers)
+    stated = {key: value for key, value, *_ in entry.rows() if key.endswith(("thickness", "mass"))}
+    keys = ", ".join(f"{key} = {value}" for key, value in stated.items())
+    refuse(
+        f"the layers ({layers}) have {entry.mass_per_area:.0f} kg/m2, but the keys ({keys}) "
+        f"{mass:.0f} kg/m2",
+        f"layers and keys of the same mass, but for layers of up to {MAX_LIGHT:g} kg/m3",
+    )
+
+
+def _mass_of_keys(entry: Construction) -> float | None:
+    """Return the mass per unit area that the keys describe, kg/m2; None if they do not."""
+    floor = entry.floor
+    if isinstance(floor, JoistFloor):
+        joists = floor.joist_density * floor.joist_width * floor.joist_height / floor.spacing
+        mass = floor.sheathing_thickness * floor.sheathing_density + joists
+    elif isinstance(floor, LaminateFloor):
+        mass = sum(floor.layer_thickness) * floor.density + floor.added_mass
+    elif isinstance(floor, Plate):
+        mass = floor.thickness * floor.density
+    else:
+        return None
+    mass += floor.screed_thickness * floor.screed_density
+    mass += floor.subceiling_thickness * floor.subceiling_density
+    return mass + entry.room.get("ceiling_mass", 0.0)
 
 
 def _read_keys(table: str, keys: object) -> dict[str, tuple[Any, str]]:

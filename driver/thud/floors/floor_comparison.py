@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,12 +17,14 @@ from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
 from thud.level.levels import get_bands
-from thud.level.rating import CLASSES, Rating
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from matplotlib.figure import Figure
+
+# Rows of the table that may be empty.
+_OPTIONAL = ("source", "class (KS F 2863-2)", "required, dB")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,14 +53,21 @@ class FloorComparison(Displayed, Page):
         """Return header and rows of text, with a column for each floor."""
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         titles = (
-            "", "floor", "force", "L_iA,Fmax (ISO 717-2)", "by modes, dB", "statistical, dB",
-            "of octaves (KS F 2863-2), dB", "standardized (ISO 16283-2), dB",
-            "required, dB", *octaves, "energy, 50 to 630 Hz, mJ",
-            "tapping machine, L_n,w (C_I), dB",
+            "", "floor", "force", "source", "L_iA,Fmax (ISO 717-2)", "by modes, dB",
+            "statistical, dB", "statistical, of octaves (KS F 2863-2)", "class (KS F 2863-2)",
+            "standardized (ISO 16283-2), dB", "required, dB", *octaves,
+            "energy into the bearing floor, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
         columns = (_column(*item) for item in self.predictions.items())
         rows = list(zip(titles, *columns, strict=True))
-        return [row for row in rows if row[0] != "required, dB" or any(row[1:])]
+        # Rows that say something of a floor.
+        rows = [row for row in rows if row[0] not in _OPTIONAL or any(row[1:])]
+        if all(prediction.is_ball for prediction in self.predictions.values()):
+            return rows
+        # The standards of the ratings are for the ball.
+        without = [re.sub(r" \((ISO|KS) [^)]*\)", "", title) for title, *_ in rows]
+        names = [title.replace("L_iA,Fmax", "A-weighted level") for title in without]
+        return [(name, *row[1:]) for name, row in zip(names, rows, strict=True)]
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -80,7 +90,9 @@ class FloorComparison(Displayed, Page):
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
         items = self.predictions.items()
-        result = (f"{name} {prediction.rated_text}" for name, prediction in items)
+        result = (
+            ", ".join(filter(None, (f"{name} {p.rated_text}", p.source_note))) for name, p in items
+        )
         return f"<FloorComparison: {', '.join(result)}>"
 
 
@@ -109,9 +121,12 @@ def compare_floors(
         if isinstance(entry, RoomPrediction):
             result[name] = entry
             continue
-        if entry.model is None or entry.floor is None or entry.room is None:
+        missing = [group for group in ("model", "floor", "room") if getattr(entry, group) is None]
+        if missing:
             refuse(
-                f"{name}: the case has no level in a room", "cases with &model, &floor and &room"
+                f"{name}: the case has no {' and no '.join(f'&{group}' for group in missing)}",
+                "cases with &floor and &room"
+                + ", and with &model beside &modes" * ("model" in missing),
             )
         try:
             result[name] = predict_level(compute(entry))
@@ -127,9 +142,14 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         name,
         prediction.floor.name.replace("_", " "),
         prediction.force,
+        _source(prediction),
         prediction.rated_text,
         str(prediction.modal_rating.rounded) if prediction.n_modal else "",
-        *(_rated(prediction.ratings[name]) for name in ("thirds", "octaves", "standardized")),
+        str(prediction.rating.rounded),
+        prediction.octave_text,
+        # In few words, as the columns are as wide as their cells.
+        "not stated" if prediction.source_note else prediction.class_text.partition(" (")[0],
+        str(prediction.standardized_rating.rounded),
         _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
         f"{1e3 * prediction.energy.sum():.3g}",
@@ -137,24 +157,24 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
     )
 
 
-def _rated(rating: Rating) -> str:
-    """Return a rating, with its class if the standard has classes."""
-    if rating.korean_class is None:
-        return str(rating.rounded)
-    return f"{rating.rounded}, class {CLASSES[rating.korean_class]}"
+def _source(prediction: RoomPrediction) -> str:
+    """Return the source, or what is wrong with it; empty for a ball that conforms."""
+    if prediction.is_ball:
+        return prediction.source_note
+    return ", ".join(filter(None, (str(prediction.source.limits_source), prediction.source_note)))
 
 
 def _required(prediction: RoomPrediction) -> str:
-    """Return the requirement of a room and the verdict; empty without one."""
+    """Return the requirement of a room and the verdict, its reason aside; empty without one."""
     required = prediction.requirement
     if required is None:
         return ""
-    return f"{required.required:g} ({required.rating}): {required.verdict}"
+    return f"{required.required:g} ({required.rating}): {required.verdict.partition(':')[0]}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:
-    """Return the level of the tapping machine below a floor; empty if it cannot be predicted."""
-    if not has_tapping_level(prediction.floor):
-        return ""
+    """Return the level of the tapping machine below a floor; a dash if it cannot be predicted."""
+    if not has_tapping_level(prediction.floor, prediction.room):
+        return "–"
     result = tapping_level(prediction.floor, prediction.room)
     return f"{result.weighted} ({result.adaptation})"

@@ -12,16 +12,17 @@ from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
+from thud.floors.constructions import Construction
 from thud.floors.survey import RoomLevels
 from thud.impact.compute import compute
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
-from thud.level.levels import BANDWIDTHS, force_exposure_levels
+from thud.level.levels import BANDWIDTHS, SOURCES, force_exposure_levels
 from thud.level.rating import (
-    CLASSES,
     Rating,
     Requirement,
+    class_range,
     rating,
     standardized_level,
 )
@@ -90,6 +91,39 @@ class RoomPrediction(RoomLevel, Displayed):
         return f"{self.rated:.0f} dB ({low:.0f} to {high:.0f})"
 
     @property
+    def is_ball(self) -> bool:
+        """Whether the source is the rubber ball, for which the standards define L_iA,Fmax."""
+        return self.source.limits_source in {None, SOURCES[0]}
+
+    @property
+    def rated_name(self) -> str:
+        """Name of the rating: ``"L_iA,Fmax"``; of the tyre ``"A-weighted level"``."""
+        return "L_iA,Fmax" if self.is_ball else "A-weighted level"
+
+    @property
+    def source_note(self) -> str:
+        """``"the source does not conform"``, which belongs beside each rating, or empty."""
+        return "the source does not conform" if self.source_warnings else ""
+
+    @property
+    def octave_text(self) -> str:
+        """Statistical rating of octaves with its interval, such as ``"59 dB (56 to 61)"``."""
+        low, high = self.interval_of("octaves")
+        return f"{self.octave_rating.rounded} dB ({low:.0f} to {high:.0f})"
+
+    @property
+    def class_text(self) -> str:
+        """Class of the statistical rating of octaves, and the classes of its interval.
+
+        Instead the reason if the source does not conform; empty for the tyre.
+        """
+        if not self.is_ball:
+            return ""
+        if self.source_note:
+            return f"class not stated: {self.source_note}"
+        return class_range(self.octave_rating.korean_class or 0, self.interval_of("octaves"))
+
+    @property
     def radiated_share(self) -> Array:
         """Fraction of the energy loss of the floor that is radiated into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
@@ -125,16 +159,26 @@ class RoomPrediction(RoomLevel, Displayed):
             "standardized": self.standardized_rating,
         }
 
+    def interval_of(self, name: RoomRequiredRating) -> tuple[float, float]:
+        """Return the interval of a rating, dB: that of both predictions, moved to the rating."""
+        low, high = self.interval
+        return low + self._shift(name), high + self._shift(name)
+
+    def _shift(self, name: RoomRequiredRating) -> float:
+        """Return the difference between a statistical rating and that of one-third octaves, dB."""
+        return self.ratings[name].a_weighted - self.rating.a_weighted
+
     @property
     def requirement(self) -> Requirement | None:
         """Verdict on the requirement of the room (its key `required`); None without one."""
         room = self.room
         if not room.required:
             return None
-        shift = self.ratings[room.required_rating].a_weighted - self.rating.a_weighted
-        low, high = self.interval
-        ends = low + shift, high + shift
-        return Requirement(room.required_rating, room.required, self.rated + shift, ends)
+        name = room.required_rating
+        return Requirement(
+            name, room.required, self.rated + self._shift(name), self.interval_of(name),
+            self.source.limits_source or SOURCES[0], not self.source_warnings,
+        )  # fmt: skip
 
     @property
     def standardized(self) -> Array:
@@ -215,21 +259,26 @@ class RoomPrediction(RoomLevel, Displayed):
 
     def __repr__(self) -> str:
         """Return the single-number ratings."""
-        octaves = self.octave_rating
         required = self.requirement
+        iso_717, korean, iso_16283 = (
+            (", ISO 717-2", " (KS F 2863-2)", " (ISO 16283-2)") if self.is_ball else ("", "", "")
+        )
+        note, classes = (
+            f", {text}" if text else "" for text in (self.source_note, self.class_text)
+        )
         modal = f"modal {self.modal_rating.rounded} dB" if self.n_modal else "no modal prediction"
         return (
-            f"<RoomPrediction: L_iA,Fmax {self.rated_text}, ISO 717-2; "
-            f"statistical {self.rating.rounded} dB, {modal}; octaves "
-            f"{octaves.rounded} dB (KS F 2863-2, class {CLASSES[octaves.korean_class or 0]}), "
-            f"standardized {self.standardized_rating.rounded} dB (ISO 16283-2)"
+            f"<RoomPrediction: {self.rated_name} {self.rated_text}{iso_717}{note}; "
+            f"statistical {self.rating.rounded} dB, {modal}; "
+            f"statistical, of octaves{korean}, {self.octave_text}{classes}, "
+            f"standardized {self.standardized_rating.rounded} dB{iso_16283}"
             f"{f'; {required}' if required else ''}>"
         )
 
 
 def predict_level(
     source: ImpactResult | None = None,
-    floor: FloorOptions | None = None,
+    floor: FloorOptions | Construction | None = None,
     room: Room | None = None,
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
@@ -246,7 +295,8 @@ def predict_level(
         Impact of any model, or a recording; by default that of `Case(floor=floor, room=room)`,
         whose source conforms to the standards.
     floor, room
-        Floor and room; by default those of the impact's case.
+        Floor and room; by default those of the impact's case. A construction also describes the
+        ceiling of the room.
 
     Raises
     ------
@@ -254,6 +304,10 @@ def predict_level(
         If the floor or the room is missing or out of range.
     """
     require_kind("source", source, ImpactResult | None)
+    if isinstance(floor, Construction):
+        known = Case() if source is None else source.case
+        built = floor.case(replace(known, room=room or known.room))
+        floor, room = built.floor, built.room if room or known.room else None
     if source is None and floor is not None and room is not None:
         source = compute(Case(floor=floor, room=room))
     case = Case() if source is None else source.case

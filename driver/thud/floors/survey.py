@@ -67,6 +67,8 @@ NO_POSITION = {
 }  # fmt: skip
 # Maximum plausible difference between levels of two positions, dB, mean over the bands.
 MAX_DIFFERENCE = 15.0
+# Difference above which a column has no levels of a position, dB.
+MAX_OUTLIER = 40.0
 # Plausible levels, dB, and times, s.
 LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
 
@@ -287,6 +289,17 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
                 f"{path}: {quantity} = {wrong[0]:g} {unit} is not allowed",
                 f"{low:g} to {high:g} {unit}",
             )
+    # Of two columns the lower one is an outlier: neither times nor a background are louder.
+    means = levels.mean(axis=1)
+    differences = abs(means - np.median(means)) * (2 if len(means) == 2 else 1)  # noqa: PLR2004
+    outlier = max(range(len(means)), key=lambda i: (differences[i], -means[i]))
+    if differences[outlier] > MAX_OUTLIER:
+        refuse(
+            f"{path}: column {positions[outlier].strip()!r} differs by {differences[outlier]:.0f} "
+            f"dB from other positions",
+            f"levels of positions, up to {MAX_OUTLIER:g} dB apart; other columns have the titles "
+            "background or reverberation_time",
+        )
     volume = None if volume is None else require_volume(volume)
     return RoomLevels(Path(path).stem, bands, frequency, levels, background, time, volume)
 

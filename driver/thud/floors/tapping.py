@@ -88,19 +88,19 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz) with T_s = 2.2/(f eta)
     (ISO 12354-2 annex B). Radiation factor sigma and loss factor eta are those of `predict_level`.
     The constant includes density and wave speed of concrete. The floor is the bare plate, without
-    floating floor, ceiling or flanking walls.
+    flanking walls.
 
     Parameters
     ----------
     floor
         The plate.
     room
-        Room, of which only the properties of air are used; by default `Room()`.
+        Room without a ceiling, of which only the properties of air are used; by default `Room()`.
 
     Raises
     ------
     InputError
-        If the floor is not a plate, or its keys are out of range.
+        If the floor is not a bare plate like concrete, or its keys are out of range.
 
     Examples
     --------
@@ -122,6 +122,12 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
             "1 and 1",
         )
     require_kind("room", room, Room | None)
+    if layers := _layers(floor, room or Room()):
+        refuse(
+            "the formula of ISO 12354-2 is for bare plates, but this one has "
+            f"{' and '.join(layers)}",
+            "plates without floating floor, covering, subceiling and ceiling",
+        )
     case = Case(floor=floor, room=room or Room())
     result = ask("radiator", case=case_text(case), frequency=FREQUENCY)
     time = 2.2 / (FREQUENCY * result["loss_factor"])
@@ -130,9 +136,22 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     return TappingLevel(FREQUENCY, level)
 
 
-def has_tapping_level(floor: FloorOptions) -> TypeGuard[Plate]:
-    """Whether `tapping_level` applies to a floor: an isotropic plate similar to concrete."""
-    return isinstance(floor, Plate) and _is_like_concrete(floor) and _is_isotropic(floor)
+def has_tapping_level(floor: FloorOptions, room: Room) -> TypeGuard[Plate]:
+    """Whether `tapping_level` applies: to a bare isotropic plate similar to concrete."""
+    is_plate = isinstance(floor, Plate) and _is_like_concrete(floor) and _is_isotropic(floor)
+    return is_plate and not _layers(floor, room)
+
+
+def _layers(floor: FloorOptions, room: Room) -> list[str]:
+    """Return the names of layers above and below a plate."""
+    layers = {
+        "a floating floor": getattr(floor, "screed_thickness", 0.0),
+        "a covering": getattr(floor, "covering_stiffness", 0.0)
+        or any(getattr(floor, "covering_improvement", ())),
+        "a subceiling": getattr(floor, "subceiling_thickness", 0.0),
+        "a ceiling": room.ceiling_mass,
+    }
+    return [name for name, value in layers.items() if value]
 
 
 def _is_like_concrete(floor: Plate) -> bool:

@@ -12,12 +12,12 @@ from thud.base._schema import CLASS_LIMITS, RATED_BANDS, RATINGS
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
-from thud.level.levels import BANDWIDTHS
+from thud.level.levels import BANDWIDTHS, SOURCES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, RoomRequiredRating
+    from thud.base._schema import BandSet, LimitsSource, RoomRequiredRating
 
 # Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
@@ -53,7 +53,8 @@ class Rating(Displayed):
 
     def __repr__(self) -> str:
         """Return rating and class."""
-        korea = "" if self.korean_class is None else f", Korean class {CLASSES[self.korean_class]}"
+        korean = self.korean_class
+        korea = "" if korean is None else f", {class_name(korean)} (KS F 2863-2)"
         return (
             f"<Rating, {self.bands}s: L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f}){korea}>"
         )
@@ -84,18 +85,30 @@ class Requirement:
         Maximum rating, and the mean rating of both predictions, dB.
     interval : tuple of float
         Ends of the interval of that rating, dB.
+    source : str
+        Source of the levels; for another than the rubber ball the requirement is a limit of one's
+        own, as the standards of the ratings are for the ball.
+    conforms : bool
+        Whether the source conforms to the standards.
     verdict : str
-        ``"met"``, ``"not met"``, or ``"undecided"`` if the interval, rounded, holds both.
+        ``"met"``, ``"not met"``, or ``"undecided"`` if the interval, rounded, holds both, or, with
+        the reason, if the source does not conform.
     """
 
     rating: RoomRequiredRating
     required: float
     level: float
     interval: tuple[float, float]
+    source: LimitsSource = SOURCES[0]
+    conforms: bool = True
 
     @property
-    def verdict(self) -> Literal["met", "not met", "undecided"]:
+    def verdict(
+        self,
+    ) -> Literal["met", "not met", "undecided", "undecided: the source does not conform"]:
         """Whether all levels of the interval, rounded, are at most the required one."""
+        if not self.conforms:
+            return "undecided: the source does not conform"
         low, high = map(_rounded, self.interval)
         if high <= self.required:
             return "met"
@@ -104,15 +117,38 @@ class Requirement:
     def __str__(self) -> str:
         """Return rating, requirement and verdict in words."""
         low, high = map(_rounded, self.interval)
+        is_ball = self.source == SOURCES[0]
+        title = RATINGS[self.rating] if is_ball else f"A-weighted level ({self.rating})"
         return (
-            f"{RATINGS[self.rating]}: {_rounded(self.level)} dB ({low} to {high}), required "
-            f"{self.required:g} dB, {self.verdict}"
+            f"{title}: {_rounded(self.level)} dB ({low} to {high}), "
+            f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.verdict}"
         )
 
 
 def _rounded(level: float) -> int:
     """Return a level rounded half up."""
     return math.floor(level + 0.5)
+
+
+def class_name(korean_class: int) -> str:
+    """Return a class of KS F 2863-2 in words; 0 is no class."""
+    return f"class {CLASSES[korean_class]}" if korean_class else "no class"
+
+
+def class_range(korean_class: int, interval: tuple[float, float]) -> str:
+    """Return a class of KS F 2863-2, and the classes of the ends of an interval if they differ.
+
+    >>> class_range(4, (46.0, 48.0)), class_range(0, (47.2, 58.0))
+    ('class 4 (at most 49 dB)', 'no class; interval: class 4 to no class')
+    """
+    ends = [
+        next((i for i, limit in enumerate(CLASS_LIMITS, 1) if _rounded(end) <= limit), 0)
+        for end in interval
+    ]
+    if {*ends} == {korean_class}:
+        return class_text(korean_class)
+    names = " to ".join(dict.fromkeys(map(class_name, ends)))
+    return f"{class_name(korean_class)}; interval: {names}"
 
 
 def class_text(korean_class: int) -> str:
@@ -122,8 +158,8 @@ def class_text(korean_class: int) -> str:
     'class 4 (at most 49 dB)'
     """
     if korean_class:
-        return f"class {korean_class} (at most {CLASS_LIMITS[korean_class - 1]:g} dB)"
-    return f"no class (class {len(CLASS_LIMITS)}: at most {CLASS_LIMITS[-1]:g} dB)"
+        return f"{class_name(korean_class)} (at most {CLASS_LIMITS[korean_class - 1]:g} dB)"
+    return f"{class_name(0)} (class {len(CLASS_LIMITS)}: at most {CLASS_LIMITS[-1]:g} dB)"
 
 
 def rated_bands(bands: BandSet) -> NDArray[np.float64]:

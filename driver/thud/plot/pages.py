@@ -60,18 +60,26 @@ _SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cros
 
 
 def html_page(
-    title: str, text: str, table: Sequence[Sequence[str]], plots: Sequence[dict[str, Any]]
+    title: str,
+    text: str,
+    table: Sequence[Sequence[str]],
+    plots: Sequence[dict[str, Any]],
+    warnings: Sequence[str] = (),
 ) -> str:
     """Return a page of title, text, table (header row first) and plots, the first of full width.
+
+    Warnings are listed below the table.
 
     A click on the legend hides the curve with the same index in all plots.
     """
     head, *body = table
+    items = "".join(f"<li>{html.escape(warning)}</li>" for warning in warnings)
     return _PAGE.substitute(
         title=html.escape(title),
         text=html.escape(text),
         head=_row(head, "th"),
         rows="\n".join(_row(row, "td") for row in body),
+        warnings=f"<h2>Warnings</h2><ul>{items}</ul>" if items else "",
         plots=json.dumps(plots).replace("<", r"\u003c"),
         script=Path(__file__).with_name("curves.js").read_text(encoding="utf-8"),
     )
@@ -119,6 +127,7 @@ _PAGE = Template("""<!DOCTYPE html>
 body { font-family: sans-serif; margin: 1.5em auto; max-width: 80em; padding: 0 0.8em;
   color: var(--text); background: var(--page); }
 h1 { font-size: 1.5em; }
+h2 { font-size: 1.1em; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: 0.3em 0.8em; text-align: right; border-bottom: 1px solid var(--line); }
@@ -155,6 +164,7 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 $rows
 </tbody>
 </table></div>
+$warnings
 <div class="legend"></div>
 <div class="plots"></div>
 <script>
@@ -350,10 +360,11 @@ def floors_html(comparison: FloorComparison) -> str:
     text = (
         "Levels in the room below, and the chain that leads to them: force, energy, floor, room. "
         "Lines with marks are statistical means over positions, floors and rooms; thin lines are "
-        "levels by the modes of floor and room. See the warnings of each prediction."
+        "levels by the modes of floor and room."
     )
     # The first plot has the full width: the level in the room.
-    return html_page("Comparison of floors", text, comparison.rows(), [plots[-1], *plots[:-1]])
+    plots = [plots[-1], *plots[:-1]]
+    return html_page("Comparison of floors", text, comparison.rows(), plots, comparison.warnings)
 
 
 def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:

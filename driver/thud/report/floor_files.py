@@ -29,12 +29,15 @@ _WIDTH = 80
 
 def screen_text(floor: PredictedFloor) -> str:
     """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
-    required = floor.prediction.requirement
+    prediction = floor.prediction
+    required = prediction.requirement
+    (_, standard, _, _), *others, (_, korean, _, octaves) = floor.ratings
+    notes = [*filter(None, (standard, prediction.source_note))]
     lines = [
         floor.name,
-        f"  L_iA,Fmax {floor.prediction.rated_text}, ISO 717-2",
-        *(f"    {text:>6}  {title}" for title, _, _, text in floor.ratings[1:-1]),
-        f"  Statistical, of octaves, KS F 2863-2: {floor.ratings[-1][3]}",
+        f"  {', '.join([f'{prediction.rated_name} {prediction.rated_text}', *notes])}",
+        *(f"    {text:>6}  {title}" for title, _, _, text in others),
+        f"  Statistical, of octaves{korean and f', {korean}'}: {octaves}",
         *([f"  {required}"] if required else []),
         *([f"  A-weighted energy by path: {floor.path_shares}"] if len(floor.paths) > 1 else []),
         "  Contributions to the interval, dB:",

@@ -16,6 +16,7 @@ from thud.report.predicted_floor import (
     contribution_title,
     deviation_text,
     difference_text,
+    number_text,
 )
 from thud.report.template import PAGE
 
@@ -34,7 +35,7 @@ BODY = Template("""<header>
 <td><h2>Construction, to scale</h2>$section</td>
 <td><h2>Room and source</h2><table class="pairs">$about</table></td>
 </tr></table>
-<h2>Ratings, L<sub>iA,Fmax</sub></h2>
+<h2>Ratings, $quantity</h2>
 $ratings
 <h2>Assumptions and their sources</h2>
 $assumptions
@@ -99,9 +100,10 @@ sub { line-height: 0; font-size: 0.8em; vertical-align: -0.2em; }
 """
 ABOUT_COLUMNS = (
     "The force level is the force exposure level of the force on the floor; the energy is what "
-    "this force transfers to the floor. Spread: expected standard deviation of the statistical "
-    "level at one position of source and microphone. Above {last} Hz, where modes of the room "
-    "overlap, there is no prediction by modes, and its rating uses the statistical levels."
+    "this force transfers to the bearing floor, below a floating plate if there is one. Spread: "
+    "expected standard deviation of the statistical level at one position of source and "
+    "microphone. Above {last} Hz, where modes of the room overlap, there is no prediction by "
+    "modes, and its rating uses the statistical levels."
 )
 ABOUT_INTERVAL = (
     "Deviations from {rated:.1f} dB. They count as independent: the root sums of squares of both "
@@ -134,6 +136,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         name=escaped(floor.name),
         section=_figure(section, "s"),
         about=pair_rows(_about(floor)),
+        quantity=_with_index(prediction.rated_name),
         ratings=_table(
             [
                 ("Rating", "Standard", "Value"),
@@ -187,24 +190,30 @@ def page_texts(floor: PredictedFloor) -> str:
 
 def _box(floor: PredictedFloor) -> list[str]:
     """Return the lines below the rating."""
-    *_, (_, _, _, octaves) = floor.ratings
+    prediction = floor.prediction
+    (_, standard, _, _), *_, (_, korean, _, octaves) = floor.ratings
     lines = [
-        "L_iA,Fmax in the room below, 50 to 630 Hz (ISO 717-2)",
-        f"KS F 2863-2, of octaves: {octaves}",
+        f"{prediction.rated_name} in the room below, 50 to 630 Hz{standard and f' ({standard})'}",
+        f"statistical, of octaves{korean and f' ({korean})'}: {octaves}",
     ]
-    required = floor.prediction.requirement
+    required = prediction.requirement
+    if prediction.source_note:
+        lines.insert(0, prediction.source_note.capitalize())
     return [*lines, f"{required}"] if required else lines
 
 
 def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
     """Return room and source."""
     prediction = floor.prediction
-    length, width, height = prediction.size
+    sides = " × ".join(f"{side:.3g}" for side in prediction.size)  # noqa: RUF001
     times = np.unique(np.round(prediction.reverberation_time, 2))
     time = " to ".join(f"{value:g}" for value in dict.fromkeys((times[0], times[-1])))
     source, room = prediction.source, prediction.room
     case = source.case
     kind = humanize(source.limits_source or "source that is not stated")
+    # A recording has no case of its own, only the velocity.
+    drop = f" dropped from {case.drop.height:.3g} m" if case.model else ""
+    limits = f"limits of the {kind}"
     model = humanize(case.model.name) if case.model else "recording or measured modes"
     forces = {
         "contact": "on the mobile floor",
@@ -212,14 +221,14 @@ def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
     }
     conforms = not prediction.source_warnings
     pairs = [
-        ("Room", f"{length:.3g} × {width:.3g} × {height:.3g} m, {prediction.volume:.5g} m³"),  # noqa: RUF001
+        ("Room", f"{sides} m, {number_text(prediction.volume)} m³"),
         ("Reverberation", f"T = {time} s, of the {humanize(room.reverberation_of)} room"),
         (
             "Flanking walls",
             f"A-weighted energy: {floor.path_shares}" if room.wall_lengths else "none described",
         ),
         ("Ceiling", _ceiling(prediction)),
-        ("Source", f"{source.mass:.3g} kg, {source.impact_velocity:.3g} m/s; limits of the {kind}"),
+        ("Source", f"{source.mass:.3g} kg{drop}, {source.impact_velocity:.3g} m/s; {limits}"),
         (
             "Source levels",
             "conform to the standards" if conforms else "do not conform: see warnings",

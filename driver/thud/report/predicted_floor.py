@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -25,7 +26,7 @@ from thud.case.keys import humanize
 from thud.floors.constructions import Layer
 from thud.floors.prediction import BANDS, predict_level
 from thud.level.levels import get_bands
-from thud.level.rating import class_text, rating
+from thud.level.rating import rating
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -137,13 +138,14 @@ class PredictedFloor:
 
     @property
     def ratings(self) -> list[tuple[str, str, float, str]]:
-        """Title, standard, value, dB, and text of each rating."""
+        """Title, standard, value, dB, and text of each rating; no standard for the tyre."""
         prediction = self.prediction
+        note = f"; {prediction.source_note}" if prediction.source_note else ""
+        known = f", {prediction.class_text}" if prediction.class_text else ""
         predictions = "mean of both predictions" if prediction.n_modal else "prediction"
         mean = f"{predictions}, with interval"
-        octaves = prediction.octave_rating
         result = [
-            (mean, "ISO 717-2", prediction.rated, prediction.rated_text),
+            (mean, "ISO 717-2", prediction.rated, f"{prediction.rated_text}{note}"),
             _rating_entry("statistical prediction", "ISO 717-2", prediction.level),
         ]
         if prediction.n_modal:
@@ -153,15 +155,16 @@ class PredictedFloor:
                 _rating_entry("by modes, simply supported", "ISO 717-2", prediction.simple_level),
                 _rating_entry("by modes, clamped", "ISO 717-2", prediction.clamped_level),
             ]
-        known = class_text(octaves.korean_class or 0)
         result += [
             _rating_entry("statistical, standardized", "ISO 16283-2", prediction.standardized),
             (
-                "statistical, of octaves", "KS F 2863-2", octaves.a_weighted,
-                f"{octaves.rounded} dB, {known}",
+                "statistical, of octaves", "KS F 2863-2", prediction.octave_rating.a_weighted,
+                f"{prediction.octave_text}{known}",
             ),
         ]  # fmt: skip
-        return result
+        if prediction.is_ball:
+            return result
+        return [(title, "", value, text) for title, _, value, text in result]
 
     @property
     def paths(self) -> list[str]:
@@ -202,6 +205,10 @@ class PredictedFloor:
                 source = known.get(key.name, "" if is_default else "stated in the case")
                 if not source and key.name in _MAIN:
                     source = "default value"
+                # The construction takes the sides of the case.
+                stated = getattr(construction.floor, key.name, value) if construction else value
+                if owner != "room" and value != stated:
+                    source = "that of the case"
                 meaning = re.split("[;:(]|, 0", key.meaning)[0].strip()
                 yield humanize(key.name), meaning, _value_text(key, value), source
 
@@ -229,7 +236,7 @@ class PredictedFloor:
 # Title with unit, decimals or significant digits on the page, and value of each column of bands.
 COLUMNS: dict[str, tuple[str, Callable[[PredictedFloor], Iterable[float]]]] = {
     "force level, dB re 1 N": (".1f", lambda floor: floor.force_levels),
-    "energy, mJ": ("#.3g", lambda floor: 1e3 * floor.prediction.energy),
+    "energy into the bearing floor, µJ": ("#.3g", lambda floor: 1e6 * floor.prediction.energy),
     "radiation factor": ("#.3g", lambda floor: floor.prediction.radiation_factor),
     "loss factor": (".3f", lambda floor: floor.prediction.loss_factor),
     "T, s": (".2f", lambda floor: floor.prediction.reverberation_time),
@@ -267,11 +274,19 @@ def difference_text(change: Change) -> str:
     return f"{change.difference:+z.1f}".replace("-", "−")
 
 
+def number_text(value: float, form: str = ".3g") -> str:
+    """Return a number by a format, without exponent and with a minus sign.
+
+    >>> number_text(-0.123), number_text(4.45e-5), number_text(1e5, ".5g"), number_text(66.092)
+    ('−0.123', '0.0000445', '100000', '66.1')
+    """
+    return f"{Decimal(f'{value:z{form}}'):f}".replace("-", "−")
+
+
 def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
     """Return the bands as rows of text, the header first; modal levels only of modal bands."""
     cells = [
-        [f"{value:z{form}}".replace("-", "−") for value in values(floor)]
-        for form, values in COLUMNS.values()
+        [number_text(value, form) for value in values(floor)] for form, values in COLUMNS.values()
     ]
     prediction = floor.prediction
     for title, column in zip(COLUMNS, cells, strict=True):
@@ -301,7 +316,8 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
         bands += [(floor.name, *row) for row in rows]
         ratings += [(floor.name, *entry) for entry in floor.ratings]
         for end, value in zip(("lower", "upper"), prediction.interval, strict=True):
-            ratings.append((floor.name, f"{end} end of the interval", "ISO 717-2", value, ""))
+            standard = floor.ratings[0][1]
+            ratings.append((floor.name, f"{end} end of the interval", standard, value, ""))
         required = prediction.requirement
         if required:
             ratings.append((floor.name, "required", "", required.required, str(required)))
@@ -352,7 +368,7 @@ def _value_text(key: Key, value: object) -> str:
     # A reverberation time of 500 ms would be unusual.
     largest = max(map(abs, numbers), default=0.0)
     unit, size = ("s", 1.0) if key.unit == "s" else display_unit(key.unit, largest)
-    text = ", ".join(f"{number / size:.5g}" for number in numbers)
+    text = ", ".join(number_text(number / size, ".4g") for number in numbers)
     return f"{text} {unit.replace('m2', 'm²').replace('m3', 'm³')}".strip()
 
 

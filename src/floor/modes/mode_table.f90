@@ -8,7 +8,7 @@ module thud_mode_table
    use thud_error, only: error_type, input_error
    use thud_function_set, only: min_nodes
    use thud_kinds, only: wp
-   use thud_text, only: fixed, is_number, lower_case, newline, quoted, tab, to_text
+   use thud_text, only: byte_order_mark, fixed, is_number, lower_case, newline, quoted, tab, to_text
    implicit none (type, external)
    private
 
@@ -163,7 +163,6 @@ contains
       real(wp), allocatable, intent(out) :: value(:)
       !> Set if a cell is neither a number nor a label.
       type(error_type), allocatable, intent(out) :: error
-      character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
       character(len=len(line)) :: text
       character(len=64) :: word
       character(len=128) :: message

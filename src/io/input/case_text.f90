@@ -20,7 +20,7 @@ module thud_case_text
 contains
 
    !> Reads a case from the text of a namelist file and checks it.
-   subroutine read_case(text, default_name, case, error, unchecked, directory)
+   subroutine read_case(text, default_name, case, error, unchecked, directory, room_alone)
       character(len=*), intent(in) :: text
       !> Name of the case if the text has none.
       character(len=*), intent(in) :: default_name
@@ -31,6 +31,9 @@ contains
       logical, intent(in), optional :: unchecked
       !> Directory of the case, with a slash at its end, in which files are searched first (default: the current one).
       character(len=*), intent(in), optional :: directory
+      !> Allow a room without a floor (default: false).
+      logical, intent(in), optional :: room_alone
+      logical :: needs_floor
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
       integer :: i, j
@@ -47,7 +50,9 @@ contains
       case%has_unknowns = any([(groups(i)%name == 'unknowns', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
-      if (case%has_room .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &
+      needs_floor = case%has_room
+      if (present(room_alone)) needs_floor = needs_floor .and. .not. room_alone
+      if (needs_floor .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &
          '&room is given without &floor; allowed: both, for the level in the room below')
       if (case%has_impact .and. case%has_room .and. .not. names_model(groups)) call set_room_source(case)
       do i = 1, merge(size(main_groups), 1, case%has_impact)

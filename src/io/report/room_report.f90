@@ -140,7 +140,7 @@ contains
       do i = 1, size(rating_names)
          text = text//'  '//rating_titles(i)//to_text(get_rounded(prediction%rating(i)))//' dB (' &
             //fixed(prediction%rating(i), 2)//')'
-         if (rating_names(i) == 'octaves') text = text//', '//get_class_text(prediction%rating(i))
+         if (rating_names(i) == 'octaves') text = text//get_class_text(case, prediction, prediction%rating(i))
          text = text//newline
       end do
       if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
@@ -164,18 +164,32 @@ contains
       text = to_text(get_rounded(ends(1)))//' to '//to_text(get_rounded(ends(2)))
    end function get_range_text
 
-   !> The class of a rating, with the limit of the class.
-   function get_class_text(rating) result(text)
+   !> Whether the class of KS F 2863-2 is stated: that of a rubber ball that conforms.
+   pure function has_class(case, prediction) result(yes)
+      type(case_type), intent(in) :: case
+      type(room_level_type), intent(in) :: prediction
+      logical :: yes
+
+      yes = prediction%source_conforms .and. case%source == 'rubber_ball'
+   end function has_class
+
+   !> The class of a rating, with the limit of the class, after a comma; empty for another source than the ball.
+   function get_class_text(case, prediction, rating) result(text)
+      type(case_type), intent(in) :: case
+      type(room_level_type), intent(in) :: prediction
       !> Rating of octaves, dB.
       real(wp), intent(in) :: rating
       character(len=:), allocatable :: text
       integer :: number
 
       number = get_class(rating)
-      if (number > 0) then
-         text = 'class '//to_text(number)//' (at most '//fixed(class_limits(number), 0)//' dB)'
+      text = ''
+      if (.not. has_class(case, prediction)) then
+         if (.not. prediction%source_conforms) text = ', class not stated: the source does not conform'
+      else if (number > 0) then
+         text = ', class '//to_text(number)//' (at most '//fixed(class_limits(number), 0)//' dB)'
       else
-         text = 'no class (class '//to_text(size(class_limits))//': at most '//fixed(class_limits(size(class_limits)), 0) &
+         text = ', no class (class '//to_text(size(class_limits))//': at most '//fixed(class_limits(size(class_limits)), 0) &
             //' dB)'
       end if
    end function get_class_text
@@ -189,9 +203,10 @@ contains
 
       text = newline//'&room_summary'//newline//line('rating', join_quoted(rating_names), '') &
          //line('meaning', join_quoted(rating_titles), '')//line('level', join(prediction%rating), 'dB') &
-         //line('rounded', join(real(get_rounded(prediction%rating), wp)), 'dB') &
-         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none') &
-         //line('rated', to_text(prediction%rated), 'dB, mean of both predictions, ISO 717-2') &
+         //line('rounded', join(real(get_rounded(prediction%rating), wp)), 'dB')
+      if (has_class(case, prediction)) text = text &
+         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none')
+      text = text//line('rated', to_text(prediction%rated), 'dB, mean of both predictions, ISO 717-2') &
          //line('interval', join(prediction%interval), 'dB')
       if (prediction%n_modal > 0) text = text//line('modal', &
          to_text(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level)), 'dB, by the modes, ISO 717-2')
