@@ -9,7 +9,7 @@ module thud_room_report
    use thud_report, only: line
    use thud_room, only: few_modes, get_required_interval, judge_requirement, room_level_type
    use thud_room_prediction, only: contribution_names
-   use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, to_text
+   use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, significant, to_text
    implicit none (type, external)
    private
 
@@ -103,10 +103,10 @@ contains
          //fixed(minval(prediction%reverberation_time), 2)
       if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
       text = text//' s.'//newline
-      text = text//'  Resistance of the floor '//fixed(resistance/1.0e3_wp, 1)//' kN s/m.'
-      if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
-         //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'
-      text = text//newline//'  Spread: expected standard deviation of one position of source and microphone.'//newline
+      text = text//'  Resistance of the floor '//significant(resistance/1.0e3_wp, 3)//' kN s/m.'//newline
+      if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//'  *: fewer than ' &
+         //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'//newline
+      text = text//'  Spread: expected standard deviation of one position of source and microphone.'//newline
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
@@ -119,10 +119,11 @@ contains
       logical, intent(in) :: coupled
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
+      character(len=1) :: separator
       integer :: i
 
-      text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
-         //to_text(get_rounded(prediction%rated))//' dB ('//get_range_text(prediction%interval)//'), statistical ' &
+      text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%rated))//' dB (' &
+         //get_range_text(prediction%interval)//'), of one-third octaves, ISO 717-2'//newline//'  statistical ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, '
       if (prediction%n_modal > 0) then
          text = text//'modal ' &
@@ -131,16 +132,20 @@ contains
          text = text//'no modal prediction: the interval contains neither edges nor model'//newline
       end if
       text = text//'  Contributions:'
+      separator = ' '
       do i = 1, size(contribution_names)
          if (prediction%n_modal == 0 .and. any(contribution_names(i) == ['edges', 'model'])) cycle
-         text = text//merge(',', ' ', i > 1)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
+         ! As far as the decimals show it.
+         if (all(abs(prediction%contribution(:, i)) < 0.05_wp)) cycle
+         text = text//trim(separator)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
             //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
+         separator = ','
       end do
       text = text//' dB'//newline//'  Statistical:'//newline
       do i = 1, size(rating_names)
          text = text//'  '//rating_titles(i)//to_text(get_rounded(prediction%rating(i)))//' dB (' &
             //fixed(prediction%rating(i), 2)//')'
-         if (rating_names(i) == 'octaves') text = text//', '//get_class_text(prediction%rating(i))
+         if (rating_names(i) == 'octaves') text = text//newline//'    '//get_class_text(prediction%rating(i))
          text = text//newline
       end do
       if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
