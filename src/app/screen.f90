@@ -36,7 +36,7 @@ contains
       call write_screen(standard_output, lines, exit_code)
    end subroutine print_results
 
-   !> Prints an error or a warning.
+   !> Prints an error or a warning: in a log it stays one line.
    subroutine print_message(text, color, exit_code)
       character(len=*), intent(in) :: text
       !> `red` or `yellow`.
@@ -45,7 +45,8 @@ contains
       integer, intent(inout) :: exit_code
       character(len=:), allocatable :: lines
 
-      call wrap_lines('thud: '//text//newline, lines)
+      lines = 'thud: '//text//newline
+      if (is_terminal(standard_error)) call wrap_lines('thud: '//text//newline, lines)
       if (has_colors(standard_error)) lines = painted(lines(:5), color)//lines(6:)
       call write_screen(standard_error, lines, exit_code)
    end subroutine print_message
@@ -57,16 +58,13 @@ contains
       character(len=*), intent(in) :: text
       !> Becomes 1 if the text cannot be written.
       integer, intent(inout) :: exit_code
-      character(len=:), allocatable :: lines
       integer :: status
 
       call write_text(descriptor, text, status)
       if (status == 0 .or. is_closed(status)) return
       exit_code = bad_input
-      if (descriptor /= standard_output) return
-      call wrap_lines('thud: standard output cannot be written ('//get_system_message(status) &
-         //'); allowed: a screen, a pipe, or a disk with space'//newline, lines)
-      call write_text(standard_error, lines, status)
+      if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
+         //get_system_message(status)//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
    end subroutine write_screen
 
    !> Whether a descriptor shows colors, and the user wants them (https://no-color.org).

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from thud.base.checks import refuse
 from thud.base.extras import require_extra
 from thud.cli.command import QUIET, Command, argument
+from thud.cli.screen import print_notes, print_results
 
 if TYPE_CHECKING:
     import argparse
@@ -43,15 +44,14 @@ def explore(options: argparse.Namespace) -> int:
         refuse(f"{host}:{options.port} is not available", "a free port", error)
     address = f"http://{host}:{listener.getsockname()[1]}/#token={token}"
     if not options.quiet:
-        print(f"Page: {address}")
-        print("Press Ctrl-C to stop.")
+        print_results(f"Page: {address}\nPress Ctrl-C to stop.")
         sys.stdout.flush()
     if hosts == ("*",):
-        print(
-            "thud-driver: other machines can reach the page, which is not encrypted; anyone with "
-            "the address can run computations here",
-            file=sys.stderr,
+        warning = (
+            "other machines can reach the page, which is not encrypted; anyone with the address "
+            "can run computations here"
         )
+        print_notes([warning])
     application = new_application(start, token=token, hosts=hosts)
     with listener, tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -44,7 +44,7 @@ contains
       other = force_count + 1 - assessed
       ! In most models both forces are equal.
       if (.not. any(abs(assessment%level(:, other) - assessment%level(:, assessed)) > 0.0_wp)) other = 0
-      text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 11)//'verdict'
+      text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
       if (other > 0) text = text//flush_right(trim(merge('floor force  ', 'elastic force', force_names(other) == 'floor')), &
          screen_width - len(text))
       text = text//newline
@@ -150,7 +150,7 @@ contains
 
       text = '  free modes     frequency   harmonic   participation'//newline &
          //'                       Hz                of the pole'//newline &
-         //'   rigid        '//flush_right(significant(modes%rigid_frequency, 3), 9)//flush_right('1', 11) &
+         //'   rigid        '//flush_right(fixed(modes%rigid_frequency, 2), 9)//flush_right('1', 11) &
          //flush_right('1.000', 16)//newline
       do i = 1, size(modes%frequency)
          text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 2), 19) &
@@ -213,7 +213,7 @@ contains
 
       text = flush_right(short(criterion%lower*scale), 7)
       if (criterion%upper > criterion%lower) text = text//' to '//short(criterion%upper*scale)
-      text = padded(text, 16)
+      text = padded(text, 18)
    end function get_limits
 
    !> Row with minimum and maximum of a quantity.
@@ -242,14 +242,12 @@ contains
          if (any(resolution_quantities == history%model_quantity_name(i))) cycle
          ! On a hard floor there is none.
          if (history%model_quantity_name(i) == 'maximum_penetration' .and. .not. history%model_quantity(i) > 0.0_wp) cycle
-         associate (value => history%model_quantity(i), unit => trim(history%model_quantity_unit(i)))
-            rows = rows//'  '//padded(replaced(trim(history%model_quantity_name(i)), '_', ' '), 22)
-            if (unit == '') then
-               rows = rows//flush_right(significant(value, 4), 10)//newline
-            else
-               rows = rows//with_prefix(value, unit, 4, 10)//newline
-            end if
-         end associate
+         rows = rows//'  '//padded(replaced(trim(history%model_quantity_name(i)), '_', ' '), 22)
+         if (history%model_quantity_unit(i) == '') then
+            rows = rows//flush_right(significant(history%model_quantity(i), 4), 10)//newline
+         else
+            rows = rows//with_prefix(history%model_quantity(i), trim(history%model_quantity_unit(i)), 4, 10)//newline
+         end if
       end do
    end function model_quantity_rows
 
