@@ -105,7 +105,7 @@ contains
          do i = 1, outcome%n_message
             call print_message(outcome%messages(i)%text, yellow, exit_code)
          end do
-         if (.not. request%quiet) call print_results(outcome%table//'  Results: '//outcome%directory, exit_code)
+         if (.not. request%quiet) call print_results(outcome%table, outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming
       end if
    end subroutine execute

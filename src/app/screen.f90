@@ -19,21 +19,23 @@ module thud_screen
 
 contains
 
-   !> Prints lines of results, with colored verdicts.
-   subroutine print_results(text, exit_code)
+   !> Prints results, with colored verdicts, and where they are.
+   subroutine print_results(text, directory, exit_code)
       character(len=*), intent(in) :: text
+      !> Path, which stays in one piece.
+      character(len=*), intent(in) :: directory
       !> Becomes 1 if the text cannot be written.
       integer, intent(inout) :: exit_code
       character(len=:), allocatable :: lines
       integer :: i
 
-      call wrap_lines(text//newline, lines)
+      call wrap_lines(text, lines)
       if (has_colors(standard_output)) then
          do i = 1, size(words)
             call paint(lines, trim(words(i)), colors(i))
          end do
       end if
-      call write_screen(standard_output, lines, exit_code)
+      call write_screen(standard_output, lines//'  Results: '//directory//newline, exit_code)
    end subroutine print_results
 
    !> Prints an error or a warning: in a log it stays one line.

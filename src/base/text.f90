@@ -23,6 +23,9 @@ module thud_text
    !> Line feed, the line end in all files that thud writes.
    character(len=*), parameter :: newline = new_line('a')
 
+   !> UTF-8 byte order mark, with which some editors begin a text.
+   character(len=*), parameter, public :: byte_order_mark = char(239)//char(187)//char(191)
+
    !> Horizontal tab.
    character(len=*), parameter :: tab = achar(9)
 

@@ -259,7 +259,7 @@ def read_toml(path: Path) -> tuple[dict[str, Any], str]:
     Raise InputError with the path if the file cannot be read or is not TOML.
     """
     try:
-        text = read_input(path).decode("utf-8")
+        text = read_input(path).decode("utf-8-sig")
     except OSError as error:
         refuse(f"{path}: {error.strerror}", "a file that exists and can be read", error)
     except UnicodeDecodeError as error:

@@ -122,7 +122,7 @@ def _total(widths: Sequence[int]) -> int:
 
 def _height(columns: Iterable[Column], widths: Sequence[int]) -> int:
     """Return the number of lines of a table."""
-    heights = ((len(_break(c, w)) for c in col) for col, w in zip(columns, widths, strict=True))
+    heights = [[len(_break(c, w)) for c in col] for col, w in zip(columns, widths, strict=True)]
     return sum(map(max, zip(*heights, strict=True)))
 
 

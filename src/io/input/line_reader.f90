@@ -1,7 +1,7 @@
 !> Reads files and pipes of any size line by line. Fortran's `read` would load a whole line into memory, however long.
 module thud_line_reader
    use thud_system, only: close_descriptor, open_descriptor, read_bytes
-   use thud_text, only: newline
+   use thud_text, only: byte_order_mark, newline
    implicit none (type, external)
    private
 
@@ -12,9 +12,6 @@ module thud_line_reader
 
    !> Number of bytes read at a time.
    integer, parameter :: buffer_length = 65536
-
-   !> UTF-8 byte order mark, with which some editors begin a text.
-   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
    !> An open text.
    type :: line_reader_type
