@@ -73,13 +73,15 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
-    if case.name in options.done:
+    # Windows and macOS do not distinguish case.
+    key = case.name.casefold()
+    if key in options.done:
         message = (
-            f"{path}: {case.name!r} is also the name of {options.done[case.name]}, "
+            f"{path}: {case.name!r} is also the name of {options.done[key]}, "
             "whose results would be replaced; allowed: different names, or separate runs"
         )
         raise InputError(message)
-    options.done[case.name] = path
+    options.done[key] = path
     answer = ask(
         "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
         all=options.all, verbose=options.verbose, progress=not options.quiet,
