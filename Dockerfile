@@ -1,6 +1,9 @@
 # Executable and driver:
 #   docker build -t thud .
-#   docker run --rm -v "$PWD:/work" thud thud-driver run mine.nml
+#   docker run --rm -v "${PWD}:/work" thud thud-driver run mine.nml
+# The explorer, at the printed address:
+#   docker run --rm -it -p 127.0.0.1:8000:8000 -v "${PWD}:/work" thud \
+#     thud-driver explore --host 0.0.0.0 --port 8000 --no-browser
 ARG BASE=python:3.13-slim-bookworm
 
 FROM ${BASE} AS wheel
@@ -19,4 +22,5 @@ RUN --mount=type=bind,from=wheel,source=/thud/dist,target=/dist \
 RUN useradd --create-home --uid 1000 thud
 USER 1000
 WORKDIR /work
+EXPOSE 8000
 CMD ["thud-driver", "--help"]

@@ -50,8 +50,8 @@ contains
    end subroutine answer_effective_case
 
    !> Runs the namelist file `path` like the executable, with results in the directory `output`. Numbers other than 0 ask to
-   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), and to show
-   !> progress on a terminal (`progress`).
+   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), to show numbers
+   !> of the solver in the table (`verbose`), and to show progress on a terminal (`progress`).
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -66,8 +66,8 @@ contains
       call request%get_text('path', path)
       call request%get_text('output', output)
       if (request%get_number('progress') > 0.0_wp) call begin_progress()
-      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('all') > 0.0_wp, case, &
-         results, outcome, error)
+      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('all') > 0.0_wp, &
+         request%get_number('verbose') > 0.0_wp, case, results, outcome, error)
       call end_progress()
       if (allocated(error)) return
       call get_case_text(case, text)

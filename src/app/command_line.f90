@@ -11,9 +11,10 @@ module thud_command_line
    use thud_run, only: outcome_type, run_case
    use thud_samples_run, only: run_samples
    use thud_schema, only: get_schema
+   use thud_screen, only: print_message, print_results, red, write_screen, yellow
    use thud_suggestion, only: get_suggestion
-   use thud_system, only: get_system_message, is_closed, prepare_process, standard_error, standard_output, write_text
-   use thud_text, only: newline, quoted
+   use thud_system, only: prepare_process, standard_output
+   use thud_text, only: newline, quoted, wrap_lines
    implicit none (type, external)
    private
 
@@ -26,12 +27,16 @@ module thud_command_line
    integer, parameter :: max_threads = 1024
    character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
 
+   !> Usage of the program.
+   character(len=*), parameter :: usage = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] ' &
+      //'[--all] [--check] [--quiet] [--verbose] | --keys | --schema | --help | --version'
+
    !> Memory that OpenBLAS allocates in each thread that uses it, bytes; without it OpenBLAS would wait forever.
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Long names of all options.
    character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
-      '--samples', '--threads', '--check', '--quiet', '--keys', '--schema', '--help', '--version']
+      '--samples', '--threads', '--check', '--quiet', '--verbose', '--keys', '--schema', '--help', '--version']
 
    !> Options of the command line.
    type :: request_type
@@ -51,6 +56,8 @@ module thud_command_line
       logical :: check = .false.
       !> Show only errors and warnings.
       logical :: quiet = .false.
+      !> Also show numbers of the solver.
+      logical :: verbose = .false.
       !> Text to show instead of a run.
       character(len=:), allocatable :: information
    end type request_type
@@ -72,10 +79,10 @@ contains
       call prepare_process()
       call parse_arguments(request, error)
       if (allocated(error)) then
-         call write_line(standard_error, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)
+         call print_message(error%message//newline//'Usage: '//usage, red, exit_code)
          exit_code = bad_input
       else if (allocated(request%information)) then
-         call write_line(standard_output, request%information, exit_code)
+         call write_screen(standard_output, request%information//newline, exit_code)
       else
          if (.not. request%quiet) call begin_progress()
          call require_memory(blas_memory*request%threads, 'buffers of OpenBLAS', 'more memory, or fewer threads', &
@@ -83,41 +90,25 @@ contains
          if (allocated(error)) then
             continue
          else if (request%samples == '') then
-            call run_case(request%case_file, request%output, request%replace, request%all, case, results, outcome, error)
+            call run_case(request%case_file, request%output, request%replace, request%all, request%verbose, case, results, &
+               outcome, error)
          else
             call run_samples(request%case_file, request%samples, request%threads, request%output, request%replace, &
                outcome, error)
          end if
          call end_progress()
          if (allocated(error)) then
-            call write_line(standard_error, 'thud: '//error%message, exit_code)
+            call print_message(error%message, red, exit_code)
             exit_code = error%code
             return
          end if
          do i = 1, outcome%n_message
-            call write_line(standard_error, 'thud: '//outcome%messages(i)%text, exit_code)
+            call print_message(outcome%messages(i)%text, yellow, exit_code)
          end do
-         if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: ' &
-            //outcome%directory, exit_code)
+         if (.not. request%quiet) call print_results(outcome%table, outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming
       end if
    end subroutine execute
-
-   !> Writes to the screen; a full disk is an error, a closed pipe is not.
-   subroutine write_line(descriptor, text, exit_code)
-      !> `standard_output` or `standard_error`.
-      integer, intent(in) :: descriptor
-      character(len=*), intent(in) :: text
-      !> Becomes 1 if the text cannot be written.
-      integer, intent(inout) :: exit_code
-      integer :: status
-
-      call write_text(descriptor, text//newline, status)
-      if (status == 0 .or. is_closed(status)) return
-      exit_code = bad_input
-      if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
-         //get_system_message(status)//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
-   end subroutine write_line
 
    !> Parses the arguments.
    subroutine parse_arguments(request, error)
@@ -144,6 +135,8 @@ contains
             request%check = .true.
          case ('--quiet', '-q')
             request%quiet = .true.
+         case ('--verbose', '-v')
+            request%verbose = .true.
          case ('--output', '-o')
             call take_value(i, '--output', 'a directory', request%output, error)
          case ('--samples')
@@ -155,7 +148,8 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
+                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --verbose, --keys, --schema, --help, ' &
+                  //'--version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -171,6 +165,10 @@ contains
          error = input_error('--threads does nothing without --samples; allowed: both')
       else if (request%samples /= '' .and. request%all) then
          error = input_error('--all does nothing with --samples; allowed: one of them')
+      else if (request%verbose .and. request%samples /= '') then
+         error = input_error('--verbose does nothing with --samples; allowed: one of them')
+      else if (request%verbose .and. request%quiet) then
+         error = input_error('--verbose contradicts --quiet; allowed: one of them')
       end if
    end subroutine parse_arguments
 
@@ -179,16 +177,18 @@ contains
       !> One of -h, --help, --version, --keys and --schema.
       character(len=*), intent(in) :: option
       character(len=:), allocatable, intent(out) :: information
+      character(len=:), allocatable :: keys
 
       select case (option)
       case ('--version')
          information = 'thud '//version
       case ('--keys')
-         call describe_keys(information)
+         call describe_keys(keys)
+         call wrap_lines(keys, information)
       case ('--schema')
          call get_schema(information)
       case default
-         information = help()
+         call wrap_lines(help(), information)
       end select
    end subroutine get_information
 
@@ -234,21 +234,13 @@ contains
       call get_command_argument(i, value=argument)
    end function get_argument
 
-   !> Usage of the program in one line.
-   pure function usage() result(text)
-      character(len=:), allocatable :: text
-
-      text = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] [--all] [--check] ' &
-         //'[--quiet] | --keys | --schema | --help | --version'
-   end function usage
-
    !> The help text.
    pure function help() result(text)
       !> Usage, options, exit codes.
       character(len=:), allocatable :: text
 
       text = 'Force of a heavy/soft impact source on the floor, its levels and a verdict.'//newline &
-         //newline//'Usage: '//usage()//newline//newline &
+         //newline//'Usage: '//usage//newline//newline &
          //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
          //'                       --samples outputs/<case>_samples)'//newline &
@@ -258,15 +250,17 @@ contains
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
          //'                       further row; all other keys are those of CASE.nml'//newline &
          //'  --threads N          threads for the samples (default: 1)'//newline &
-         //'  --check              exit with 3 if the source, with the values of CASE.nml, does not'//newline &
-         //'                       conform to the limits'//newline &
+         //'  --check              exit with 3 if the source, with the values of CASE.nml,'//newline &
+         //'                       does not conform to the limits'//newline &
          //'  -q, --quiet          show only errors and warnings'//newline &
+         //'  -v, --verbose        show also numbers of the solver: resolution, quantities'//newline &
+         //'                       of the model'//newline &
          //'  --keys               show every key with default, range and meaning'//newline &
          //'  --schema             the same and more as JSON, for programs'//newline &
          //'  -h, --help           show this text'//newline &
          //'  --version            show the version'//newline//newline &
-         //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check),'//newline &
-         //'130 interrupted, 143 terminated.'
+         //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming'//newline &
+         //'(--check), 130 interrupted, 143 terminated.'//newline//'Environment: NO_COLOR=1 shows no colors.'
    end function help
 
 end module thud_command_line

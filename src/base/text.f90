@@ -9,19 +9,25 @@ module thud_text
    private
 
    public :: byte_order_mark, fixed, flush_right, is_number, is_utf8, join, join_quoted, lower_case, newline, padded
-   public :: quoted, replaced, shortened, split, tab, to_text
+   public :: quoted, replaced, shortened, significant, split, tab, to_text, wrap_lines
+
+   !> Width of the screen, characters.
+   integer, parameter, public :: screen_width = 80
 
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
 
+   !> Maximum number of zeros before or behind the digits of a number in a table.
+   integer, parameter :: max_decimals = 6
+
    !> Line feed, the line end in all files that thud writes.
    character(len=*), parameter :: newline = new_line('a')
 
-   !> Horizontal tab.
-   character(len=*), parameter :: tab = achar(9)
-
    !> UTF-8 byte order mark, with which some editors begin a text.
    character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+
+   !> Horizontal tab.
+   character(len=*), parameter :: tab = achar(9)
 
    !> Length sufficient for any number.
    integer, parameter :: number_length = 40
@@ -77,6 +83,16 @@ contains
       text = format_fixed(value, decimals)
    end function fixed
 
+   !> Number with significant digits, for tables: `significant(0.0123_wp, 2)` is `0.012`, and 0 is `0`.
+   pure function significant(value, digits) result(text)
+      real(wp), intent(in) :: value
+      integer, intent(in) :: digits
+      !> The rounded number; with decimals unless they would be zeros before the digits of a tiny one.
+      character(len=len_trim(format_significant(value, digits))) :: text
+
+      text = format_significant(value, digits)
+   end function significant
+
    !> Integer, padded with blanks.
    pure function format_integer(value) result(buffer)
       integer, intent(in) :: value
@@ -99,6 +115,27 @@ contains
       ! No negative zero.
       if (verify(trim(buffer), '-0.') == 0) buffer = adjustl(merge(' ', buffer(:1), buffer(:1) == '-')//buffer(2:))
    end function format_fixed
+
+   !> Number with significant digits, padded with blanks.
+   pure function format_significant(value, digits) result(buffer)
+      real(wp), intent(in) :: value
+      integer, intent(in) :: digits
+      character(len=number_length) :: buffer
+      character(len=12) :: form
+      integer :: exponent
+
+      buffer = '0'
+      if (.not. abs(value) > 0.0_wp) return
+      ! The exponent of the rounded number.
+      write (form, '(a,i0,a)') '(es40.', digits - 1, 'e3)'
+      write (buffer, form) value
+      read (buffer(len(buffer) - 3:), *) exponent
+      if (abs(exponent) <= max_decimals) then
+         buffer = format_fixed(value, max(digits - 1 - exponent, 0))
+      else
+         buffer = adjustl(buffer)
+      end if
+   end function format_significant
 
    !> Shortest decimal text of a number, padded with blanks.
    elemental function format_real(value) result(buffer)
@@ -353,5 +390,59 @@ contains
 
       cell = repeat(' ', len(cell) - len(text))//text
    end function flush_right
+
+   !> Text whose lines fit the screen. Long ones are broken at blanks, and their further lines are indented; words and paths
+   !> that are wider than the screen stay whole.
+   pure subroutine wrap_lines(text, wrapped)
+      !> Lines of UTF-8.
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable, intent(out) :: wrapped
+      integer :: first, last, indentation
+
+      allocate (character(len=0) :: wrapped)
+      first = 1
+      do while (first <= len(text))
+         last = index(text(first:), newline) + first - 1
+         if (last < first) last = len(text)
+         ! Further lines of a comment in a namelist are comments, too.
+         indentation = max(verify(text(first:last), ' !') - 1, 0)
+         call wrap_line(text(first:last), text(first:first + indentation - 1)//'  ', wrapped)
+         first = last + 1
+      end do
+   end subroutine wrap_lines
+
+   !> Adds a line, broken at blanks.
+   pure subroutine wrap_line(line, indentation, wrapped)
+      !> The line, with its line feed if it has one.
+      character(len=*), intent(in) :: line
+      !> Beginning of further lines.
+      character(len=*), intent(in) :: indentation
+      character(len=:), allocatable, intent(inout) :: wrapped
+      integer :: i, begin, width, blank
+
+      begin = 1
+      blank = 0
+      width = 0
+      do i = 1, len(line)
+         if (line(i:i) == newline) exit
+         width = width + get_width(line(i:i))
+         if (line(i:i) == ' ' .and. verify(line(:i), ' ') > 0) blank = i
+         if (width <= screen_width .or. blank <= begin) cycle
+         wrapped = wrapped//trim(line(begin:blank))//newline//indentation
+         begin = blank + 1
+         width = len(indentation) + get_width(line(begin:i))
+      end do
+      wrapped = wrapped//line(begin:)
+   end subroutine wrap_line
+
+   !> Number of characters of a text.
+   pure function get_width(text) result(width)
+      !> UTF-8: bytes that continue a character have no width.
+      character(len=*), intent(in) :: text
+      integer :: width
+      integer :: i
+
+      width = count([(iand(iachar(text(i:i)), 192) /= 128, i=1, len(text))])
+   end function get_width
 
 end module thud_text

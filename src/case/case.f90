@@ -15,7 +15,7 @@ module thud_case
    use thud_room, only: check_below_subceiling, check_room, get_room_bands, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
-   use thud_text, only: is_utf8, quoted, to_text
+   use thud_text, only: is_utf8, lower_case, quoted, to_text
    use thud_unknowns, only: check_unknowns, get_unknowns_fields, unknowns_type
    implicit none (type, external)
    private
@@ -254,15 +254,27 @@ contains
       logical :: usable
       integer :: i
 
-      usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/\') == 0 &
-         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name)
+      usable = name(1:1) /= ' ' .and. scan(name, '/\:*?"<>|') == 0 .and. scan(trim(name), '.', back=.true.) < len_trim(name) &
+         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name) .and. .not. is_device(name)
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
             //' characters, without it the name of the file')
       else if (.not. usable) then
-         error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory, ' &
-            //"UTF-8 without '/' and '\', of up to "//to_text(name_length)//' characters')
+         error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory on ' &
+            //'any system, UTF-8 of up to '//to_text(name_length)//' characters without / \ : * ? " < > |, without a ' &
+            //'period at its end, and not that of a device of Windows, such as con')
       end if
    end subroutine check_name
+
+   !> Whether Windows has a device of this name, and so no file, whatever its extension is.
+   pure function is_device(name) result(yes)
+      character(len=*), intent(in) :: name
+      logical :: yes
+      character(len=:), allocatable :: stem
+
+      stem = lower_case(name(:index(name//'.', '.') - 1))
+      yes = any(stem == [character(len=3) :: 'con', 'prn', 'aux', 'nul'])
+      if (len_trim(stem) == 4) yes = any(stem(:3) == ['com', 'lpt']) .and. scan(stem(4:4), '123456789') == 1
+   end function is_device
 
 end module thud_case

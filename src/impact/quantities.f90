@@ -3,10 +3,12 @@
 module thud_quantities
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_text, only: fixed, significant
    implicit none (type, external)
    private
 
    public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
+   public :: show
 
    !> A number that a result can have.
    type :: quantity_type
@@ -39,14 +41,14 @@ module thud_quantities
 
    !> The quantities: first those of samples, then those of impacts, in the order of `get_quantities`, then all others.
    type(quantity_type), parameter :: quantities(*) = [ &
-      quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 3, 'contact time', of_sample), &
-      quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 1, 'maximum force on the floor', of_sample), &
-      quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 1, &
+      quantity_type('contact_time', 'contact time', 'T', 's', 'ms', 1.0e3_wp, 2, 'contact time', of_sample), &
+      quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 0, 'maximum force on the floor', of_sample), &
+      quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 0, &
       'maximum elastic force', of_sample), &
-      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 3, &
+      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 2, &
       'maximum deflection', of_sample), &
-      quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 4, 'coefficient of restitution', of_sample), &
-      quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 3, &
+      quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 3, 'coefficient of restitution', of_sample), &
+      quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 2, &
       'time integral of the force on the floor', of_sample), &
       quantity_type('impact_velocity', 'impact velocity', 'v_0', 'm/s', 'm/s', 1.0_wp, 3, &
       'velocity at first touch', of_impact), &
@@ -75,7 +77,7 @@ module thud_quantities
       'numerical error of the coefficient of restitution', of_impact), &
       quantity_type('peak_force_error', 'error of peak force', '', 'N', 'N', 1.0_wp, 1, &
       'numerical error of the maximum force on the floor', of_impact), &
-      quantity_type('peak_count', 'number of force peaks', '', '', '', 1.0_wp, 0, &
+      quantity_type('peak_count', 'force peaks', '', '', '', 1.0_wp, 0, &
       'number of peaks of the assessed force', of_others), &
       quantity_type('mass', 'mass', 'M', 'kg', 'kg', 1.0_wp, 3, 'mass of the source', of_others), &
       quantity_type('drop_height', 'drop height', 'h', 'm', 'm', 1.0_wp, 3, 'drop height', of_others), &
@@ -83,7 +85,7 @@ module thud_quantities
       'impulse divided by the change of velocity', of_others), &
       quantity_type('margin', 'margin', '', 'dB', 'dB', 1.0_wp, 2, &
       'minimum distance of the assessed octave levels to limits, > 0 inside', of_others), &
-      quantity_type('floor_work', 'energy to the floor', 'W', 'J', 'mJ', 1.0e3_wp, 3, &
+      quantity_type('floor_work', 'energy to the floor', 'W', 'J', 'mJ', 1.0e3_wp, 1, &
       'energy that the source gives to the floor', of_others), &
       quantity_type('room_rating', 'level in the room', 'L_{iA,Fmax}', 'dB', 'dB', 1.0_wp, 1, &
       'A-weighted maximum Fast level in the room, re 20 uPa', of_others), &
@@ -118,5 +120,19 @@ contains
 
       quantity = quantities(findloc(quantities%name == name, .true., dim=1))
    end function get_quantity
+
+   !> Number on the screen: below the last decimal with three significant digits, 0 as `0`.
+   pure function show(quantity, value) result(text)
+      type(quantity_type), intent(in) :: quantity
+      !> Value in the unit on the screen.
+      real(wp), intent(in) :: value
+      character(len=:), allocatable :: text
+
+      if (abs(value) < 10.0_wp**(-quantity%decimals)) then
+         text = significant(value, 3)
+      else
+         text = fixed(value, quantity%decimals)
+      end if
+   end function show
 
 end module thud_quantities

@@ -4,7 +4,7 @@ module thud_progress_line
    use thud_kinds, only: wp
    use thud_progress, only: set_progress_handler
    use thud_system, only: is_terminal, standard_error, write_text
-   use thud_text, only: fixed
+   use thud_text, only: fixed, screen_width
    implicit none (type, external)
    private
 
@@ -16,8 +16,8 @@ module thud_progress_line
    !> Clock at the beginning, clock at the latest line, and clock ticks per second.
    integer(int64) :: first = 0, latest = 0, rate = 1
 
-   !> Length of a line.
-   integer, parameter :: line_length = 80
+   !> Length of a line: of a full one, some terminals begin a new line.
+   integer, parameter :: line_length = screen_width - 1
 
    !> Amount of work done at the latest report.
    real(wp) :: latest_done = 0.0_wp

@@ -67,14 +67,14 @@ contains
    end subroutine add_message
 
    !> Runs a namelist file and writes its results.
-   subroutine run_case(path, output, replace, write_all, case, results, outcome, error)
+   subroutine run_case(path, output, replace, write_all, verbose, case, results, outcome, error)
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
       !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> Also write additional quantities of the model.
-      logical, intent(in) :: write_all
+      !> Also write additional quantities of the model; also show numbers of the solver.
+      logical, intent(in) :: write_all, verbose
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
@@ -84,12 +84,12 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call compute_and_write(path, case, output, replace, write_all, results, outcome, error)
+      call compute_and_write(path, case, output, replace, write_all, verbose, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine compute_and_write(path, case, output, replace, write_all, results, outcome, error)
+   subroutine compute_and_write(path, case, output, replace, write_all, verbose, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
@@ -97,8 +97,8 @@ contains
       character(len=*), intent(in) :: output
       !> Also replace files that thud has not written.
       logical, intent(in) :: replace
-      !> Also write additional quantities of the model.
-      logical, intent(in) :: write_all
+      !> Also write additional quantities of the model; also show numbers of the solver.
+      logical, intent(in) :: write_all, verbose
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
@@ -119,7 +119,7 @@ contains
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
-      call format_results(case, results, write_all, files, outcome)
+      call format_results(case, results, write_all, verbose, files, outcome)
       call write_results(outcome%directory, input, files, [path], replace, has_other_input, error)
       if (allocated(error)) return
       if (has_other_input) call outcome%add_message(path, replacement_note//outcome%directory)
@@ -148,11 +148,11 @@ contains
    end subroutine check_space
 
    !> Makes table, verdict and files from results.
-   subroutine format_results(case, results, write_all, files, outcome)
+   subroutine format_results(case, results, write_all, verbose, files, outcome)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
-      !> Also write additional quantities of the model.
-      logical, intent(in) :: write_all
+      !> Also write additional quantities of the model; also show numbers of the solver.
+      logical, intent(in) :: write_all, verbose
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> The outcome; table and verdict are set.
@@ -174,7 +174,8 @@ contains
          return
       end if
       outcome%conforms = is_conforming(case, results%impact%assessment)
-      outcome%table = outcome%table//newline//get_table(case, results%impact%history, results%impact%assessment)
+      outcome%table = outcome%table//newline//get_table(case, results%impact%history, &
+         results%impact%assessment, verbose)
       call add_file(files, 'force.csv', get_force_csv(results%impact%history))
       call add_file(files, 'levels.csv', get_levels_csv(case, results%impact%assessment))
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)

@@ -191,7 +191,7 @@ contains
          if (any(table%names == 'force') .or. any(table%names == 'method')) exit
          text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
       end do
-      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms') &
+      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 2, 'ms') &
          //'  The samples state no numerical errors; a run of a single case states its own.'//newline
    end subroutine format_tally
 

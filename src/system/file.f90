@@ -3,7 +3,7 @@ module thud_file
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
    use thud_system, only: close_descriptor, directory_exists, get_file_size, open_descriptor, read_bytes
-   use thud_text, only: to_text
+   use thud_text, only: byte_order_mark, to_text
    implicit none (type, external)
    private
 
@@ -25,6 +25,7 @@ contains
    !> The text of a file.
    subroutine read_text_file(path, text, error, kind, max_size)
       character(len=*), intent(in) :: path
+      !> Content, without a byte order mark.
       character(len=:), allocatable, intent(out) :: text
       !> Set if the file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
@@ -62,6 +63,7 @@ contains
       end do
       call close_descriptor(descriptor)
       if (done < len(text)) error = input_error('the file cannot be read; allowed: a readable '//wanted)
+      if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
 
    !> Name of a file without directory and extension.

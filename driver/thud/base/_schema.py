@@ -1193,12 +1193,12 @@ class SampleQuantities:
 
 # The table of quantities.
 QUANTITIES = {
-    "contact_time": Quantity("contact_time", "contact time", "T", "s", "ms", 1000.0, 3, "contact time"),
-    "peak_force": Quantity("peak_force", "peak force", "F_{max}", "N", "N", 1.0, 1, "maximum force on the floor"),
-    "peak_elastic_force": Quantity("peak_elastic_force", "peak elastic force", "F_{E,max}", "N", "N", 1.0, 1, "maximum elastic force"),
-    "max_deflection": Quantity("max_deflection", "peak deflection", "d_{max}", "m", "mm", 1000.0, 3, "maximum deflection"),
-    "restitution": Quantity("restitution", "restitution", "e", "", "", 1.0, 4, "coefficient of restitution"),
-    "impulse": Quantity("impulse", "impulse", "I", "N s", "N s", 1.0, 3, "time integral of the force on the floor"),
+    "contact_time": Quantity("contact_time", "contact time", "T", "s", "ms", 1000.0, 2, "contact time"),
+    "peak_force": Quantity("peak_force", "peak force", "F_{max}", "N", "N", 1.0, 0, "maximum force on the floor"),
+    "peak_elastic_force": Quantity("peak_elastic_force", "peak elastic force", "F_{E,max}", "N", "N", 1.0, 0, "maximum elastic force"),
+    "max_deflection": Quantity("max_deflection", "peak deflection", "d_{max}", "m", "mm", 1000.0, 2, "maximum deflection"),
+    "restitution": Quantity("restitution", "restitution", "e", "", "", 1.0, 3, "coefficient of restitution"),
+    "impulse": Quantity("impulse", "impulse", "I", "N s", "N s", 1.0, 2, "time integral of the force on the floor"),
     "impact_velocity": Quantity("impact_velocity", "impact velocity", "v_0", "m/s", "m/s", 1.0, 3, "velocity at first touch"),
     "exact_contact_time": Quantity("exact_contact_time", "exact contact time", "T", "s", "ms", 1000.0, 3, "contact time, resolved between time steps"),
     "touch_time": Quantity("touch_time", "time of first touch", "t_0", "s", "ms", 1000.0, 3, "time of first touch in the record"),
@@ -1213,12 +1213,12 @@ QUANTITIES = {
     "contact_time_error": Quantity("contact_time_error", "error of contact time", "", "s", "ms", 1000.0, 3, "numerical error of the contact time"),
     "restitution_error": Quantity("restitution_error", "error of restitution", "", "", "", 1.0, 4, "numerical error of the coefficient of restitution"),
     "peak_force_error": Quantity("peak_force_error", "error of peak force", "", "N", "N", 1.0, 1, "numerical error of the maximum force on the floor"),
-    "peak_count": Quantity("peak_count", "number of force peaks", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
+    "peak_count": Quantity("peak_count", "force peaks", "", "", "", 1.0, 0, "number of peaks of the assessed force"),
     "mass": Quantity("mass", "mass", "M", "kg", "kg", 1.0, 3, "mass of the source"),
     "drop_height": Quantity("drop_height", "drop height", "h", "m", "m", 1.0, 3, "drop height"),
     "effective_mass": Quantity("effective_mass", "effective mass", "M", "kg", "kg", 1.0, 3, "impulse divided by the change of velocity"),
     "margin": Quantity("margin", "margin", "", "dB", "dB", 1.0, 2, "minimum distance of the assessed octave levels to limits, > 0 inside"),
-    "floor_work": Quantity("floor_work", "energy to the floor", "W", "J", "mJ", 1000.0, 3, "energy that the source gives to the floor"),
+    "floor_work": Quantity("floor_work", "energy to the floor", "W", "J", "mJ", 1000.0, 1, "energy that the source gives to the floor"),
     "room_rating": Quantity("room_rating", "level in the room", "L_{iA,Fmax}", "dB", "dB", 1.0, 1, "A-weighted maximum Fast level in the room, re 20 uPa"),
     "standardized_rating": Quantity("standardized_rating", "standardized level", "L'_{iA,Fmax,V,T}", "dB", "dB", 1.0, 1, "A-weighted maximum Fast level, standardized, re 20 uPa"),
 }

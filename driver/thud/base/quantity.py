@@ -47,4 +47,4 @@ class Quantity:
         if math.isnan(value):
             return ""
         shown = value * self.display_scale
-        return f"{shown:.{self.decimals}f}" if 10**-self.decimals <= abs(shown) else f"{shown:.3g}"
+        return f"{shown:.{self.decimals}f}" if 10**-self.decimals <= abs(shown) else f"{shown:z.3g}"

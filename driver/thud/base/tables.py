@@ -1,8 +1,9 @@
-"""Tables of text."""
+"""Tables and sentences that fit the terminal."""
 
 from __future__ import annotations
 
 import re
+import textwrap
 from functools import lru_cache
 from itertools import zip_longest
 from typing import TYPE_CHECKING
@@ -10,54 +11,129 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-MAX_WIDTH = 99
-# Cells are broken after spaces and underscores, but numbers keep their signs.
-_WORD = re.compile(r"(?:[^ _]| (?=[±%]))*[ _]*")
+    Column = Sequence[str]
+
+# Columns of a terminal.
+WIDTH = 80
+_GAP = 2
+# Labels and words up to this width stay whole.
+_MAX_WORD = WIDTH // 2 - _GAP
+# Cells are broken after spaces and underscores, but "1.2 ± 0.1", "5 %" and "3 to 4" stay whole.
+_WORD = re.compile(r"(?:[^ _]| (?=[±%]|to \S)|(?<=±) |(?<= to) )*[ _]*")
 
 
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
-    """Return rows of text as lines with aligned columns.
+    """Return rows of text as lines with aligned columns, up to `WIDTH` wide.
 
-    Cells of tables wider than `MAX_WIDTH` are broken, but not those of the first column.
+    Cells of wider tables are broken, those of the first column last. If there are too many columns,
+    they are distributed over several tables, each with the first column.
 
     >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
     octave  level
     31.5    39
     """
-    table = list(rows)
-    columns = list(zip(*table, strict=True))
+    label, *columns = zip(*rows, strict=True)
+    return "\n\n".join(_format_columns([label, *part]) for part in _distribute(label, columns))
+
+
+def wrap(text: str) -> str:
+    """Return text whose lines are up to `WIDTH` wide: long ones are broken, and then indented.
+
+    Words and paths that are wider stay whole.
+
+    >>> print(wrap("  " + "word " * 16))
+      word word word word word word word word word word word word word word word
+        word
+    """
+    return "\n".join(map(_wrap_line, text.split("\n")))
+
+
+def _wrap_line(line: str) -> str:
+    if len(line) <= WIDTH:
+        return line
+    # Further lines of a comment are comments, too.
+    indent = line[: len(line) - len(line.lstrip(" #"))] + "  "
+    return textwrap.fill(
+        line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def _distribute(label: Column, columns: Sequence[Column]) -> list[list[Column]]:
+    """Return the columns of as few tables as can be made narrow enough, of similar widths."""
+    natural = [max(map(len, column)) for column in columns]
+    least, *minima = _min_widths([label, *columns])
+
+    def distribute(max_width: int) -> list[list[Column]]:
+        parts: list[list[Column]] = [[]]
+        widths, narrow = [0], [least]
+        for column, width, minimum in zip(columns, natural, minima, strict=True):
+            is_wide = _total([*widths, width]) > max_width or _total([*narrow, minimum]) > WIDTH
+            if parts[-1] and is_wide:
+                parts.append([])
+                widths, narrow = [0], [least]
+            parts[-1].append(column)
+            widths.append(width)
+            narrow.append(minimum)
+        return parts
+
+    unlimited = _total([0, *natural])
+    fewest = len(distribute(unlimited))
+    return next(p for w in range(unlimited + 1) if len(p := distribute(w)) == fewest)
+
+
+def _format_columns(columns: Sequence[Column]) -> str:
+    """Return columns of text as lines; the widest columns are made narrower until they fit."""
+    minima = _min_widths(columns)
     widths = [max(map(len, column)) for column in columns]
-    minima = [max(len(w.rstrip()) for c in column for w in _WORD.findall(c)) for column in columns]
-    minima[:1] = widths[:1]
-    while sum(widths) + 2 * (len(widths) - 1) > MAX_WIDTH and widths != minima:
+    # Labels stay whole if the table fits with them.
+    label = min(widths[0], _MAX_WORD)
+    if _total([label, *minima[1:]]) <= WIDTH:
+        minima[0] = label
+    while _total(widths) > WIDTH and widths != minima:
         # The column that adds the fewest lines; of several, the widest.
         narrower = [
-            (_height(table, trial), -width, trial)
+            (_height(columns, trial), -width, trial)
             for i, (width, least) in enumerate(zip(widths, minima, strict=True))
             if width > least
             for trial in [[*widths[:i], width - 1, *widths[i + 1 :]]]
         ]
         widths = min(narrower)[-1]
-    broken = [[_break(c, w) for c, w in zip(row, widths, strict=True)] for row in table]
-    widths = [max(len(line) for c in column for line in c) for column in zip(*broken, strict=True)]
+    broken = [[_break(cell, w) for cell in c] for c, w in zip(columns, widths, strict=True)]
+    widths = [max((len(line) for cell in c for line in cell), default=0) for c in broken]
     return "\n".join(
-        "  ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
-        for row in broken
+        (" " * _GAP).join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
+        for row in zip(*broken, strict=True)
         for line in zip_longest(*row, fillvalue="")
     )
 
 
-def _height(table: Iterable[Sequence[str]], widths: Sequence[int]) -> int:
+def _min_widths(columns: Sequence[Column]) -> list[int]:
+    """Return the width of the longest word of each column."""
+    words = (
+        [word.rstrip() for cell in column for word in _WORD.findall(cell)] for column in columns
+    )
+    return [min(max(map(len, pieces)), _MAX_WORD) for pieces in words]
+
+
+def _total(widths: Sequence[int]) -> int:
+    """Return the width of a table."""
+    return sum(widths) + _GAP * (len(widths) - 1)
+
+
+def _height(columns: Iterable[Column], widths: Sequence[int]) -> int:
     """Return the number of lines of a table."""
-    return sum(max(len(_break(c, w)) for c, w in zip(row, widths, strict=True)) for row in table)
+    heights = [[len(_break(c, w)) for c in col] for col, w in zip(columns, widths, strict=True)]
+    return sum(map(max, zip(*heights, strict=True)))
 
 
 @lru_cache(4096)
 def _break(cell: str, width: int) -> list[str]:
-    """Return the lines of a cell."""
+    """Return the lines of a cell; words that are wider are cut."""
     lines = [""]
     for word in _WORD.findall(cell):
         if lines[-1] and len((lines[-1] + word).rstrip()) > width:
             lines.append("")
         lines[-1] += word
+        while len(lines[-1].rstrip()) > width:
+            lines[-1:] = [lines[-1][:width], lines[-1][width:]]
     return [line.rstrip() for line in lines]

@@ -34,6 +34,7 @@ from thud.cli.command import (
 from thud.cli.explore_command import EXPLORE
 from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
 from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
+from thud.cli.screen import print_error
 from thud.cli.study_commands import study_commands
 from thud.level.levels import FORCES, SOURCES
 
@@ -71,6 +72,12 @@ COMMANDS = {
                 "--animation",
                 action="store_true",
                 help="also write motion.gif of cases with snapshots",
+            ),
+            argument(
+                "-v",
+                "--verbose",
+                action="store_true",
+                help="also show numbers of the solver: resolution, quantities of the model",
             ),
             QUIET,
         ),
@@ -156,18 +163,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
-        print(f"thud-driver: interrupted; {after_interrupt}", file=sys.stderr)
+        print_error(f"interrupted; {after_interrupt}")
         return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
             # Standard output is full: discard what is still buffered.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        print(f"thud-driver: {message_of(error)}", file=sys.stderr)
+        print_error(message_of(error))
         return exit_code(error)
     except MemoryError as error:
         cause = f" ({error})" if str(error) else ""
-        message = f"not enough memory{cause}; allowed: a smaller task, or more memory"
-        print(f"thud-driver: {message}", file=sys.stderr)
+        print_error(f"not enough memory{cause}; allowed: a smaller task, or more memory")
         return NumericalError.exit_code
     return code
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import sys
 import warnings
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,9 +27,9 @@ from thud.cli.command import (
     exit_code,
     message_of,
     output,
-    print_notes,
     results_of,
 )
+from thud.cli.screen import print_error, print_notes, print_path, print_results, shows_progress
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
@@ -44,17 +43,22 @@ if TYPE_CHECKING:
 
 def run_cases(options: argparse.Namespace) -> int:
     """Run all cases, even if one fails; return the exit code."""
+    if options.verbose and options.quiet:
+        refuse("--verbose contradicts --quiet", "one of them")
     worst = 0
     options.done = {}
     for path in tqdm(
-        options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet or None
+        options.cases,
+        unit="case",
+        disable=len(options.cases) == 1 or not shows_progress(quiet=options.quiet),
+        leave=False,
     ):
         try:
             conforms = _run_case(path, options)
         except (ThudError, OSError) as error:
             if isinstance(error, OSError) and error.filename is None:
                 raise  # standard output fails for the other cases, too
-            tqdm.write(f"thud-driver: {message_of(error)}", file=sys.stderr)
+            print_error(message_of(error))
             failure = exit_code(error)
             worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
         else:
@@ -69,19 +73,20 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
-    if case.name in options.done:
+    # Windows and macOS do not distinguish case.
+    key = case.name.casefold()
+    if key in options.done:
         message = (
-            f"{path}: {case.name!r} is also the name of {options.done[case.name]}, "
+            f"{path}: {case.name!r} is also the name of {options.done[key]}, "
             "whose results would be replaced; allowed: different names, or separate runs"
         )
         raise InputError(message)
-    options.done[case.name] = path
+    options.done[key] = path
     answer = ask(
         "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
-        all=options.all, progress=not options.quiet,
+        all=options.all, verbose=options.verbose, progress=not options.quiet,
     )  # fmt: skip
-    for warning in answer.get("messages", {}).values():
-        tqdm.write(f"thud-driver: {text(warning)}", file=sys.stderr)
+    print_notes(map(text, answer.get("messages", {}).values()))
     folder = Path(output or os.fsdecode(answer["directory"]))
     contents = _figures(answer, options)
     sentence, files = _model_verdict(answer)
@@ -89,7 +94,8 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         results = Results(folder, inputs=(path,), replace=options.replace)
         results.write(contents | files, marker=answer["case"])
     if not options.quiet:
-        tqdm.write(f"{text(answer['table'])}\n{sentence}  Results: {folder}\n")
+        print_results(f"{text(answer['table'])}{sentence}".removesuffix("\n"))
+        print_path("  Results", f"{folder}\n")
     return bool(answer["conforms"])
 
 
@@ -105,9 +111,9 @@ def _model_verdict(answer: Bundle) -> tuple[str, dict[str, bytes]]:
     verdict = assess_impact(new_impact(case, answer))
     if verdict:
         print_notes(verdict.warnings)
-        return f"  {verdict.message}\n", {FILE: verdict.to_csv().encode()}
+        return f"\n  {verdict.message}", {FILE: verdict.to_csv().encode()}
     if find_unknowns(case)[0]:
-        return "  Verdict over what is not known: run thud-driver assess\n", {}
+        return "\n  Verdict over what is not known: run thud-driver assess", {}
     return "", {}
 
 
@@ -122,14 +128,14 @@ def assess_case(options: argparse.Namespace) -> int:
     verdict = assess(
         case,
         results.folder,
-        progress=not options.quiet and sys.stderr.isatty(),
+        progress=shows_progress(quiet=options.quiet),
         replace_files=options.replace,
     )
     results.write({FILE: verdict.to_csv().encode()})
     print_notes(verdict.warnings)
-    print(verdict.message if options.quiet else verdict)
+    print_results(verdict.message if options.quiet else str(verdict))
     if not options.quiet:
-        print(f"Results: {results.folder}")
+        print_path("Results", results.folder)
     return NOT_CONFORMING if options.check and verdict.result != OUTCOMES[0] else 0
 
 
@@ -194,15 +200,13 @@ def compare_cases(options: argparse.Namespace) -> int:
             items,
             options.force,
             options.source,
-            progress=not options.quiet and sys.stderr.isatty(),
+            progress=shows_progress(quiet=options.quiet),
         )
     print_notes(page.warnings)
     paths = results.write(page.files())
     if not options.quiet:
-        print(format_rows(page.rows()))
-        print(f"Page: {paths[-1]}")
-        for reason in page.reasons:
-            print(reason)
+        print_results("\n".join([format_rows(page.rows()), *page.reasons]))
+        print_path("Page", paths[-1])
     return 0
 
 
@@ -211,15 +215,16 @@ def draw_figures(options: argparse.Namespace) -> int:
     from thud.plot import documentation, figure_files
 
     results = results_of(options, "figures")
+    hidden = not shows_progress(quiet=options.quiet)
     for name, draw in tqdm(
-        documentation.FIGURES.items(), unit="figure", disable=options.quiet or None, leave=False
+        documentation.FIGURES.items(), unit="figure", disable=hidden, leave=False
     ):
         with warnings.catch_warnings(record=True) as caught:
             drawn = draw_all({name: draw})
         print_notes(f"{name}: {warning.message}" for warning in caught)
         results.write(figure_files(drawn, options.format))
     if not options.quiet:
-        print(f"Figures: {results.folder}")
+        print_path("Figures", results.folder)
     return 0
 
 
@@ -303,7 +308,7 @@ def copy_examples(options: argparse.Namespace) -> int:
     finally:
         shutil.rmtree(partial, ignore_errors=True)
     if not options.quiet:
-        print(f"Inputs: {target}")
+        print_path("Inputs", target)
     return 0
 
 

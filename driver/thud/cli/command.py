@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from tqdm import tqdm
-
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError
 from thud.base.files import Results
+from thud.cli.screen import print_notes, print_path, print_results
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -89,12 +87,6 @@ FORMAT = argument(
 )
 
 
-def print_notes(warnings: Iterable[object]) -> None:
-    """Print warnings above any progress bar."""
-    for warning in warnings:
-        tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
-
-
 @contextmanager
 def print_immediately() -> Iterator[None]:
     """Print warnings of reports and locks as soon as they arise."""
@@ -135,10 +127,10 @@ def save_result(  # noqa: PLR0913, PLR0917 - all differ between commands
             contents |= figure_files(draw_all({figure: result.plot}))
     results.write(contents)
     if not options.quiet:
-        print(shown)
+        print_results(shown)
     print_notes(result.warnings)
     if not options.quiet:
-        print(f"Results: {results.folder}")
+        print_path("Results", results.folder)
     return 0
 
 

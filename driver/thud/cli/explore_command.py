@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import secrets
 import socket
 import sys
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 from thud.base.checks import refuse
 from thud.base.extras import require_extra
 from thud.cli.command import QUIET, Command, argument
+from thud.cli.screen import print_notes, print_path, print_results
 
 if TYPE_CHECKING:
     import argparse
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 # Host names that are reachable from this machine only.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+# Hosts that stand for all addresses of this machine, with the name of one.
+ALL_ADDRESSES = {"0.0.0.0": "localhost", "[::]": "[::1]"}  # noqa: S104 - only compared
 
 
 def explore(options: argparse.Namespace) -> int:
@@ -41,17 +45,17 @@ def explore(options: argparse.Namespace) -> int:
         )
     except OSError as error:
         refuse(f"{host}:{options.port} is not available", "a free port", error)
-    address = f"http://{host}:{listener.getsockname()[1]}/#token={token}"
+    address = f"http://{_reachable_name(host)}:{listener.getsockname()[1]}/#token={token}"
     if not options.quiet:
-        print(f"Page: {address}")
-        print("Press Ctrl-C to stop.")
+        print_path("Page", address)
+        print_results("Press Ctrl-C to stop.")
         sys.stdout.flush()
     if hosts == ("*",):
-        print(
-            "thud-driver: other machines can reach the page, which is not encrypted; anyone with "
-            "the address can run computations here",
-            file=sys.stderr,
+        warning = (
+            "other machines can reach the page under the name of this one, and it is not "
+            "encrypted; anyone with the address can run computations here"
         )
+        print_notes([warning])
     application = new_application(start, token=token, hosts=hosts)
     with listener, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -60,6 +64,16 @@ def explore(options: argparse.Namespace) -> int:
                 webbrowser.open(_redirect(folder, address))
             run_server(application, listener, folder)
     return 0
+
+
+def _reachable_name(host: str) -> str:
+    """Return the name of a host in the address of the page.
+
+    From Windows, servers in WSL are reachable as localhost, but not always as 127.0.0.1; so are
+    published ports of containers.
+    """
+    is_wsl = "microsoft" in platform.release().lower()
+    return "localhost" if is_wsl and host in LOOPBACK else ALL_ADDRESSES.get(host, host)
 
 
 @contextmanager

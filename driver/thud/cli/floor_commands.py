@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -23,10 +22,10 @@ from thud.cli.command import (
     argument,
     number,
     output,
-    print_notes,
     results_of,
     save_result,
 )
+from thud.cli.screen import print_notes, print_path, print_results, shows_progress
 
 if TYPE_CHECKING:
     import argparse
@@ -45,7 +44,7 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     from thud.floors.constructions import constructions
 
     if options.list is not None:
-        print(format_rows(constructions(options.list).rows()))
+        print_results(format_rows(constructions(options.list).rows()))
         return 0
     files = [name for name in options.construction if name.endswith(".toml")]
     results = results_of(options, "floors", [*options.cases, *files])
@@ -55,8 +54,8 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     print_notes(comparison.warnings)
     paths = results.write(comparison.files())
     if not options.quiet:
-        print(format_rows(comparison.rows()))
-        print(f"Page: {paths[-1]}")
+        print_results(format_rows(comparison.rows()))
+        print_path("Page", paths[-1])
     return 0
 
 
@@ -66,7 +65,7 @@ def _compare(cases: dict[str, Case], options: argparse.Namespace) -> FloorCompar
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
-        return compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
+        return compare_floors(cases, progress=shows_progress(quiet=options.quiet))
 
 
 def predict(options: argparse.Namespace) -> int:
@@ -92,10 +91,10 @@ def predict(options: argparse.Namespace) -> int:
     # The results of other floors belong to an earlier call.
     results.write(written, stale=results.written())
     if not options.quiet:
-        print("\n\n".join(map(screen_text, floors)))
+        print_results("\n\n".join(map(screen_text, floors)))
     print_notes(comparison.warnings)
     if not options.quiet:
-        print(f"Results: {results.folder}")
+        print_path("Results", results.folder)
     return 0
 
 
@@ -189,8 +188,9 @@ def listen_to_cases(options: argparse.Namespace) -> int:
     print_notes(sound.warnings)
     results.write({path.name: sound.wav()})
     if not options.quiet:
-        print(format_rows(sound.rows()))
-        print(f"Sound: {path}, full scale {sound.full_scale:g} Pa\nThe sound is {NOTE}.")
+        print_results(format_rows(sound.rows()))
+        print_results(f"Full scale: {sound.full_scale:g} Pa\nThe sound is {NOTE}.")
+        print_path("Sound", path)
     return 0
 
 

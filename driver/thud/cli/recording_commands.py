@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,9 +19,9 @@ from thud.cli.command import (
     argument,
     number,
     output,
-    print_notes,
     results_of,
 )
+from thud.cli.screen import print_notes, print_path, print_results, shows_progress
 from thud.level.levels import SOURCES
 from thud.recordings.channel import channel_of
 
@@ -68,7 +67,7 @@ def measure(options: argparse.Namespace) -> int:
             end=options.end,
             low_pass=options.low_pass or None,
             config=options.config,
-            progress=not options.quiet and sys.stderr.isatty(),
+            progress=shows_progress(quiet=options.quiet),
             workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
             checkpoint=checkpoint,
         )
@@ -76,24 +75,22 @@ def measure(options: argparse.Namespace) -> int:
         recording_files.save(recording, files, figures=figures)
     if not options.quiet:
         rows = recording_files.drop_table(recording)
-        print(format_rows(rows[: MAX_PRINTED + 1]))
+        print_results(format_rows(rows[: MAX_PRINTED + 1]))
         if len(rows) > MAX_PRINTED + 1:
-            print(f"and {len(rows) - MAX_PRINTED - 1} more drops, in {folder / 'report.json'}")
-        print()
-        print(format_rows(recording_files.table(recording)))
-        print()
+            print_path(f"and {len(rows) - MAX_PRINTED - 1} more drops", folder / "report.json")
+        print_results(f"\n{format_rows(recording_files.table(recording))}\n")
         for step in (*recording_files.messages(recording, "steps"), *recording.level_steps):
-            print(f"  {step}")
-        print(f"  {recording_files.verdict_text(recording)}")
+            print_results(f"  {step}")
+        print_results(f"  {recording_files.verdict_text(recording)}")
         excluded = recording_files.uncertainty_text(recording)
         if excluded:
-            print(f"  {excluded}")
+            print_results(f"  {excluded}")
         if figures:
-            print(recording_files.missing_text(recording))
+            print_results(recording_files.missing_text(recording))
     messages = recording_files.messages(recording, "warnings")
     print_notes((*recording.own_warnings, *recording.outliers, *messages))
     if not options.quiet:
-        print(f"Results: {folder}")
+        print_path("Results", folder)
     return NOT_CONFORMING if options.check and not verdict else 0
 
 
@@ -213,7 +210,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         plate = calibrate_tap(options.record, channel=channel_of(options.channel))
         print(plate.lines())
         if not options.quiet:
-            print(f"# {plate}")
+            print_results(f"# {plate}")
         print_notes(plate.warnings)
         return 0
     result = calibrate(
@@ -230,9 +227,9 @@ def run_calibrate(options: argparse.Namespace) -> int:
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
-        print(f"# {result.origin}")
+        print_results(f"# {result.origin}")
         if result.time_constant:
-            print(f"# {result.time_constant}")
+            print_results(f"# {result.time_constant}")
     print_notes(result.warnings)
     unknown = "uncertainty of the {} not stated: not included ({})"
     if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
@@ -298,13 +295,13 @@ def run_history(options: argparse.Namespace) -> int:
     figures = draw_all({"history": partial(draw_history, history)})
     paths = results.write(figure_files(figures))
     if not options.quiet:
-        print(history.title)
-        print(format_rows(history.table()))
+        print_results(history.title)
+        print_results(format_rows(history.table()))
         marks = history.marks()
         if marks:
-            print(marks)
+            print_results(marks)
         for warning in history.warnings():
-            print(warning)
+            print_results(warning)
         if paths:
-            print(f"Chart: {paths[0]}")
+            print_path("Chart", paths[0])
     return 0

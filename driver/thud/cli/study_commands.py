@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.cli.screen import print_notes, print_path, print_results, print_status, shows_progress
 from thud.studies.directory import open_results
 from thud.studies.kinds import KINDS, get_kind
 
@@ -65,7 +63,10 @@ def run_study(options: argparse.Namespace) -> int:
     """Run a study, print its results, save files and figures; return the exit code."""
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
-    run_options: RunOptions = {"progress": not options.quiet, "replace": options.replace}
+    run_options: RunOptions = {
+        "progress": shows_progress(quiet=options.quiet),
+        "replace": options.replace,
+    }
     if KINDS[options.name].has_samples:
         run_options |= {
             "backend": options.backend,
@@ -76,7 +77,7 @@ def run_study(options: argparse.Namespace) -> int:
     kind.require_runnable(study, **run_options)
     folder = Path(options.output or Path("outputs", study.name))
     if not options.quiet:
-        print(kind.describe(study), file=sys.stderr)
+        print_status(kind.describe(study))
     figures = not options.no_figures
     with open_results(folder, kind, study, replace=options.replace, figures=figures) as directory:
         try:
@@ -85,7 +86,7 @@ def run_study(options: argparse.Namespace) -> int:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
         if not options.quiet:
-            tqdm.write(result.table())
+            print_results(result.table())
         print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
         contents = kind.files(result, study)
         if figures:
@@ -95,5 +96,5 @@ def run_study(options: argparse.Namespace) -> int:
                 contents |= figure_files(result.figures(study.name))
         directory.write(contents)
     if not options.quiet:
-        tqdm.write(f"Results: {folder}")
+        print_path("Results", folder)
     return 0 if result.succeeded else NumericalError.exit_code

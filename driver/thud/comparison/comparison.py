@@ -94,13 +94,13 @@ class Comparison(Displayed, Page):
         rows = [
             ("", *self.impacts),
             ("assessed force", *(impact.assessed_force(self.force) for impact in impacts)),
-            ("method of the levels", *(impact.level_method for impact in impacts)),
+            ("method of levels", *(impact.level_method for impact in impacts)),
             *(_criterion_row(row) for row in criteria),
             (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts)),
             *_quantity_rows(impacts),
         ]
         if any(times):
-            rows.append(("computing time, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times)))
+            rows.append(("computing time, ms", *(f"{1e3 * t:.3g}" if t else "" for t in times)))
         results = [
             (self.model_verdicts.get(name) or verdict).result
             for name, verdict in zip(self.impacts, verdicts, strict=True)
@@ -116,7 +116,7 @@ class Comparison(Displayed, Page):
                 "",
                 *(c.range for c in v.criteria),
                 *blank,
-                f"{v.shown_probability} conforms",
+                f"conformity {v.shown_probability}",
             ]
             for v in self._shared_verdicts()
         ]

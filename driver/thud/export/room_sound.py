@@ -89,7 +89,7 @@ class RoomSound(Displayed):
         for start, name in zip(self.starts, self.order, strict=True):
             sound = sounds[name]
             pairs = zip(summary(sound.level), summary(sound.reference), strict=True)
-            cells = [f"{level:.1f} ({level - reference:+.1f})" for level, reference in pairs]
+            cells = [f"{level:.1f} ({level - reference:+z.1f})" for level, reference in pairs]
             place = "-" if sound.position is None else "{}, {}".format(*sound.position)
             rows.append((f"{start:.3f}", name, place, *cells))
         return [("start, s", "floor", "ball, microphone", *octaves, "L_AFmax, dB"), *rows]

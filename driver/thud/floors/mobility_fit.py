@@ -158,7 +158,7 @@ class MobilityFit(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text of the errors."""
         body = [
-            (f"{band:g}", f"{100 * error:.2g}", "" if np.isnan(level) else f"{level:+.2f}")
+            (f"{band:g}", f"{100 * error:.2g}", "" if np.isnan(level) else f"{level:+z.2f}")
             for band, (error, level) in self.band_errors().items()
         ]
         return [("octave, Hz", "error, %", "real part, dB"), *body]

@@ -79,7 +79,7 @@ class FloorImpact(Impact):
         change = 20 * np.log10(self.floor_force.max() / self.blocked_force.max())
         return (
             f"<FloorImpact, {self.floor.name}: contact {1e3 * self.contact_time:.2f} ms, "
-            f"e {self.restitution:.3f}, peak {change:+.2f} dB, floor work {self.floor_work:.3g} J>"
+            f"e {self.restitution:.3f}, peak {change:+z.2f} dB, floor work {self.floor_work:.3g} J>"
         )
 
     @property

@@ -74,7 +74,9 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
     def size(name: str) -> str:
         half_widths = math.sqrt(3) * contributions.get(name, np.zeros(1))
         band = int(np.nanargmax(half_widths))
-        return f"up to {half_widths[band]:.2f} dB at {get_bands('octave').nominal[band]:g} Hz"
+        largest = half_widths[band]
+        text = f"up to {largest:.2f}" if largest >= 0.005 else "less than 0.01"  # noqa: PLR2004
+        return f"{text} dB at {get_bands('octave').nominal[band]:g} Hz"
 
     plate = config.resonance
     rings = any(drop.ringing for drop in drops)

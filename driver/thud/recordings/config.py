@@ -417,7 +417,7 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     if file.stat().st_size > MIB:
         refuse(f"{name}: is larger than 1 MiB", "a TOML file of a few lines")
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
+        table = tomllib.loads(file.read_text(encoding="utf-8-sig"))
     except UnicodeDecodeError as error:
         refuse(f"{name}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
     except (OSError, ValueError, RecursionError) as error:

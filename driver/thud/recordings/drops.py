@@ -192,7 +192,7 @@ def _pieces(
     first = first_sample
     bar = tqdm(
         total=stop_sample - first_sample, unit="sample", unit_scale=True, desc=signal.name,
-        disable=not progress,
+        disable=not progress, leave=False,
     )  # fmt: skip
     block = 4_096 * width
     n_collected = 0

@@ -153,7 +153,7 @@ def _measure(
     results = processes.map(call, remaining) if signal.path else map(call, remaining)
     with tqdm(
         total=len(windows), initial=len(windows) - len(remaining), unit="drop", desc=signal.name,
-        disable=not progress,
+        disable=not progress, leave=False,
     ) as bar:  # fmt: skip
         for window, drop in zip(remaining, results, strict=True):
             checkpoint.add(window.start, drop)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from thud.base._schema import KEYS
 from thud.base.display import Displayed
 from thud.base.tables import format_rows
+from thud.base.units import display_unit
 
 if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
@@ -226,8 +228,12 @@ class ModelVerdict(Displayed):
         """Return header and rows of text: the unknowns."""
         rows: list[tuple[str, ...]] = [("not known", "low", "high", "standard deviation", "reason")]
         for entry in self.unknowns:
-            deviation = f"{entry.standard_deviation:g}" if entry.standard_deviation else ""
-            rows.append((entry.key, f"{entry.low:g}", f"{entry.high:g}", deviation, entry.reason))
+            unit = next((key.unit for key in KEYS if key.name == entry.key), "")
+            unit, size = display_unit(unit, max(abs(entry.low), abs(entry.high)))
+            low, high = (f"{end / size:g}" for end in (entry.low, entry.high))
+            deviation = entry.standard_deviation / size
+            label = f"{entry.key}, {unit}".removesuffix(", ")
+            rows.append((label, low, high, f"{deviation:g}" if deviation else "", entry.reason))
         return rows
 
 

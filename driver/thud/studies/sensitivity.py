@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -73,9 +74,7 @@ class Sensitivity(SampleResult):
             row = self.indices.sel(output=output)
             pairs = zip(row["total"].to_numpy(), row["total_interval"].to_numpy(), strict=True)
             error = [f"{float(row['surrogate']):.3f}"] if "surrogate" in row else []
-            rows.append(
-                (str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs), *error)
-            )
+            rows.append((str(output), *(_index_text(*pair) for pair in pairs), *error))
         return rows
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -87,6 +86,19 @@ class Sensitivity(SampleResult):
         from thud.plot import draw_sensitivity
 
         return draw_sensitivity(self)
+
+
+def _index_text(index: float, half_width: float) -> str:
+    """Return an index and the half width of its interval, rounded up to two decimals, as text.
+
+    >>> _index_text(0.297, 0.072), _index_text(0.014, 0.003), _index_text(0.001, 0.0004)
+    ('0.30 ± 0.08', '0.01 ± 0.01', '< 0.01')
+    """
+    if not math.isfinite(index + half_width):
+        return "–"
+    if abs(index) + half_width < 0.01:  # noqa: PLR2004
+        return "< 0.01"
+    return f"{index:z.2f} ± {math.ceil(100 * half_width) / 100:.2f}"
 
 
 class SensitivityKind(SampleKind[Sensitivity]):

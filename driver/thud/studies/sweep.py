@@ -55,9 +55,9 @@ class Sweep(SampleResult):
                 for band in self.dataset[bands].values if bands else [None]:
                     values = variable.sel({bands: band}) if bands else variable
                     at = "" if band is None else f" {band:g} Hz"
-                    label = f"{name}{at}, {variable.attrs['units']}"
+                    label = f"{name}{at}, {variable.attrs['units']}".removesuffix(", 1")
                     numbers = (values.min(), values.median(), values.max())
-                    rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
+                    rows.append((label, *(f"{float(number):z.4g}" for number in numbers)))
         rows.append(("conforming samples", "", "", f"{int(self.dataset['conforms'].sum())}"))
         return rows
 

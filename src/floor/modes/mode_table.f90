@@ -170,7 +170,6 @@ contains
 
       label = ''
       text = line
-      if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
       i = index(text, '#')
       if (i > 0) text(i:) = ''
       do i = 1, len_trim(text)

@@ -2,7 +2,7 @@
 !> alone it could not distinguish a missing group from an unterminated one, nor name the key of a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
-   use thud_text, only: byte_order_mark, lower_case, newline, replaced, shortened, tab, to_text
+   use thud_text, only: lower_case, newline, replaced, shortened, tab, to_text
    implicit none (type, external)
    private
 
@@ -49,9 +49,7 @@ contains
       integer :: start, finish, gap
 
       allocate (groups(0))
-      start = 1
-      if (index(text, byte_order_mark) == 1) start = 1 + len(byte_order_mark)
-      call separate(text(start:), clean, structure, error)
+      call separate(text, clean, structure, error)
       if (allocated(error)) return
       start = 1
       do

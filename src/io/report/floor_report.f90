@@ -8,17 +8,17 @@ module thud_floor_report
    use thud_force_history, only: force_history_type, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
-      sample_quantity_count
+      sample_quantity_count, show
    use thud_report, only: get_model_quantities, get_force_csv, get_quantity_lines, line
-   use thud_table, only: get_verification_rows, is_peak_of_other, shown_error
-   use thud_text, only: fixed, flush_right, newline, padded, to_text
+   use thud_table, only: get_verification_rows, is_peak_of_other, shown_error, with_prefix
+   use thud_text, only: fixed, flush_right, newline, significant, to_text
    implicit none (type, external)
    private
 
    public :: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
 
-   !> Widths of the columns of the table: names, numbers, units.
-   integer, parameter :: name_column = 22, number_column = 10, unit_column = 4
+   !> Widths of the columns of the table: names, numbers, units, energies.
+   integer, parameter :: name_column = 22, number_column = 10, unit_column = 4, energy_column = 8
 
    !> Additional columns of `floor_force.csv` for every floor.
    character(len=32), parameter :: own_columns(3) = [character(len=32) :: &
@@ -93,8 +93,7 @@ contains
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=name_column) :: name
-      character(len=13) :: energy
-      character(len=:), allocatable :: cells
+      character(len=:), allocatable :: deviation
       real(wp), allocatable :: blocked_level(:)
       real(wp) :: values(history_quantity_count, 2)
       type(band_type) :: octaves(octave_count)
@@ -107,10 +106,10 @@ contains
       do i = 1, size(floor_result%bands)
          name = 'level, '//get_band_name(floor_result%bands(i))//' Hz '//trim(floor_result%bands(i)%set)
          associate (contact_level => floor_result%contact_level(i))
-            call get_cells([blocked_level(i), contact_level, contact_level - blocked_level(i)], 2, spread('dB', 1, 3), cells)
+            text = text//'  '//name//cell(fixed(blocked_level(i), 2), 'dB')//cell(fixed(contact_level, 2), 'dB') &
+               //cell(fixed(contact_level - blocked_level(i), 2), 'dB') &
+               //with_prefix(floor_result%energy(i), 'J', 3, energy_column)//newline
          end associate
-         write (energy, '(es11.2, " J")') floor_result%energy(i)
-         text = text//'  '//name//cells//'  '//energy//newline
       end do
       text = text//newline
       values(:, 1) = get_quantities(impact%history)
@@ -119,18 +118,21 @@ contains
          if (is_peak_of_other(quantities(i), case)) cycle
          call add_quantity(quantities(i), values(i, 1), values(i, 2))
       end do
-      call add_row('velocity of the floor', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_velocity)), 3, 'mm/s')
-      call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
-      call add_quantity(get_quantity('floor_work'), 0.0_wp, contact%floor_work)
+      call add_row('velocity of the floor', '-', significant(1.0e3_wp*maxval(abs(contact%floor_velocity)), 3), 'mm/s')
+      call add_row('its displacement', '-', significant(1.0e3_wp*maxval(abs(contact%floor_displacement)), 3), 'mm')
+      associate (work => get_quantity('floor_work'))
+         call add_row(trim(work%title), '-', show(work, work%display_scale*contact%floor_work), trim(work%display_unit))
+      end associate
       do i = 1, octave_count
          associate (errors => [impact%history%numerical_error%octave(i), contact%numerical_error%octave(i)])
-            if (errors(2) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', errors(1), errors(2), &
-               2, 'dB')
+            if (errors(2) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', fixed(errors(1), 2), &
+               fixed(errors(2), 2), 'dB')
          end associate
       end do
       text = text//get_verification_rows(contact)
-      text = text//newline//'  The energy to the floor by its mobility, in all frequencies, differs by ' &
-         //fixed(1.0e2_wp*(floor_result%total_energy/max(contact%floor_work, tiny(1.0_wp)) - 1), 3)//' %.'//newline
+      deviation = fixed(1.0e2_wp*(floor_result%total_energy/max(contact%floor_work, tiny(1.0_wp)) - 1), 2)
+      if (deviation == '0.00') deviation = 'less than 0.01'
+      text = text//newline//'  The energy by the mobility of the floor, in all frequencies, differs by '//deviation//' %.'//newline
 
    contains
 
@@ -140,40 +142,29 @@ contains
          !> Values on rigid and mobile floor, SI units.
          real(wp), intent(in) :: rigid, moving
 
-         call add_row(trim(quantity%title), quantity%display_scale*rigid, quantity%display_scale*moving, &
-            quantity%decimals, trim(quantity%display_unit))
+         call add_row(trim(quantity%title), show(quantity, quantity%display_scale*rigid), &
+            show(quantity, quantity%display_scale*moving), trim(quantity%display_unit))
       end subroutine add_quantity
 
       !> Adds a number of both drops.
-      subroutine add_row(title, rigid, moving, decimals, unit)
+      subroutine add_row(title, rigid, moving, unit)
          character(len=*), intent(in) :: title
-         !> Values on rigid and mobile floor, in the shown unit.
-         real(wp), intent(in) :: rigid, moving
-         integer, intent(in) :: decimals
+         !> Values on rigid and mobile floor, in the shown unit, as text.
+         character(len=*), intent(in) :: rigid, moving
          character(len=*), intent(in) :: unit
 
          name = title
-         call get_cells([rigid, moving], decimals, [unit, unit], cells)
-         text = text//'  '//name//cells//newline
+         text = text//'  '//name//merge(cell(rigid, ''), cell(rigid, unit), rigid == '-')//trim(cell(moving, unit))//newline
       end subroutine add_row
 
    end subroutine get_floor_table
 
-   !> Numbers with their units, each in its column.
-   pure subroutine get_cells(values, decimals, units, text)
-      !> The numbers: [n].
-      real(wp), intent(in) :: values(:)
-      integer, intent(in) :: decimals
-      !> Units of the numbers: [n].
-      character(len=*), intent(in) :: units(:)
-      character(len=:), allocatable, intent(out) :: text
-      integer :: i
+   !> A number with its unit in a column.
+   pure function cell(number, unit) result(text)
+      character(len=*), intent(in) :: number, unit
+      character(len=number_column + 1 + unit_column) :: text
 
-      text = ''
-      do i = 1, size(values)
-         text = text//flush_right(fixed(values(i), decimals), number_column)//' '//padded(units(i), unit_column)
-      end do
-      text = trim(text)
-   end subroutine get_cells
+      text = flush_right(number, number_column)//' '//unit
+   end function cell
 
 end module thud_floor_report

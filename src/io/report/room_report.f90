@@ -9,7 +9,7 @@ module thud_room_report
    use thud_report, only: line
    use thud_room, only: few_modes, get_required_interval, judge_requirement, room_level_type
    use thud_room_prediction, only: contribution_names
-   use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, to_text
+   use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, significant, to_text
    implicit none (type, external)
    private
 
@@ -103,10 +103,10 @@ contains
          //fixed(minval(prediction%reverberation_time), 2)
       if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
       text = text//' s.'//newline
-      text = text//'  Resistance of the floor '//fixed(resistance/1.0e3_wp, 1)//' kN s/m.'
-      if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
-         //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'
-      text = text//newline//'  Spread: expected standard deviation of one position of source and microphone.'//newline
+      text = text//'  Resistance of the floor '//significant(resistance/1.0e3_wp, 3)//' kN s/m.'//newline
+      if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//'  *: fewer than ' &
+         //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'//newline
+      text = text//'  Spread: expected standard deviation of one position of source and microphone.'//newline
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
@@ -119,10 +119,11 @@ contains
       logical, intent(in) :: coupled
       !> The table so far.
       character(len=:), allocatable, intent(inout) :: text
+      character(len=1) :: separator
       integer :: i
 
-      text = text//newline//'  ISO 717-2, of one-third octaves: L_iA,Fmax ' &
-         //to_text(get_rounded(prediction%rated))//' dB ('//get_range_text(prediction%interval)//'), statistical ' &
+      text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%rated))//' dB (' &
+         //get_range_text(prediction%interval)//'), of one-third octaves, ISO 717-2'//newline//'  statistical ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, '
       if (prediction%n_modal > 0) then
          text = text//'modal ' &
@@ -131,17 +132,21 @@ contains
          text = text//'no modal prediction: the interval contains neither edges nor model'//newline
       end if
       text = text//'  Contributions:'
+      separator = ' '
       do i = 1, size(contribution_names)
          if (prediction%n_modal == 0 .and. any(contribution_names(i) == ['edges', 'model'])) cycle
-         text = text//merge(',', ' ', i > 1)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
+         ! As far as the decimals show it.
+         if (all(abs(prediction%contribution(:, i)) < 0.05_wp)) cycle
+         text = text//trim(separator)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
             //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
+         separator = ','
       end do
       text = text//' dB'//newline//'  Statistical:'//newline
       do i = 1, size(rating_names)
          text = text//'  '//rating_titles(i)//to_text(get_rounded(prediction%rating(i)))//' dB (' &
             //fixed(prediction%rating(i), 2)//')'
-         if (rating_names(i) == 'octaves') text = text//get_class_text(case, prediction, prediction%rating(i))
          text = text//newline
+         if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, prediction%rating(i))
       end do
       if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
          //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
@@ -173,8 +178,8 @@ contains
       yes = prediction%source_conforms .and. case%source == 'rubber_ball'
    end function has_class
 
-   !> The class of a rating, with the limit of the class, after a comma; empty for another source than the ball.
-   function get_class_text(case, prediction, rating) result(text)
+   !> The class of a rating with its limit, as a line; empty for another source than the ball.
+   function get_class_line(case, prediction, rating) result(text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
       !> Rating of octaves, dB.
@@ -185,14 +190,14 @@ contains
       number = get_class(rating)
       text = ''
       if (.not. has_class(case, prediction)) then
-         if (.not. prediction%source_conforms) text = ', class not stated: the source does not conform'
+         if (.not. prediction%source_conforms) text = '    class not stated: the source does not conform'//newline
       else if (number > 0) then
-         text = ', class '//to_text(number)//' (at most '//fixed(class_limits(number), 0)//' dB)'
+         text = '    class '//to_text(number)//' (at most '//fixed(class_limits(number), 0)//' dB)'//newline
       else
-         text = ', no class (class '//to_text(size(class_limits))//': at most '//fixed(class_limits(size(class_limits)), 0) &
-            //' dB)'
+         text = '    no class (class '//to_text(size(class_limits))//': at most ' &
+            //fixed(class_limits(size(class_limits)), 0)//' dB)'//newline
       end if
-   end function get_class_text
+   end function get_class_line
 
    !> Ratings and verdict as a group of `summary.nml`.
    function get_room_summary(case, prediction) result(text)

@@ -12,15 +12,15 @@ module thud_table
    use thud_numerical_error, only: finer_prefix, finer_quantities, get_model_quantity, has_quantity, &
       resolution_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
-      sample_quantity_count
+      sample_quantity_count, show
    use thud_report, only: get_verdict, get_verdict_word
    use thud_source_limits, only: conforms, criterion_type, is_inconclusive
-   use thud_text, only: fixed, flush_right, newline, padded, replaced, to_text
+   use thud_text, only: fixed, flush_right, newline, padded, replaced, screen_width, significant, to_text
    implicit none (type, external)
    private
 
    public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
-   public :: get_verification_rows, is_peak_of_other
+   public :: get_verification_rows, is_peak_of_other, with_prefix
 
    !> Numerical error of a level above which it is shown, dB.
    real(wp), parameter, public :: shown_error = 0.1_wp
@@ -28,10 +28,12 @@ module thud_table
 contains
 
    !> The table that a run shows on the screen.
-   function get_table(case, history, assessment) result(text)
+   function get_table(case, history, assessment, verbose) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
       type(assessment_type), intent(in) :: assessment
+      !> Also show the resolution and the quantities of the model.
+      logical, intent(in) :: verbose
       character(len=:), allocatable :: text
       character(len=:), allocatable :: resolution
       real(wp) :: values(history_quantity_count)
@@ -43,7 +45,8 @@ contains
       ! In most models both forces are equal.
       if (.not. any(abs(assessment%level(:, other) - assessment%level(:, assessed)) > 0.0_wp)) other = 0
       text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
-      if (other > 0) text = text//'    '//get_force_title(force_names(other))
+      if (other > 0) text = text//flush_right(trim(merge('floor force  ', 'elastic force', force_names(other) == 'floor')), &
+         screen_width - len(text))
       text = text//newline
       associate (criteria => assessment%criteria(:, assessed))
          do i = 1, octave_count
@@ -64,19 +67,20 @@ contains
             if (is_peak_of_other(quantities(i), case)) cycle
             text = text//quantity_row(quantities(i), values(i))
          end do
-         text = text//model_quantity_rows(history)
-         resolution = get_resolution(history, '')
-         if (case%models(get_model_number(case))%model%chooses_resolution()) resolution = resolution//', automatic'
-         if (resolution /= '') text = text//'  resolution: '//resolution//newline
+         if (verbose) then
+            text = text//model_quantity_rows(history)
+            resolution = get_resolution(history, '')
+            if (case%models(get_model_number(case))%model%chooses_resolution()) resolution = resolution//', automatic'
+            if (resolution /= '') text = text//'  resolution: '//resolution//newline
+         end if
          do i = 1, octave_count
             associate (error => history%numerical_error%octave(i))
                if (.not. history%numerical_error%known) exit
-               if (error > shown_error .or. is_inconclusive(criteria(i))) text = text//row('numerical error at ' &
-                  //get_band_name(assessment%bands(i))//' Hz', error, 2, 'dB')
+               if (error > shown_error .or. is_inconclusive(criteria(i))) text = text//row('error at ' &
+                  //get_band_name(assessment%bands(i))//' Hz', fixed(error, 2), 'dB')
             end associate
          end do
-         if (.not. history%numerical_error%known) text = text//'  '//padded('numerical error', 22) &
-            //flush_right('unknown', 10)//newline
+         if (.not. history%numerical_error%known) text = text//row('numerical error', 'unknown', '')
          text = text//get_verification_rows(history)//newline
          verdict = 'the source '//get_verdict(criteria)
          undecided = ''
@@ -102,9 +106,10 @@ contains
          character(len=:), allocatable :: line
 
          line = row('level, '//get_band_name(assessment%bands(band))//' Hz '//trim(assessment%bands(band)%set), &
-            assessment%level(band, assessed), 2, 'dB', criterion, 1.0_wp)
+            fixed(assessment%level(band, assessed), 2), 'dB', criterion, 1.0_wp)
          if (other == 0) return
-         line = line(:len(line) - 1)//flush_right(fixed(assessment%level(band, other), 2), 79 - len(line))//' dB'//newline
+         line = line(:len(line) - 1)
+         line = line//flush_right(fixed(assessment%level(band, other), 2)//' dB', screen_width - len(line))//newline
       end function level_row
 
    end function get_table
@@ -145,10 +150,10 @@ contains
 
       text = '  free modes     frequency   harmonic   participation'//newline &
          //'                       Hz                of the pole'//newline &
-         //'   rigid        '//flush_right(fixed(modes%rigid_frequency, 3), 9)//flush_right('1', 11) &
+         //'   rigid        '//flush_right(fixed(modes%rigid_frequency, 2), 9)//flush_right('1', 11) &
          //flush_right('1.000', 16)//newline
       do i = 1, size(modes%frequency)
-         text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 3), 19) &
+         text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 2), 19) &
             //flush_right(to_text(modes%harmonic(i)), 11)//flush_right(fixed(modes%participation(i), 3), 16)//newline
       end do
    end function get_modes_table
@@ -161,10 +166,10 @@ contains
 
       associate (deflection => compression%deflection, force => compression%force, n => size(compression%force))
          text = '  quasi-static compression between plates'//newline &
-            //row('peak deflection', 1.0e3_wp*deflection(n), 2, 'mm') &
-            //row('force there', force(n), 1, 'N') &
-            //row('secant stiffness', force(n)/deflection(n)/1.0e3_wp, 2, 'kN/m') &
-            //row('at the first point', force(2)/deflection(2)/1.0e3_wp, 2, 'kN/m')
+            //row('peak deflection', fixed(1.0e3_wp*deflection(n), 2), 'mm') &
+            //row('force there', significant(force(n), 4), 'N') &
+            //row('secant stiffness', significant(force(n)/deflection(n)/1.0e3_wp, 4), 'kN/m') &
+            //row('at the first point', significant(force(2)/deflection(2)/1.0e3_wp, 4), 'kN/m')
       end associate
    end function get_compression_table
 
@@ -177,16 +182,15 @@ contains
       type(criterion_type), intent(in), optional :: criterion
       character(len=:), allocatable :: text
 
-      text = row(quantity%title, quantity%display_scale*value, quantity%decimals, quantity%display_unit, criterion, &
+      text = row(quantity%title, show(quantity, quantity%display_scale*value), quantity%display_unit, criterion, &
          quantity%display_scale)
    end function quantity_row
 
    !> Row for a number, with its limits if there are any.
-   function row(name, value, decimals, unit, criterion, scale) result(text)
+   function row(name, value, unit, criterion, scale) result(text)
       character(len=*), intent(in) :: name
-      !> Value in the shown unit.
-      real(wp), intent(in) :: value
-      integer, intent(in) :: decimals
+      !> Text of the value in the shown unit.
+      character(len=*), intent(in) :: value
       !> The shown unit.
       character(len=*), intent(in) :: unit
       !> Limits, in SI units.
@@ -195,7 +199,7 @@ contains
       real(wp), intent(in), optional :: scale
       character(len=:), allocatable :: text
 
-      text = '  '//padded(name, 22)//flush_right(fixed(value, decimals), 10)//' '//padded(unit, 5)
+      text = '  '//padded(name, 22)//flush_right(value, 10)//' '//padded(unit, 5)
       if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale)//get_verdict_word(criterion)
       text = trim(text)//newline
    end function row
@@ -230,9 +234,7 @@ contains
    function model_quantity_rows(history) result(rows)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: rows
-      character(len=*), parameter :: prefixes(-3:3) = ['n', 'u', 'm', ' ', 'k', 'M', 'G']
-      real(wp) :: scale
-      integer :: i, power
+      integer :: i
 
       rows = ''
       do i = 1, size(history%model_quantity_name)
@@ -240,14 +242,31 @@ contains
          if (any(resolution_quantities == history%model_quantity_name(i))) cycle
          ! On a hard floor there is none.
          if (history%model_quantity_name(i) == 'maximum_penetration' .and. .not. history%model_quantity(i) > 0.0_wp) cycle
-         power = 0
-         if (history%model_quantity_unit(i) /= '') power = floor(log10(max(abs(history%model_quantity(i)), tiny(1.0_wp)))/3)
-         if (abs(power) > 3) power = 0
-         scale = 10.0_wp**(-3*power)
-         rows = rows//row(replaced(trim(history%model_quantity_name(i)), '_', ' '), history%model_quantity(i)*scale, 3, &
-            trim(adjustl(prefixes(power)//history%model_quantity_unit(i))))
+         rows = rows//'  '//padded(replaced(trim(history%model_quantity_name(i)), '_', ' '), 22)
+         if (history%model_quantity_unit(i) == '') then
+            rows = rows//flush_right(significant(history%model_quantity(i), 4), 10)//newline
+         else
+            rows = rows//with_prefix(history%model_quantity(i), trim(history%model_quantity_unit(i)), 4, 10)//newline
+         end if
       end do
    end function model_quantity_rows
+
+   !> A number with significant digits and the prefix of its unit: ` 90.9 mJ`.
+   pure function with_prefix(value, unit, digits, width) result(text)
+      !> Value in the unit without prefix.
+      real(wp), intent(in) :: value
+      character(len=*), intent(in) :: unit
+      integer, intent(in) :: digits
+      !> Width of the number.
+      integer, intent(in) :: width
+      character(len=:), allocatable :: text
+      character(len=*), parameter :: prefixes(-3:3) = ['n', 'u', 'm', ' ', 'k', 'M', 'G']
+      integer :: power
+
+      power = floor(log10(max(abs(value), tiny(1.0_wp)))/3)
+      if (abs(power) > 3) power = 0
+      text = flush_right(significant(value*10.0_wp**(-3*power), digits), width)//' '//trim(adjustl(prefixes(power)//unit))
+   end function with_prefix
 
    !> The resolution of a result in words; empty if it is the sampling of the input.
    pure function get_resolution(history, prefix) result(text)
@@ -304,11 +323,12 @@ contains
          finer = history%model_quantity(first - 1 + i)
          if (i <= octave_count) then
             rows = rows//compared('level, '//get_band_name(octaves(i))//' Hz octave', finer, level(i), &
-               history%numerical_error%octave(i), get_quantity('octave_500_error'))
+               history%numerical_error%octave(i), get_quantity('octave_500_error'), get_quantity('octave_500_error'))
          else
             associate (name => finer_quantities(i) (len(finer_prefix) + 1:))
                rows = rows//compared(name, finer, values(findloc(quantities%name, name, dim=1)), &
-                  values(findloc(quantities%name, trim(name)//'_error', dim=1)), get_quantity(name))
+                  values(findloc(quantities%name, trim(name)//'_error', dim=1)), get_quantity(name), &
+                  get_quantity(trim(name)//'_error'))
             end associate
          end if
       end do
@@ -316,16 +336,16 @@ contains
    contains
 
       !> Row with a number at the finer resolution, its change, and the stated error; marked if the change exceeds the error.
-      function compared(name, finer, value, error, quantity) result(text)
+      function compared(name, finer, value, error, quantity, error_quantity) result(text)
          character(len=*), intent(in) :: name
          !> SI units.
          real(wp), intent(in) :: finer, value, error
-         !> Unit and decimals on the screen.
-         type(quantity_type), intent(in) :: quantity
+         !> Unit and decimals of the number and of its error on the screen.
+         type(quantity_type), intent(in) :: quantity, error_quantity
          character(len=:), allocatable :: text
 
-         associate (scale => quantity%display_scale, decimals => quantity%decimals)
-            text = row(replaced(trim(name), '_', ' '), finer*scale, decimals, quantity%display_unit)
+         associate (scale => quantity%display_scale, decimals => error_quantity%decimals)
+            text = row(replaced(trim(name), '_', ' '), fixed(finer*scale, quantity%decimals), quantity%display_unit)
             text = padded(text(:len(text) - 1), 40)//flush_right(fixed((finer - value)*scale, decimals), 8) &
                //flush_right(fixed(error*scale, decimals), 16)
             ! As far as the decimals show it.

@@ -1,0 +1,91 @@
+"""What the commands print: results, messages and progress, for terminals and for logs."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+from thud.base.tables import WIDTH, wrap
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import TextIO
+
+RED, GREEN, YELLOW = 31, 32, 33
+# Words of verdicts in sentences, and alone in a line of a cell.
+_VERDICTS = {
+    RED: (
+        r"\bdo(?:es)? not(?: conform)?\b|\btoo (?:low|high)\b|(?<=\d )(?:low|high)\b|\bnot met\b"
+        r"|(?<=  )(?:does|not|conform|low|high)(?=  |$)"
+    ),
+    GREEN: r"(?<!that )\bconforms\b|(?<=criteria )conform\b|(?<=: )met\b",
+    YELLOW: r"\bundecided(?: by the model)?\b|\binconclusive\b|(?<=  )by the(?: model)?(?=  |$)",
+}
+_COLORED = re.compile(
+    "|".join(f"(?P<color_{color}>{words})" for color, words in _VERDICTS.items()), re.MULTILINE
+)
+
+
+def print_results(text: str) -> None:
+    """Print results above any progress bar, with colored verdicts if a terminal shows colors."""
+    lines = wrap(text)
+    if _has_colors(sys.stdout):
+        lines = _COLORED.sub(_color_verdict, lines)
+    tqdm.write(lines, file=sys.stdout)
+
+
+def print_path(title: str, path: object) -> None:
+    """Print a path in one piece, below its title if both are wider than a terminal."""
+    line = f"{title}: {path}"
+    tqdm.write(line if len(line) <= WIDTH else f"{title}:\n{path}", file=sys.stdout)
+
+
+def print_notes(warnings: Iterable[object]) -> None:
+    """Print warnings above any progress bar."""
+    for warning in warnings:
+        _print_message(str(warning), YELLOW)
+
+
+def print_error(message: str) -> None:
+    """Print an error above any progress bar."""
+    _print_message(message, RED)
+
+
+def print_status(text: str) -> None:
+    """Print what is computed beside the results, above any progress bar."""
+    tqdm.write(wrap(text) if sys.stderr.isatty() else text, file=sys.stderr)
+
+
+def shows_progress(*, quiet: bool) -> bool:
+    """Whether progress is shown: on terminals, but not in logs."""
+    return not quiet and sys.stderr.isatty()
+
+
+def _print_message(message: str, color: int) -> None:
+    """Print a message; in a log it stays one line."""
+    name = "thud-driver:"
+    text = f"{name} {message}"
+    if sys.stderr.isatty():
+        text = wrap(text)
+    if _has_colors(sys.stderr):
+        text = text.replace(name, _colored(name, color), 1)
+    tqdm.write(text, file=sys.stderr)
+
+
+def _has_colors(stream: TextIO) -> bool:
+    """Whether a stream is a terminal with colors, and the user wants them (no-color.org)."""
+    wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") not in {"", "dumb"}
+    return wanted and stream.isatty()
+
+
+def _color_verdict(match: re.Match[str]) -> str:
+    return _colored(match[0], int(str(match.lastgroup).removeprefix("color_")))
+
+
+def _colored(text: str, color: int) -> str:
+    """Return text in a color, by a control sequence of ECMA-48."""
+    return f"\033[{color}m{text}\033[0m"
