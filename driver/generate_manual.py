@@ -57,13 +57,14 @@ class Program(NamedTuple):
 
 def executable(text: str) -> Program:
     """Return the executable by its help."""
-    purpose, calls = re.split(r"\n\n(?:Usage: )?", text)[:2]
+    purpose, calls, options = re.split(r"\n\n(?:Usage: )?", text)[:3]
     arguments = []
-    for short, long, value, meaning in OPTION.findall(text):
+    for short, long, value, meaning in OPTION.findall(f"\n{options}\n"):
         names = [name for name in (short.strip(", "), long) if name] or [value]
         settings = {"metavar": value} if value else {"action": "store_true"}
         arguments.append(argument(*names, help=" ".join(meaning.split()), **settings))
     codes = text.split("Exit codes: ")[1]
+    calls = " ".join(calls.split())
     return Program("thud", purpose, calls.split(" | "), tuple(arguments), {}, codes)
 
 
