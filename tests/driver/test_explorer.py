@@ -31,6 +31,7 @@ from thud.case.case import check_case
 from thud.explorer import server
 from thud.explorer.answer import new_case
 from thud.explorer.form import construction_form, form
+from thud.recordings.config import config_from
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
@@ -59,6 +60,26 @@ def last_report(client: TestClient, path: str, **request: Any) -> dict[str, Any]
     assert all(0 <= line["done"] <= 1 for line in lines[:-1])
     found: dict[str, Any] = lines[-1]
     return found
+
+
+FORM_TYPE = "multipart/form-data; boundary=edge"
+
+
+def form_body(content: bytes) -> bytes:
+    """Return the body of a form with a file."""
+    head = 'Content-Disposition: form-data; name="file"; filename="a.wav"'
+    return f"--edge\r\n{head}\r\n\r\n".encode() + content + b"\r\n--edge--\r\n"
+
+
+def form_of(content: bytes, fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of a request with a file and fields; `name` is that of the file."""
+    others = {name: str(value) for name, value in fields.items() if name != "name"}
+    return {"files": {"file": (fields.get("name", "a.wav"), content)}, "data": others}
+
+
+def measured(client: TestClient, content: bytes, **fields: Any) -> dict[str, Any]:  # noqa: ANN401 - of a form
+    """Return the last report on a recording."""
+    return last_report(client, "/measure", **form_of(content, fields))
 
 
 def solved(client: TestClient, values: object) -> dict[str, Any]:
@@ -220,7 +241,7 @@ def test_ranges_over_what_is_not_known_stand_beside_the_values(client: TestClien
 def test_recording_is_assessed(client: TestClient) -> None:
     path = REPOSITORY / "inputs/recordings/drop_1.wav"
     query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
-    report = last_report(client, "/measure", params=query, content=path.read_bytes())
+    report = measured(client, path.read_bytes(), **query)
     answer = report["answer"]
     recording = thud.read_recording(path, height=1.0, mass=2.5, calibration=CALIBRATION)
     assert answer["levels"]["level"] == pytest.approx(recording.levels(), rel=1e-5)
@@ -232,7 +253,7 @@ def test_recording_is_assessed(client: TestClient) -> None:
 
 def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> None:
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
-    report = last_report(client, "/measure", params={"name": "drop_1.csv"}, content=content)
+    report = measured(client, content, name="drop_1.csv")
     assert "restitution" not in [name for name, *_ in report["answer"]["numbers"]]
     warnings = report["answer"]["warnings"]
     # The page puts the name before them.
@@ -256,7 +277,7 @@ def test_drawn_force_of_a_recording_is_low_passed(client: TestClient) -> None:
     ripple = 0.1 * pulse * np.sin(2 * np.pi * 4000.0 * np.arange(len(pulse)) / rate)
     noise = np.random.default_rng(1).normal(scale=0.5, size=len(pulse))
     content = table_of(pulse + ripple + noise, rate)
-    answer = last_report(client, "/measure", params={"name": "a.csv"}, content=content)["answer"]
+    answer = measured(client, content, name="a.csv")["answer"]
     time, value = (np.array(answer["force"][key]) for key in ("time", "value"))
     expected = np.interp(1e-3 * time + start, np.arange(len(pulse)) / rate, pulse)
     inside = (time > 2) & (time < 18)
@@ -266,7 +287,7 @@ def test_drawn_force_of_a_recording_is_low_passed(client: TestClient) -> None:
 
 def test_values_of_a_recording_have_the_digits_of_their_uncertainty(client: TestClient) -> None:
     query = {"name": "a.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
-    answer = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    answer = measured(client, WAV, **query)["answer"]
     recording = thud.read_recording(
         REPOSITORY / "inputs/recordings/drop_1.wav", height=1, mass=2.5, calibration=CALIBRATION
     )
@@ -289,11 +310,11 @@ def test_values_of_a_recording_have_the_digits_of_their_uncertainty(client: Test
 
 def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
     query = {"name": "a.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
-    bare = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    bare = measured(client, WAV, **query)["answer"]
     query |= {
         "calibration_uncertainty": 5, "mass_uncertainty": 0.002, "height_uncertainty": 0.003,
     }  # fmt: skip
-    answer = last_report(client, "/measure", params=query, content=WAV)["answer"]
+    answer = measured(client, WAV, **query)["answer"]
     before, after = (
         {entry["name"]: entry["uncertainty"] for entry in found["criteria"]}
         for found in (bare, answer)
@@ -340,7 +361,7 @@ def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
 def test_messages_on_a_recording_name_its_fields_and_its_file(
     client: TestClient, query: dict[str, str], words: str
 ) -> None:
-    response = client.post("/measure", params={"name": "ball 1.wav"} | query, content=WAV)
+    response = client.post("/measure", **form_of(WAV, {"name": "ball 1.wav"} | query))
     is_begun = response.status_code == 200
     message = json.loads(response.text.splitlines()[-1])["error"] if is_begun else response.text
     assert words in message
@@ -355,20 +376,88 @@ def test_load_cells_are_named_like_the_fields(client: TestClient) -> None:
     cells = np.column_stack([time, *(pulse / 2 + noise)])
     np.savetxt(text, cells, "%.9g", ",", header="time_s,F1_N,F2_N", comments="")
     content = text.getvalue().encode()
-    report = last_report(client, "/measure", params={"name": "cells.csv"}, content=content)
+    report = measured(client, content, name="cells.csv")
     assert "“Load cells to be added” =" in report["error"]
     assert "or “Channel” = the force" in report["error"]
     query = {"name": "cells.csv", "channels": "sum"}
-    warnings = last_report(client, "/measure", params=query, content=content)["answer"]["warnings"]
+    warnings = measured(client, content, **query)["answer"]["warnings"]
     assert warnings
     assert not any("[" in warning or "recording.csv" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])
 def test_hostile_recordings_get_a_sentence(client: TestClient, name: str) -> None:
-    report = last_report(client, "/measure", params={"name": name}, content=b"\0" * 100)
-    assert report.keys() == {"error"}
+    response = client.post("/measure", **form_of(b"\0" * 100, {"name": name}))
+    report = json.loads(response.text.splitlines()[-1])
+    assert report.keys() == {"error", "field"}
     assert "/recording" not in report["error"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "content"),
+    [
+        ("text/csv", b"1,2"),
+        ("multipart/form-data", b"1,2"),
+        (FORM_TYPE, b"1,2"),
+        (FORM_TYPE, b"--edge\r\n\r\n\r\n--edge--"),
+        (FORM_TYPE, form_body(b"") * 200),
+    ],
+)
+def test_requests_that_are_no_forms_get_a_sentence(
+    client: TestClient, kind: str, content: bytes
+) -> None:
+    response = client.post("/measure", content=content, headers={"Content-Type": kind})
+    assert json.loads(response.text.splitlines()[-1]).keys() == {"error", "field"}
+
+
+RECORDINGS = REPOSITORY / "inputs/recordings"
+
+
+def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: TestClient) -> None:
+    content = (RECORDINGS / "drop_1.csv").read_bytes()
+    truth = tomllib.loads((RECORDINGS / "truth.toml").read_text())["drop"][0]
+    fields = {"name": "drop_1.csv", "height": 1, "mass": 2.5}
+    answer = measured(client, content, **fields)["answer"]
+    octave = answer["criteria"][4]
+    # The plate lifts the level, but the range holds the truth: nothing is decided.
+    assert abs(octave["value"] - truth["levels"][4]) > 1
+    assert abs(octave["value"] - truth["levels"][4]) < octave["uncertainty"]
+    assert octave["verdict"] == "inconclusive"
+    (asked,) = answer["asks"]
+    assert asked["values"] == {"plate_f0": "1100", "plate_Q": "24"}
+    assert any("“First resonance of the force plate, Hz” = 1100" in w for w in answer["warnings"])
+    answer = measured(client, content, **fields, **asked["values"])["answer"]
+    octave = answer["criteria"][4]
+    assert octave["value"] == pytest.approx(truth["levels"][4], abs=0.1)
+    assert octave["verdict"] == answer["verdict"] == "does not conform"
+    assert answer["headline"]["text"].startswith("does not conform: 500 Hz 10.2 dB, below 10.5")
+    assert answer["asks"] == []
+
+
+def test_several_files_are_the_drops_of_one_measurement(client: TestClient) -> None:
+    paths = [RECORDINGS / f"drop_{i}.csv" for i in range(1, 4)]
+    files = [("file", (path.name, path.read_bytes())) for path in paths]
+    data = {"height": "1", "mass": "2.5", "plate_f0": "1100", "plate_Q": "25"}
+    answer = last_report(client, "/measure", files=files, data=data)["answer"]
+    plate = {"f0": 1100, "Q": 25}
+    recording = thud.read_recording(
+        paths, config=config_from({"height": 1, "mass": 2.5, "plate": plate})
+    )
+    assert answer["drops"] == 3
+    assert answer["levels"]["level"] == pytest.approx(recording.levels(), rel=1e-5)
+    thirds = recording.levels("third")
+    assert answer["levels"]["thirds"]["level"] == pytest.approx(thirds, rel=1e-5)
+    assert not any("recording_" in warning for warning in answer["warnings"])
+    # The report is complete in itself, and has the names of the files.
+    assert all(path.name in answer["report"] for path in paths)
+    assert "recording_" not in answer["report"]
+    assert not re.search(r'(src|href)="(?!data:|#)', answer["report"])
+
+
+def test_recording_of_a_tyre_has_its_limits(client: TestClient) -> None:
+    query = {"calibration": CALIBRATION, "source": "tyre"}
+    answer = measured(client, WAV, **query)["answer"]
+    assert (answer["criteria"][0]["lower"], answer["criteria"][0]["upper"]) == (46, 48)
 
 
 def claiming_hdf5() -> bytes:
@@ -406,7 +495,7 @@ LENGTH = WAV.index(b"data") + 4
 def test_recordings_that_do_harm_get_a_sentence(
     client: TestClient, name: str, content: bytes, words: str
 ) -> None:
-    report = last_report(client, "/measure", params={"name": name, "unit": "N"}, content=content)
+    report = measured(client, content, name=name, unit="N")
     assert words in report["error"]
     assert repr(name) in report["error"]
 
@@ -421,10 +510,10 @@ def test_recordings_and_works_leave_no_files(
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
-    assert "answer" in last_report(client, "/measure", params=query, content=WAV)
-    assert client.post("/measure?height=high", content=WAV).status_code == 400
+    assert "answer" in measured(client, WAV, **query)
+    assert client.post("/measure", **form_of(WAV, {"height": "high"})).status_code == 400
     monkeypatch.setattr(server, "MAX_RECORDING", 1000)
-    assert client.post("/measure", params=query, content=WAV).status_code == 413
+    assert client.post("/measure", **form_of(WAV, query)).status_code == 413
     assert not copies_in(tmp_path)
 
 
@@ -526,7 +615,7 @@ def test_no_path_reaches_the_file_system(client: TestClient) -> None:
     assert client.post("/download/..%2fcase.nml", json=SHELL).status_code == 404
 
 
-@pytest.mark.parametrize("path", ["/solve", "/download/case.nml", "/measure?name=a.wav"])
+@pytest.mark.parametrize("path", ["/solve", "/download/case.nml", "/measure"])
 @pytest.mark.parametrize("parts", [1, 10, 1000])
 def test_bodies_may_be_as_long_as_allowed_and_no_longer(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, path: str, parts: int
@@ -535,12 +624,14 @@ def test_bodies_may_be_as_long_as_allowed_and_no_longer(
     limit = 2000
     monkeypatch.setattr(server, "MAX_CASE", limit)
     monkeypatch.setattr(server, "MAX_RECORDING", limit)
-    content = json.dumps(SHELL).encode().ljust(limit)
+    kind, content = "application/json", json.dumps(SHELL).encode().ljust(limit)
+    if path == "/measure":
+        kind, content = FORM_TYPE, form_body(b"\0" * 1000).ljust(limit)
 
     def send(body: bytes) -> int:
         length = -(-len(body) // parts)
         pieces = (body[at : at + length] for at in range(0, len(body), length))
-        return client.post(path, content=pieces).status_code
+        return client.post(path, content=pieces, headers={"Content-Type": kind}).status_code
 
     assert send(content) == 200
     assert send(content + b" ") == 413
@@ -723,7 +814,8 @@ def test_page_that_leaves_before_the_answer_leaves_no_copy(
     async def send_and_leave() -> None:
         # The second waits for ever where the first has kept its place.
         for _ in range(2):
-            receive = leaving_after({"type": "http.request", "body": WAV, "more_body": False})
+            body = form_body(WAV)
+            receive = leaving_after({"type": "http.request", "body": body, "more_body": False})
             await asyncio.wait_for(application(scope_of("/measure"), receive, discard), 20)
 
     asyncio.run(send_and_leave())
@@ -735,7 +827,11 @@ def scope_of(path: str) -> dict[str, Any]:
     return {
         "type": "http", "method": "POST", "path": path, "query_string": b"", "scheme": "http",
         "server": ("127.0.0.1", 80), "root_path": "",
-        "headers": [(b"host", b"127.0.0.1"), (server.TOKEN.encode(), TOKEN.encode())],
+        "headers": [
+            (b"host", b"127.0.0.1"),
+            (server.TOKEN.encode(), TOKEN.encode()),
+            (b"content-type", FORM_TYPE.encode()),
+        ],
     }  # fmt: skip
 
 

@@ -7,10 +7,11 @@ import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, ROOM_SOURCE
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
+from thud.explorer.models import condition_of, is_folded, users_of
 from thud.floors.constructions import constructions
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ SLIDER_FACTOR = 3.0
 MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
 # Fraction of the allowed range that a linear slider omits at both ends.
 INSET = 0.01
+# Number of steps from zero to a value, at least.
+STEPS = 15
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Groups of keys that are not on the page.
 OMITTED_GROUPS = ("case", "modes", "compression", "output")
@@ -34,9 +37,10 @@ def form() -> list[dict[str, Any]]:
     """Return the groups of fields.
 
     A group has part (``"model"``, ``"floor"``, ``"room"`` or its name), name, title and fields. A
-    field has group and name of its key, label, kind, help, choices and default. A field of a number
-    also has a unit, the power of ten that converts it to the unit of the key, limits of the allowed
-    range in its unit (None: open), and a slider.
+    field has group and name of its key, label, kind, help, choices, default, the models that use it
+    (None: all), whether it is advanced, and the choice with which it has an effect (None: always).
+    A field of a number also has a unit, the power of ten that converts it to the unit of the key,
+    limits of the allowed range in its unit (None: open), a round step, and a slider.
     """
     groups = [
         _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
@@ -73,17 +77,6 @@ def construction_form() -> list[dict[str, Any]]:
     ]
 
 
-def room_source() -> dict[str, dict[str, object]]:
-    """Return name and options of the model of a room whose case names none, by group."""
-    defaults = type(ROOM_SOURCE)()
-    options = {
-        option.name: getattr(ROOM_SOURCE, option.name)
-        for option in fields(ROOM_SOURCE)
-        if getattr(ROOM_SOURCE, option.name) != getattr(defaults, option.name)
-    }
-    return {"model": {"name": ROOM_SOURCE.name}, ROOM_SOURCE.name: options}
-
-
 def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
     """Return the fields of the options of a model, a floor or the room."""
     names = [option.name for option in fields(kind)]  # type: ignore[arg-type]
@@ -110,7 +103,11 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "choices": {choice: humanize(choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
         "unit": _typeset(key.unit),
+        "si_unit": key.unit,
         "power": 0,
+        "models": users_of(key),
+        "advanced": is_folded(key),
+        "condition": condition_of(key),
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
         # Times remain in seconds: a reverberation time of 500 ms would be unusual.
@@ -125,6 +122,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
             "lower": lower,
             "upper": upper,
             "help": f"{'' if meaning == label else meaning + '; '}{allowed.rstrip()}",
+            "step": _step(value or 0.0, lower, upper, whole=key.kind == "whole"),
             "slider": _slider(value or 0.0, lower, upper, whole=key.kind == "whole"),
         }
     return field
@@ -155,6 +153,16 @@ def _limit(limit: float | str, power: int) -> str:
         return humanize(limit)
     number = f"{scaled(limit, -power):g}"
     return re.sub(r"1e\+0?(\d+)", lambda match: "10" + match[1].translate(_SUPERSCRIPTS), number)
+
+
+def _step(value: float, lower: float | None, upper: float | None, *, whole: bool) -> float | None:
+    """Return a power of ten by which arrow keys change a value; None if no size is known."""
+    length = abs(value)
+    if not length and lower is not None and upper is not None and upper - lower <= MAX_LENGTH:
+        length = upper - lower
+    if whole:
+        return 1
+    return 10.0 ** math.floor(math.log10(length / STEPS)) if length else None
 
 
 def _slider(

@@ -15,9 +15,11 @@ import anyio
 from tqdm import tqdm
 
 from thud.base.bridge import progress
-from thud.base.errors import InputError, ThudError
-from thud.explorer.answer import answer_case, answer_quickly, answer_recording, new_case
+from thud.base.errors import ThudError
+from thud.explorer.answer import answer_case, answer_quickly, new_case
 from thud.explorer.downloads import DOWNLOADS
+from thud.explorer.messages import describe_error
+from thud.explorer.recording import answer_recording
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable
@@ -180,7 +182,7 @@ def _run_task(connection: Connection, task: str, arguments: tuple[Any, ...]) -> 
         limit = f"{MAX_MEMORY / 1e9:g} GB"
         return {"error": f"the computation needs more than {limit} of memory; allowed: less"}
     except (*INPUT_ERRORS, OSError) as error:
-        return {"error": str(error) or InputError.__name__}
+        return describe_error(error)
     finally:
         finished.set()
         thread.join()
