@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import hashlib
 import io
 import json
 import re
@@ -42,6 +44,11 @@ TOKEN = "secret"  # noqa: S105 - of the test
 HEAD = {server.TOKEN: TOKEN}
 CALIBRATION = "2000 N/FS"
 SHELL: dict[str, Any] = {"model": {"name": "hollow_sphere"}}
+# A case of minutes.
+LONG = {
+    "model": {"name": "finite_element"},
+    "mesh": {"radial_elements": 16, "polar_elements": 512},
+}
 
 
 @pytest.fixture(scope="module")
@@ -542,7 +549,7 @@ def test_bad_values_get_a_sentence(client: TestClient, values: object, words: st
 
 
 # Routes that show the page itself, without a token; all others are to refuse.
-OPEN = {"/": "/", "/page/{name}": "/page/explorer.js"}
+OPEN = {"/": "/"}
 # Tokens that are not that of the server: none, empty, parts of it, longer, of other letters.
 STRANGE_TOKENS = [None, "", "é", "guess", TOKEN[:1], TOKEN[:-1], TOKEN[1:], TOKEN + "x"]
 STRANGE_ORIGINS = [
@@ -600,8 +607,49 @@ def test_every_route_refuses_other_hosts(client: TestClient, host: str) -> None:
 
 def test_page_holds_no_token(client: TestClient) -> None:
     assert client.get("/about").status_code == 200
-    for path in ("/", *(f"/page/{name}" for name in server.FILES)):
-        assert TOKEN not in client.get(path).text
+    assert TOKEN not in client.get("/").text
+
+
+def test_page_is_one_compressed_file_that_loads_no_other(client: TestClient) -> None:
+    response = client.get("/", headers={"Accept-Encoding": "gzip"})
+    assert response.headers["content-encoding"] == "gzip"
+    assert int(response.headers.get("content-length", 0)) < 60_000
+    assert not re.search(
+        r'(?:src|href)="(?!data:|#)|^(?:import|export) ', response.text, re.MULTILINE
+    )
+    policy = response.headers["content-security-policy"]
+    for kind, element in (("script-src", "script"), ("style-src", "style")):
+        texts = re.findall(rf"<{element}>(.*?)</{element}>", response.text, re.DOTALL)
+        assert texts
+        for text in texts:
+            digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+            assert f"'sha256-{digest}'" in policy.partition(kind)[2].partition(";")[0]
+    again = client.get("/", headers={"If-None-Match": response.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+
+
+def test_first_answer_is_in_the_page_but_no_case_of_a_user(client: TestClient) -> None:
+    def first_of(content: str) -> str:
+        return re.findall(r'id="first_answer">(.*?)</script>', content, re.DOTALL)[0]
+
+    first = json.loads(first_of(client.get("/").text))
+    assert first["values"] == client.get("/about").json()["presets"][0]["values"]
+    assert first["answer"]["headline"]["result"] == "conforms"
+    start = {"model": {"name": "hollow_sphere"}}
+    application = server.new_application(start, token=TOKEN, hosts=("127.0.0.1",))
+    with TestClient(application, base_url="http://127.0.0.1") as other:
+        assert first_of(other.get("/").text) == ""
+
+
+def test_answers_are_compressed_and_reports_come_one_by_one(client: TestClient) -> None:
+    response = client.post("/solve", json=SHELL, headers={"Accept-Encoding": "gzip"})
+    assert response.headers["content-encoding"] == "gzip"
+    assert int(response.headers["content-length"]) < 6000
+    with client.stream(
+        "POST", "/solve", json=LONG, headers={"Accept-Encoding": "gzip"}
+    ) as response:
+        assert response.headers["content-encoding"] == "gzip"
+        assert json.loads(next(response.iter_lines())) == {"done": 0.0}
 
 
 def test_empty_token_is_refused_at_the_start() -> None:

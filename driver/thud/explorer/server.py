@@ -6,7 +6,6 @@ import json
 import secrets
 import shutil
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
-from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -17,6 +16,7 @@ from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response, StreamingResponse
@@ -31,6 +31,7 @@ from thud.explorer.form import construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.messages import describe_error
 from thud.explorer.models import changed_values, floor_facts, model_facts, standard_ball
+from thud.explorer.page_file import new_page
 from thud.explorer.presets import presets
 from thud.explorer.recording_fields import recording_form, recording_table
 
@@ -52,20 +53,14 @@ MAX_FIELDS = 100
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Maximum pause between two chunks of a body, s.
 BODY_TIMEOUT = 20.0
+# Level of compression: higher ones save a few percent and take twice as long.
+COMPRESSION = 6
 # Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
 # slow task.
 TIME_LIMIT = 300.0
 QUICK_TIME_LIMIT = 1.0
-# Files of the page, by name.
-FILES = {file.name: file for file in (resources.files("thud.explorer") / "page").iterdir()}
-TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-# The page loads files of this server only; it plays sounds that it has downloaded with its token.
-POLICY = (
-    "default-src 'self'; img-src 'self' data:; media-src blob:; "
-    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-)
 HEADERS = {
-    "Content-Security-Policy": POLICY,
+    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
@@ -102,7 +97,6 @@ def new_application(
     application = Starlette(
         routes=[
             Route("/", _page),
-            Route("/page/{name}", _page),
             *(
                 Route(path, _guarded(endpoint), methods=methods)
                 for path, endpoint, methods in (
@@ -113,7 +107,10 @@ def new_application(
                 )
             ),
         ],
-        middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
+        middleware=[
+            Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts)),
+            Middleware(GZipMiddleware, compresslevel=COMPRESSION),
+        ],
         exception_handlers=dict.fromkeys((*INPUT_ERRORS, HTTPException, _TaskError), _report_error)
         | {ClientDisconnect: _ignore_error},
         lifespan=lifespan,
@@ -131,6 +128,8 @@ def new_application(
         "room_source": changed_values(standard_ball()),
         "max_recording": MAX_RECORDING,
     }
+    # The page itself is sent without a token, and holds nothing of a user.
+    application.state.page = new_page(None if start else presets()[0]["values"])
     application.state.token = token
     application.state.slow = slow
     application.state.quick = quick
@@ -139,12 +138,14 @@ def new_application(
 
 
 async def _page(request: Request) -> Response:
-    name = request.path_params.get("name", "index.html")
-    if name not in FILES:
-        raise HTTPException(404, "there is no such file")
-    return Response(
-        FILES[name].read_bytes(), media_type=TYPES[name.rpartition(".")[2]], headers=HEADERS
-    )
+    page = request.app.state.page
+    headers = {
+        **HEADERS, "Content-Security-Policy": page.policy, "Cache-Control": "no-cache",
+        "ETag": page.tag,
+    }  # fmt: skip
+    if page.tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(page.content, media_type="text/html", headers=headers)
 
 
 async def _about(request: Request) -> Response:
