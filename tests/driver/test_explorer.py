@@ -186,7 +186,7 @@ def test_slow_case_reports_and_answers(client: TestClient) -> None:
         polar_elements=64,
     )
     assert answer["levels"]["level"] == pytest.approx(impact.levels(), rel=1e-5)
-    assert np.shape(answer["motion"]["outer"])[1:] == (65, 2)
+    assert np.shape(answer["motion"]["outer"])[1:] == (33, 2)
 
 
 @pytest.mark.parametrize(
@@ -225,8 +225,6 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert numbers["peak force relative to rigid floor"] == pytest.approx(change)
     assert [row[0] for row in answer["floor"]["rows"]] == ["31.5", "63", "125", "250", "500"]
     assert len(answer["room"]["level"]) == 12
-    # A model without a shape has no picture.
-    assert solved(client, {"model": {"name": "modal_ball"}})["motion"] is None
 
 
 def test_ranges_over_what_is_not_known_stand_beside_the_values(client: TestClient) -> None:

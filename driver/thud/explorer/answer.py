@@ -16,10 +16,11 @@ from thud.case.keys import humanize
 from thud.explorer.criteria import criterion_facts, room_headline, source_headline
 from thud.explorer.messages import in_words
 from thud.explorer.models import MODEL_FACTS
+from thud.explorer.motion import motion_of
+from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
-from thud.impact.floor_impact import FloorImpact
 from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import class_text
@@ -29,34 +30,28 @@ from thud.report.predicted_floor import contribution_title
 from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
     from thud.case.case import Case
     from thud.floors.prediction import RoomPrediction
+    from thud.impact.floor_impact import FloorImpact
     from thud.impact.impact import Impact
     from thud.level.assessment import Criterion
     from thud.level.impact_result import ImpactResult
 
     Answer = dict[str, Any]
 
-# Maximum number of points of a curve on the page, and of instants of an animation.
-MAX_POINTS = 400
-MAX_INSTANTS = 60
 # Time between instants of finite elements, s.
 SNAPSHOT_INTERVAL = 1e-3
 # Maximum number of samples of a record.
 MAX_SAMPLES = 200_000
 # Maximum estimated duration of a computation while a slider moves, s.
 MAX_QUICK_TIME = 0.1
-# Length of the displayed time range divided by the contact time.
-TIME_RANGE = 1.05
 # Maximum density of a wall, kg/m3: that of the densest metal, osmium.
 MAX_DENSITY = 22_600.0
-# Significant digits of curves.
-DIGITS = 6
 
 
 def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
@@ -119,7 +114,7 @@ def answer_case(case: Case) -> Answer:
         for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
             entry["range"] = criterion.range
     on_floor = impact.on_floor
-    answer["motion"] = _motion(on_floor or impact)
+    answer["motion"] = motion_of(on_floor or impact)
     answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
     if case.room is not None and case.floor is not None:
         prediction = predict_level(impact)
@@ -139,13 +134,13 @@ def common_answer(
     """Return the entries that all answers have; times are in ms, and `force` is in kN."""
     verdict = source.assess()
     return {
-        "force": _curve(times, 1e3 * force),
+        "force": curve(times, 1e3 * force),
         "levels": {
-            "frequency": _to_json(get_bands().nominal),
-            "level": _to_json(source.levels()),
+            "frequency": to_json(get_bands().nominal),
+            "level": to_json(source.levels()),
             "thirds": {
-                "frequency": _to_json(get_bands(BANDWIDTHS[1]).nominal),
-                "level": _to_json(source.levels(BANDWIDTHS[1])),
+                "frequency": to_json(get_bands(BANDWIDTHS[1]).nominal),
+                "level": to_json(source.levels(BANDWIDTHS[1])),
             },
         },
         "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
@@ -189,36 +184,6 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     }
 
 
-def _motion(impact: Impact) -> Answer | None:
-    """Return the surfaces of the ball relative to the floor, and the floor, mm, at times, ms.
-
-    None for models without a shape. The shape of the shell model is a sphere that is flattened by
-    its deflection.
-    """
-    end = impact.touch_time + TIME_RANGE * impact.contact_time
-    motion = impact.motion
-    if motion is None and "shell_force" not in impact.components:
-        return None
-    times = impact.time if motion is None else motion.time
-    chosen = _thin_out(np.flatnonzero(times <= end), MAX_INSTANTS)
-    answer: Answer = {"time": _to_json(1e3 * (times[chosen] - impact.touch_time))}
-    if motion is not None:
-        depth = motion.floor_displacement[chosen]
-        relative = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
-        answer["outer"], answer["inner"] = (
-            [[[round(float(x), 2) for x in point] for point in line] for line in 1e3 * surface]
-            for surface in (relative[:, :, -1], relative[:, :, 0])
-        )
-    else:
-        floor = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
-        depth = floor[chosen]
-        ball = impact.case.ball
-        answer["deflection"] = _to_json(1e3 * impact.deflection[chosen])
-        answer |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
-    answer["floor"] = _to_json(1e3 * depth)
-    return answer
-
-
 def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
     """Return force and velocity of a mobile floor, its quantities, and a table of octaves."""
     shown = np.flatnonzero(on_floor.time <= on_floor.touch_time + 2 * on_floor.contact_time)
@@ -227,8 +192,8 @@ def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
     header, *rows = on_floor.rows()
     return {
         "name": humanize(on_floor.floor.name),
-        "force": _curve(contact[0], 1e3 * contact[1]),
-        "velocity": _curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
+        "force": curve(contact[0], 1e3 * contact[1]),
+        "velocity": curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
         "numbers": [
             [
                 "peak force relative to rigid floor",
@@ -248,9 +213,9 @@ def _room(prediction: RoomPrediction) -> Answer:
     """Return the levels in the room below, dB, with the range of the rating and its causes."""
     low, high = prediction.interval
     return {
-        "frequency": _to_json(prediction.frequency),
-        "level": _to_json(prediction.level),
-        "modal_level": _to_json(prediction.modal_level[: prediction.n_modal]),
+        "frequency": to_json(prediction.frequency),
+        "level": to_json(prediction.level),
+        "modal_level": to_json(prediction.modal_level[: prediction.n_modal]),
         "rated": {"value": prediction.rated, "low": low, "high": high},
         "interval": prediction.rated_text,
         "contributions": [
@@ -274,21 +239,3 @@ def _ratings_text(prediction: RoomPrediction) -> str:
     ]
     required = prediction.requirement
     return "; ".join([*words, *([str(required)] if required else [])])
-
-
-def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
-    """Return a curve of at most `MAX_POINTS` points."""
-    chosen = _thin_out(np.arange(len(times)), MAX_POINTS)
-    return {"time": _to_json(times[chosen]), "value": _to_json(values[chosen])}
-
-
-def _thin_out(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """Return at most `count` of the indices, evenly spaced, including the first and the last."""
-    chosen = np.linspace(0, len(indices) - 1, min(len(indices), count)).astype(int)
-    result: NDArray[np.intp] = indices[np.unique(chosen)]
-    return result
-
-
-def _to_json(values: Iterable[float]) -> list[float | None]:
-    """Return numbers for JSON, with None for NaN and infinity."""
-    return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values]

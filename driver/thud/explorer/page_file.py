@@ -55,7 +55,8 @@ def new_page(values: Mapping[str, Any] | None) -> Page:
     content = _STYLE.sub(lambda match: inline(match, "styles", "style"), content)
     content = _SCRIPT.sub(lambda match: inline(match, "scripts", "script"), content)
     if values is not None:
-        first = {"values": values, "answer": answer_case(new_case(values))}
+        # The motion comes with the next answer.
+        first = {"values": values, "answer": answer_case(new_case(values)) | {"motion": None}}
         text = json.dumps(first, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
         content = content.replace(_FIRST, _FIRST + text)
     policy = _POLICY.format(**{kind: " ".join(found) or "'none'" for kind, found in hashes.items()})
