@@ -1,37 +1,79 @@
-// Section of the ball on the floor at an instant, and its animation.
+// Section of the source on the floor at an instant, and its animation, in step with the plot of the force.
 import { byId, rounded } from "./page.js";
+import { setCursor } from "./plot.js";
 
 // Duration of the animation, ms.
-const DURATION = 4000;
+const DURATION = 5000;
 // Maximum displayed displacement of the floor as a fraction of the height of the ball.
 const MAX_DISPLACEMENT = 0.12;
+const isStill = matchMedia("(prefers-reduced-motion: reduce)");
 let motion = null;
 let playing = 0;
+let endsAfterPass = false;
+let hasPlayed = false;
 
-/** Show the motion of an answer; hide the section if there is none. */
+/** Show the motion of an answer; hide the section if there is none. Without a wish for less motion it plays once. */
 export function showBall(newMotion) {
   motion = newMotion ?? null;
   byId("ball_section").hidden = !motion;
-  if (motion) render();
+  if (!motion) { stopBall(); setCursor(byId("force"), null); return; }
+  renderBall();
+  if (!hasPlayed && !isStill.matches) startBall(true);
+  hasPlayed = true;
 }
 
 export function listenToBall() {
-  byId("play").addEventListener("click", play);
-  byId("instant").addEventListener("input", render);
+  byId("play").addEventListener("click", () => (playing ? stopBall() : startBall(false)));
+  byId("instant").addEventListener("input", () => { stopBall(); renderBall(); });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (motion) renderBall(); });
 }
 
-function render() {
+function stopBall() {
+  cancelAnimationFrame(playing);
+  playing = 0;
+  byId("play").textContent = "Play";
+}
+
+function startBall(once) {
+  endsAfterPass = once;
+  byId("play").textContent = "Pause";
+  let [last, passed] = [performance.now(), 0];
+  const step = (now) => {
+    const slider = byId("instant");
+    const part = (now - last) / DURATION;
+    last = now;
+    passed += part;
+    slider.value = (Number(slider.value) + part) % 1;
+    if (motion) renderBall();
+    if (endsAfterPass && passed >= 1) stopBall();
+    else playing = requestAnimationFrame(step);
+  };
+  playing = requestAnimationFrame(step);
+}
+
+/** Return a value between two instants: of numbers, or of lists of them. */
+function between(lists, i, part) {
+  const mix = (one, other) => (typeof one === "number" ? one + part * (other - one) : one.map((value, k) => mix(value, other[k])));
+  return part ? mix(lists[i], lists[i + 1]) : lists[i];
+}
+
+function renderBall() {
   const canvas = byId("ball");
   const context = canvas.getContext("2d");
-  const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const last = motion.time.length - 1;
-  const i = Math.round(Number(byId("instant").value) * last);
+  const styles = getComputedStyle(document.documentElement);
+  const color = (name) => styles.getPropertyValue(name).trim();
+  const { time } = motion;
+  const at = time[0] + Number(byId("instant").value) * (time.at(-1) - time[0]);
+  let i = 0;
+  while (i < time.length - 2 && time[i + 1] <= at) i += 1;
+  const part = (at - time[i]) / (time[i + 1] - time[i]);
   const top = motion.outer ? Math.max(...motion.outer.flat().map(([, z]) => z)) : 2 * motion.radius;
   const factor = magnification(top);
-  const ground = canvas.height - 70;
+  const floor = factor * between(motion.floor, i, part);
+  const ground = canvas.height - 60;
   const scale = (ground - 20) / Math.max(200, top);
   const x = (r) => canvas.width / 2 + scale * r;
-  const y = (z) => ground - scale * (z - factor * motion.floor[i]);
+  const y = (z) => ground - scale * (z - floor);
   context.clearRect(0, 0, canvas.width, canvas.height);
   context.lineWidth = 2;
   context.fillStyle = color("--floor");
@@ -44,7 +86,7 @@ function render() {
   context.fillStyle = color("--rubber");
   context.strokeStyle = color("--ink");
   context.beginPath();
-  const [outer, inner] = motion.outer ? [motion.outer[i], motion.inner[i]] : flattened(i);
+  const [outer, inner] = motion.outer ? [between(motion.outer, i, part), between(motion.inner, i, part)] : flattened(between(motion.deflection, i, part));
   for (const line of [outer, inner]) {
     line.forEach(([r, z], k) => (k ? context.lineTo(x(r), y(z)) : context.moveTo(x(r), y(z))));
     for (const [r, z] of [...line].reverse()) context.lineTo(x(-r), y(z));
@@ -52,9 +94,10 @@ function render() {
   }
   context.fill("evenodd");
   context.stroke();
-  const time = `${motion.time[i].toFixed(1)} ms`;
-  byId("instant_text").textContent = time;
-  byId("instant").setAttribute("aria-valuetext", time);
+  const text = `${at.toFixed(1)} ms`;
+  byId("instant_text").textContent = text;
+  byId("instant").setAttribute("aria-valuetext", text);
+  setCursor(byId("force"), at);
   const shape = motion.outer ? "Computed section." : "Shape that the model assumes: a sphere, flattened by its deflection.";
   const displacement = factor > 1 ? ` The floor moves by up to ${rounded(Math.max(...motion.floor), "mm")}, magnified ${factor}×.` : "";
   byId("ball_text").textContent = shape + displacement;
@@ -70,8 +113,8 @@ function magnification(top) {
 }
 
 /** Return the outer and inner surface of a hollow sphere, flattened by the floor and the wall on it. */
-function flattened(i) {
-  const deflection = Math.max(0, motion.deflection[i]);
+function flattened(newDeflection) {
+  const deflection = Math.max(0, newDeflection);
   return [0, motion.wall].map((wall) => {
     const radius = motion.radius - wall;
     return Array.from({ length: 121 }, (_, k) => {
@@ -79,21 +122,4 @@ function flattened(i) {
       return [radius * Math.sin(angle), Math.max(wall, motion.radius - deflection - radius * Math.cos(angle))];
     });
   });
-}
-
-function play() {
-  const starts = !playing;
-  byId("play").textContent = starts ? "Pause" : "Play";
-  cancelAnimationFrame(playing);
-  playing = 0;
-  if (!starts) return;
-  let last = performance.now();
-  const step = (now) => {
-    const slider = byId("instant");
-    slider.value = (Number(slider.value) + (now - last) / DURATION) % 1;
-    last = now;
-    if (motion) render();
-    playing = requestAnimationFrame(step);
-  };
-  playing = requestAnimationFrame(step);
 }
