@@ -107,9 +107,8 @@ async function solve() {
     else current[door] = { door, style: 0, values, answer, slow: thisJob.slow };
     if (state.door !== door || job !== thisJob) return;
     hideMessage();
-    setOutdated(false);
+    setOutdated(false, thisJob.repeat);
     showAll();
-    store();
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
@@ -141,6 +140,7 @@ function recordedVariant(answer) {
 /** Compute the case after a change of the form; a slow case only after a pause. */
 function onChange() {
   commitSoon();
+  hideMessage();
   const isSlow = (job ?? current[state.door])?.slow || state.door === "recording";
   if (!isSlow) { solve(); return; }
   job?.controller.abort();
@@ -215,8 +215,7 @@ function showNothing(door) {
 function keep() {
   const own = current[state.door];
   if (!own) return;
-  const letter = String.fromCharCode(65 + (kept.length % 26));
-  kept = [...kept, { ...own, style: freeStyle(kept), letter }];
+  kept = [...kept, { ...own, style: freeStyle(variantsOfDoor()) }];
   showAll();
   commit();
 }
@@ -255,11 +254,10 @@ function openDoor(door, { focus = false } = {}) {
   document.body.dataset.door = door;
   buildDoor(onChange, onInvalid);
   hideMessage();
-  const isCurrent = current[door] && (door === "recording" || JSON.stringify(current[door].values) === JSON.stringify(caseValues(door)));
-  if (!isCurrent && door !== "recording") current[door] = null;
-  setOutdated(false);
+  const isCurrent = Boolean(current[door]) && (door === "recording" || JSON.stringify(current[door].values) === JSON.stringify(caseValues(door)));
   showAll();
-  if (!isCurrent) solve();
+  setOutdated(!isCurrent && Boolean(current[door]), !isCurrent);
+  if (!isCurrent || current[door].isPartial) solve();
   commitSoon();
 }
 
@@ -276,11 +274,11 @@ function commit() {
   clearTimeout(steps.timer);
   const [last, next] = [steps.list[steps.at], snapshot()];
   const isEqual = last && last.kept === next.kept && last.files === next.files && sameCase(last.state, next.state);
+  store();
   if (isEqual) return;
   steps.list.splice(steps.at + 1, Infinity, next);
   steps.at = steps.list.length - 1;
   showSteps();
-  store();
 }
 
 function sameCase(one, other) {
@@ -361,7 +359,7 @@ async function takeLink(text) {
   state.door = door;
   for (const variant of variants) {
     const answer = await runTask("Computing", "solve", JSON.stringify(variant.values), new AbortController()).catch(showError);
-    if (answer) kept = [...kept, { door: variant.door, style: freeStyle(kept), values: variant.values, title: variant.title, answer }];
+    if (answer) kept = [...kept, { door: variant.door, style: freeStyle(kept.filter((other) => (other.door === "floor") === (variant.door === "floor"))), values: variant.values, title: variant.title, answer }];
   }
   return true;
 }
@@ -476,7 +474,8 @@ async function main() {
   listen();
   const link = fragment.get("case");
   const door = DOORS.find((name) => fragment.has(name));
-  if (firstAnswer) current.ball = { door: "ball", style: 0, values: firstAnswer.values, answer: firstAnswer.answer };
+  // The answer that the page contains lacks the motion.
+  if (firstAnswer) current.ball = { door: "ball", style: 0, values: firstAnswer.values, answer: firstAnswer.answer, isPartial: true };
   const isRestored = link === null && restoreStored();
   if (isRestored) openDoor(door ?? state.door);
   else begin(about.start);

@@ -98,6 +98,9 @@ function exchange(old, next) {
   }
 }
 
+/** Return whether the floor has a plate that radiates into a room. */
+const hasRoom = () => factsOf("floor", state.floor).has_room !== false;
+
 function setModel(name) {
   exchange(factsOf("model", state.model).values, factsOf("model", name).values);
   state.model = name;
@@ -106,6 +109,7 @@ function setModel(name) {
 function setFloor(name) {
   exchange(factsOf("floor", state.floor).values, factsOf("floor", name).values);
   state.floor = name;
+  state.room &&= hasRoom();
 }
 
 // ---- Constructions.
@@ -168,11 +172,12 @@ function floorInputs(handlers) {
   const source = balls.find((preset) => isSame(sorted(preset.values), sorted(caseValues("ball"))));
   const box = element("input", { type: "checkbox", id: "has_room" });
   box.checked = state.room;
+  box.disabled = !hasRoom();
   box.addEventListener("change", () => { state.room = box.checked; handlers.rebuild(); });
   return [
     choiceOf("construction", "Construction", options, construction?.name ?? "", (name) => { fillConstruction(name); handlers.rebuild(); },
       element("p", { class: "help", id: "construction_text" }, construction?.text ?? "Changed values of a floor.")),
-    choiceOf("source", "Dropped on it", [...(source ? [] : [["", "The ball of the second door"]]), ...balls.map(({ name, title }) => [name, title])], source?.name ?? "",
+    choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls.map(({ name, title }) => [name, title])], source?.name ?? "",
       (name) => { takeValues(balls.find((preset) => preset.name === name).values); handlers.rebuild(); }),
     element("label", { class: "toggle" }, box, "Room below"),
     ...(state.room ? groupsOf("room").map((group) => groupElement(group, handlers, sources)) : []),

@@ -20,7 +20,8 @@ const watcher = new ResizeObserver((entries) => entries.forEach((entry) => redra
  * `content` has a title and either `rows` of bars, [title, low, high], or `curves`. These have name,
  * style, x, y and the options `marks`, `thin` and `ends` ([low, high] of each value). The axes `x`
  * and `y` have a title and a unit; `x.bands` is a list of names of bands. `limits` are [lower, upper]
- * of each band, and `missed` says which of them the first curve exceeds.
+ * of each band, and `missed` says which of them the first curve exceeds. With `hasCursor` the first
+ * curve has the cursor of `setCursor`.
  */
 export function plot(host, content) {
   const entry = drawn.get(host) ?? {};
@@ -40,7 +41,7 @@ export function setCursor(host, at) {
   if (!entry) return;
   entry.at = at;
   const { content, drawing } = entry;
-  if (!drawing?.moment) return;
+  if (!drawing?.moment || !content.hasCursor) return;
   const curve = content.curves[0];
   const isInside = at !== null && curve && at >= drawing.across[0] && at <= drawing.across[1];
   drawing.moment.setAttribute("visibility", isInside ? "visible" : "hidden");

@@ -66,7 +66,7 @@ export function showForces(variants, { thirds, differences }) {
   });
   byId("force_title").textContent = capitalize(first.answer.force.title ?? "force on the floor");
   plot(byId("force"), {
-    title: byId("force_title").textContent, curves,
+    title: byId("force_title").textContent, curves, hasCursor: !isDifference,
     x: { title: "Time", unit: "ms" },
     y: { title: isDifference ? `Difference to ${first.label}` : "Force, low-passed at 1.25 kHz", unit: "N", zero: true },
   });
