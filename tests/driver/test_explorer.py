@@ -33,6 +33,7 @@ from thud.case.case import check_case
 from thud.explorer import server
 from thud.explorer.answer import new_case
 from thud.explorer.form import construction_form, form
+from thud.impact.compute import compute
 from thud.recordings.config import config_from
 
 if TYPE_CHECKING:
@@ -73,9 +74,10 @@ FORM_TYPE = "multipart/form-data; boundary=edge"
 
 
 def form_body(content: bytes) -> bytes:
-    """Return the body of a form with a file."""
+    """Return the body of a form with a case and a file."""
     head = 'Content-Disposition: form-data; name="file"; filename="a.wav"'
-    return f"--edge\r\n{head}\r\n\r\n".encode() + content + b"\r\n--edge--\r\n"
+    case = f'--edge\r\nContent-Disposition: form-data; name="case"\r\n\r\n{json.dumps(SHELL)}\r\n'
+    return f"{case}--edge\r\n{head}\r\n\r\n".encode() + content + b"\r\n--edge--\r\n"
 
 
 def form_of(content: bytes, fields: dict[str, Any]) -> dict[str, Any]:
@@ -566,7 +568,8 @@ def requests_of(client: TestClient) -> list[tuple[str, str, str]]:
     for route in client.app.routes:  # type: ignore[attr-defined]
         address = OPEN.get(route.path, re.sub(r"\{.*?\}", "case.nml", route.path))
         found += [(route.path, method, address) for method in route.methods]
-    assert {"/about", "/solve", "/measure", "/download/{name}"} < {path for path, *_ in found}
+    paths = {"/about", "/solve", "/measure", "/improve", "/fit", "/download/{name}"}
+    assert paths < {path for path, *_ in found}
     return found
 
 
@@ -661,7 +664,7 @@ def test_no_path_reaches_the_file_system(client: TestClient) -> None:
     assert client.post("/download/..%2fcase.nml", json=SHELL).status_code == 404
 
 
-@pytest.mark.parametrize("path", ["/solve", "/download/case.nml", "/measure"])
+@pytest.mark.parametrize("path", ["/solve", "/download/case.nml", "/improve", "/measure", "/fit"])
 @pytest.mark.parametrize("parts", [1, 10, 1000])
 def test_bodies_may_be_as_long_as_allowed_and_no_longer(
     client: TestClient, monkeypatch: pytest.MonkeyPatch, path: str, parts: int
@@ -671,7 +674,7 @@ def test_bodies_may_be_as_long_as_allowed_and_no_longer(
     monkeypatch.setattr(server, "MAX_CASE", limit)
     monkeypatch.setattr(server, "MAX_RECORDING", limit)
     kind, content = "application/json", json.dumps(SHELL).encode().ljust(limit)
-    if path == "/measure":
+    if path in {"/measure", "/fit"}:
         kind, content = FORM_TYPE, form_body(b"\0" * 1000).ljust(limit)
 
     def send(body: bytes) -> int:
@@ -699,7 +702,86 @@ def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None
     assert force.max() == pytest.approx(
         thud.solve(drop=thud.Drop(height=0.7)).floor_force.max(), rel=1e-8
     )
-    assert "<html" in client.post("/download/report.html", json=values).text
+
+
+@pytest.mark.parametrize("name", ["standard_ball", "finite_elements", "tyre", "floating_floor"])
+def test_script_computes_the_case(
+    client: TestClient, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    presets = client.get("/about").json()["presets"]
+    (values,) = (preset["values"] for preset in presets if preset["name"] == name)
+    text = client.post("/download/case.py", json=values).text
+    namespace: dict[str, Any] = {}
+    exec(compile(text, "case.py", "exec"), namespace)  # noqa: S102 - it is the result
+    assert namespace["case"] == new_case(values | {"case": {"name": "python"}})
+    assert f"{namespace['impact'].levels().round(2)}" in capsys.readouterr().out
+    assert ("predict_level" in text) == ("room" in values)
+
+
+def test_names_in_a_script_are_texts(client: TestClient) -> None:
+    values = SHELL | {"case": {"name": "a'b"}}
+    response = client.post("/download/case.py", json=values)
+    assert response.status_code == 400 or 'name="a\'b"' in response.text
+
+
+def test_smallest_change_that_conforms_is_found(client: TestClient) -> None:
+    values = {
+        "model": {"name": "modal_ball"},
+        "modal_ball": {"damping_law": "rising", "loss_factor": 0.15},
+    }
+    answer = last_report(client, "/improve", json=values)["answer"]
+    (change,) = (entry for entry in answer["changes"] if entry["key"] == "modal_ball.loss_factor")
+    assert change["text"].startswith("Loss factor ")
+    assert change["to"] == change["value"]
+
+    def conforms(loss: float) -> bool:
+        options = {"damping_law": "rising", "loss_factor": loss}
+        return thud.solve(model=thud.ModalBall(**options)).assess().conforms  # type: ignore[arg-type]
+
+    assert conforms(change["value"])
+    assert not conforms(change["value"] - 0.002)
+    assert answer["none"] == ""
+    sizes = [abs(np.log(entry["factor"])) for entry in answer["changes"]]
+    assert sizes == sorted(sizes)
+
+
+def test_shell_that_no_single_change_helps_says_so(client: TestClient) -> None:
+    answer = last_report(client, "/improve", json=SHELL)["answer"]
+    assert answer["changes"] == []
+    assert "No change of a single parameter makes the source conform" in answer["none"]
+    assert "125 Hz 19.0 dB, below 21.5" in answer["none"]
+
+
+def test_source_that_conforms_needs_no_change(client: TestClient) -> None:
+    values = client.get("/about").json()["presets"][0]["values"]
+    answer = last_report(client, "/improve", json=values)["answer"]
+    assert answer["changes"] == []
+    assert answer["none"] == "The source conforms already."
+
+
+def test_fit_to_a_recording_returns_its_values(client: TestClient) -> None:
+    truth = {"model": {"name": "hunt_crossley"}, "drop": {"height": 0.9}}
+    truth |= {"hunt_crossley": {"contact_time": 0.019, "restitution": 0.75}}
+    impact = compute(new_case(truth))
+    rate, length = 44100, 44100 // 3
+    force = np.random.default_rng(1).normal(scale=0.3, size=length)
+    force[length // 2 :][: len(impact.time)] += impact.floor_force[: length // 2]
+    fields = {"name": "drop.csv", "height": 0.9, "mass": 2.5}
+    start = truth | {"hunt_crossley": {"contact_time": 0.021, "restitution": 0.8}}
+    form = form_of(table_of(force, rate), {**fields, "case": json.dumps(start)})
+    answer = last_report(client, "/fit", **form)["answer"]
+    fitted = answer["values"]["hunt_crossley"]
+    assert fitted["contact_time"] == pytest.approx(0.019, rel=0.01)
+    assert fitted["restitution"] == pytest.approx(0.75, abs=0.01)
+    assert answer["values"]["drop"] == {"height": 0.9}
+    assert answer["text"].startswith("Fitted to drop.csv: contact time 0.019 (")
+    modes = {"model": {"name": "measured_modes"}}
+    form = form_of(table_of(force, rate), {**fields, "case": json.dumps(modes)})
+    assert (
+        "no parameters that a recording determines" in last_report(client, "/fit", **form)["error"]
+    )
+    form = form_of(table_of(force, rate), {**fields, "case": "[]"})
+    assert client.post("/fit", **form).status_code == 400
 
 
 def test_sound_in_the_room_is_that_of_the_case(client: TestClient) -> None:
@@ -898,7 +980,7 @@ def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> 
     assert call(client, leaving_after())[0]["status"] == 400
 
 
-@pytest.mark.parametrize("path", ["/solve", "/download/report.html"])
+@pytest.mark.parametrize("path", ["/solve", "/download/case.py"])
 def test_page_that_leaves_while_it_waits_ends_its_work(path: str) -> None:
     application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",), width=1)
     ended = []

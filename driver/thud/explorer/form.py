@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
@@ -51,6 +52,12 @@ def form() -> list[dict[str, Any]]:
     floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
     room = _options("room", "room", OPTIONAL_GROUPS["room"])
     return [*groups, *models, *floors, room]
+
+
+@cache
+def fields_by_key() -> dict[tuple[str, str], dict[str, Any]]:
+    """Return the fields of the page by group and key."""
+    return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
 
 
 def construction_form() -> list[dict[str, Any]]:

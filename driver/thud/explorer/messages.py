@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from thud.base.errors import InputError
 from thud.base.units import scaled
 from thud.case.keys import humanize
-from thud.explorer.form import form
+from thud.explorer.form import fields_by_key
 from thud.explorer.recording_fields import recording_field_of
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ def describe_error(error: BaseException) -> dict[str, Any]:
 def field_of(message: str) -> str | None:
     """Return the field that a message of the library begins with, as ``group.name``."""
     match = _KEY.match(message)
-    field = _fields().get((match[1], match[2])) if match else None
+    field = fields_by_key().get((match[1], match[2])) if match else None
     return f"{field['group']}.{field['name']}" if field else None
 
 
@@ -48,7 +47,7 @@ def in_words(message: str) -> str:
 89 mm'
     """
     match = _KEY.match(message)
-    first = _fields().get((match[1], match[2])) if match else None
+    first = fields_by_key().get((match[1], match[2])) if match else None
     if match and first:
         message = _with_range(message, first)
         message = _in_unit(message[match.end() :], first)
@@ -58,19 +57,13 @@ def in_words(message: str) -> str:
     return _KEY.sub(_label, message)
 
 
-@cache
-def _fields() -> dict[tuple[str, str], Field]:
-    """Return the fields of the page by group and key."""
-    return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
-
-
 def _label(match: re.Match[str]) -> str:
     """Return the label of a key in a sentence."""
-    field = _fields().get((match[1], match[2]))
-    return _lower(field["label"]) if field else match[0]
+    field = fields_by_key().get((match[1], match[2]))
+    return lower(field["label"]) if field else match[0]
 
 
-def _lower(label: str) -> str:
+def lower(label: str) -> str:
     """Return a label for the middle of a sentence."""
     is_name = label.startswith(("Young", "Poisson"))
     return label if is_name else label[:1].lower() + label[1:]
@@ -78,9 +71,9 @@ def _lower(label: str) -> str:
 
 def _with_labels(text: str, group: str) -> str:
     """Return a text with labels in place of the keys of a group that are more than a word."""
-    for (other, name), field in _fields().items():
+    for (other, name), field in fields_by_key().items():
         if other == group and "_" in name:
-            text = re.sub(rf"(?<!\w){name}(?!\w)", _lower(field["label"]), text)
+            text = re.sub(rf"(?<!\w){name}(?!\w)", lower(field["label"]), text)
     return text
 
 
@@ -118,8 +111,8 @@ def _bound(text: str, field: Field, words: str) -> str:
     name, _, number = text.rpartition(" = ")
     if not re.fullmatch(_NUMBER, number):
         return f"{words} {text}"
-    other = _fields().get((field["group"], name))
-    label = f"{_lower(other['label']) if other else name}, " if name else ""
+    other = fields_by_key().get((field["group"], name))
+    label = f"{lower(other['label']) if other else name}, " if name else ""
     unit = f" {field['unit']}" if field["unit"] else ""
     return f"{words} {label}{_scaled(number, field['power'])}{unit}"
 

@@ -25,6 +25,8 @@ _BALL = (
     "outer_radius", "wall_thickness", "youngs_modulus", "poisson_ratio", "gauge_pressure",
     "ambient_pressure", "heat_capacity_ratio",
 )  # fmt: skip
+# Parameters of a rubber ball that a maker can change.
+_MADE = ("youngs_modulus", "wall_thickness", "outer_radius", "mass")
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,10 @@ class Facts:
         Function that returns the case with whose values the page begins; None: the defaults.
     unused : tuple of str
         Keys that all models have, but which have no effect on this one.
+    tuned : tuple of str
+        Parameters of a source that may be changed so that it conforms.
+    fitted : tuple of str
+        Parameters that a recording determines.
     """
 
     title: str = ""
@@ -48,6 +54,8 @@ class Facts:
     validity: str = ""
     case: Callable[[], Case] | None = None
     unused: tuple[str, ...] = ()
+    tuned: tuple[str, ...] = ()
+    fitted: tuple[str, ...] = ()
 
     def data(self, name: str) -> dict[str, object]:
         """Return the facts of a model or a floor with a name, for the page."""
@@ -108,6 +116,8 @@ MODEL_FACTS = {
         "Octaves from 31.5 to 250 Hz; 500 Hz depends on the damping law. The modes are linear: "
         "1.6 MPa is an effective modulus.",
         standard_ball,
+        tuned=("loss_factor", *_MADE),
+        fitted=("youngs_modulus", "loss_factor"),
     ),
     "finite_element": Facts(
         "Finite elements",
@@ -115,11 +125,15 @@ MODEL_FACTS = {
         "Octaves from 31.5 to 250 Hz; 500 Hz varies by 2 dB with the damping law.",
         partial(input_case, "rubber_ball_fe.nml"),
         ("gauge_pressure",),
+        ("loss_factor", *_MADE),
+        ("youngs_modulus", "loss_factor"),
     ),
     "hollow_sphere": Facts(
         "Thin shell",
         "The analytical model of the paper: contact time and peak force",
         "Octaves 31.5 and 63 Hz; from 125 Hz on 4 to 5 dB too low, as a shell without modes.",
+        tuned=_MADE,
+        fitted=("youngs_modulus",),
     ),
     "two_mass": Facts(
         "Tyre: belt and rim",
@@ -127,6 +141,8 @@ MODEL_FACTS = {
         "Carcass and damping are chosen so that the tyre conforms: it shows effects of parts.",
         partial(input_case, "tyre.nml"),
         _BALL,
+        ("belt_mass", "belt_frequency", "carcass_stiffness", "contact_damping", "mass"),
+        ("carcass_stiffness", "contact_damping"),
     ),
     "measured_modes": Facts(
         "Measured modes",
@@ -141,6 +157,8 @@ MODEL_FACTS = {
         "A baseline: contact time and restitution do not determine the levels.",
         partial(input_case, "tyre_one_mass.nml"),
         _BALL,
+        ("contact_time", "restitution", "exponent", "mass"),
+        ("contact_time", "restitution"),
     ),
 }
 FLOOR_FACTS = {

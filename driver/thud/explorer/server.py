@@ -103,6 +103,8 @@ def new_application(
                     ("/about", _about, ["GET"]),
                     ("/solve", _solve, ["POST"]),
                     ("/measure", _measure, ["POST"]),
+                    ("/improve", _improve, ["POST"]),
+                    ("/fit", _fit, ["POST"]),
                     ("/download/{name}", _download, ["POST"]),
                 )
             ),
@@ -162,6 +164,17 @@ async def _solve(request: Request) -> Response:
 
 async def _measure(request: Request) -> Response:
     return await _with_files(request, "recording", lambda form: (recording_table(form),))
+
+
+async def _improve(request: Request) -> Response:
+    reports = request.app.state.slow.run("improve", await _values(request))
+    return _Reports(reports, AsyncExitStack())
+
+
+async def _fit(request: Request) -> Response:
+    return await _with_files(
+        request, "fit", lambda form: (recording_table(form), _groups(form.get("case", "")))
+    )
 
 
 async def _with_files(
@@ -324,8 +337,13 @@ async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None
 
 async def _values(request: Request) -> dict[str, dict[str, Any]]:
     """Return the values in the body of a request, by group and key."""
+    return _groups(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+
+
+def _groups(content: bytes | str) -> dict[str, dict[str, Any]]:
+    """Return the values of JSON, by group and key."""
     try:
-        values = json.loads(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+        values = json.loads(content)
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
     if not isinstance(values, dict):
