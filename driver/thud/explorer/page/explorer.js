@@ -197,8 +197,14 @@ function showAll() {
   showSounds(hasRoom ? variants : [], showError);
   if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
   if (door === "ball" && own.answer.headline.result !== "conforms") byId("next").append(button("Smallest change that conforms", improve, { id: "improve" }));
-  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").textContent = fitted.text;
+  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted.text));
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
+}
+
+/** Return the result of a fit, and its details folded. */
+function fitTexts(text) {
+  const [, first, rest] = text.match(/^(.*?\)\.) ?(.*)$/s) ?? [null, text, ""];
+  return [element("p", {}, first), ...(rest ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, rest))] : [])];
 }
 
 /** Show the door without an answer. */
@@ -398,16 +404,16 @@ async function improve() {
   const asked = byId("improve");
   asked.disabled = true;
   try {
-    const { changes, none } = await runTask("Looking for a change that conforms", "improve", JSON.stringify(caseValues("ball")), new AbortController(), { showNow: true });
-    const apply = ({ key, to }) => {
+    const { changes, none, note } = await runTask("Looking for a change that conforms", "improve", JSON.stringify(caseValues("ball")), new AbortController(), { showNow: true });
+    const apply = ({ key, value }) => {
       const [group, name] = key.split(".");
       const values = caseValues("ball");
-      (values[group] ??= {})[name] = to;
+      (values[group] ??= {})[name] = value;
       takeValues(values);
       openDoor("ball");
     };
     const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
-    byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none));
+    byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
   } catch (error) { showError(error); } finally { asked.disabled = false; }
 }
 

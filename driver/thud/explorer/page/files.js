@@ -16,9 +16,10 @@ function svgText(host) {
   try {
     const image = imageOf(contentOf(host), WIDTH, HEIGHT);
     place.append(image);
-    for (const part of image.querySelectorAll("*")) {
-      const style = getComputedStyle(part);
-      for (const name of PROPERTIES) part.style.setProperty(name, style.getPropertyValue(name));
+    const parts = [...image.querySelectorAll("*")];
+    const styles = parts.map((part) => PROPERTIES.map((name) => getComputedStyle(part).getPropertyValue(name)));
+    for (const [i, part] of parts.entries()) {
+      PROPERTIES.forEach((name, k) => part.style.setProperty(name, styles[i][k]));
       part.removeAttribute("class");
     }
     for (const hidden of image.querySelectorAll("[visibility=hidden]")) hidden.remove();
@@ -86,28 +87,25 @@ export async function fileOf(name, values) {
 }
 
 const STYLE = `:root { color-scheme: light; } body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 60rem; padding: 0 1rem; color: #1b1d1f; background: #fff; }
-h1 { font-size: 1.4rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 .4rem; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { border-bottom: 1px solid #dcdfe2; padding: .2rem .9rem .2rem 0; text-align: right; } th:first-child { text-align: left; } .scroll { overflow-x: auto; }
-svg { max-width: 100%; height: auto; } small { color: #565c62; } .conforms { color: #00583f; } .fails { color: #9a2c00; } .undecided { color: #6b4a00; }`;
+h1 { font-size: 1.4rem; } h2 { font-size: 1.1rem; margin: 1.6rem 0 .4rem; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; } caption { text-align: left; font-weight: 600; padding-top: .6rem; }
+th, td { border-bottom: 1px solid #dcdfe2; padding: .2rem .9rem .2rem 0; text-align: right; } th:first-child { text-align: left; } tbody th { font-weight: 400; } .scroll { overflow-x: auto; }
+figure { margin: 1rem 0; } figcaption { font-weight: 600; } svg { max-width: 100%; height: auto; } small { color: #565c62; } td small { display: block; } .curve { stroke-width: 2; }
+.conforms { color: #00583f; } .fails { color: #9a2c00; } .undecided { color: #6b4a00; }`;
 
 /** Return a page of its own with headline, inputs, criteria, plots and warnings of all variants. */
 export function pageOf(variants, version) {
   const page = document.implementation.createHTMLDocument("thud");
-  page.head.append(element("meta", { charset: "utf-8" }), element("meta", { name: "viewport", content: "width=device-width, initial-scale=1" }), element("style", {}, STYLE));
   const table = (id) => {
     const copy = byId(id).cloneNode(true);
     copy.removeAttribute("id");
+    const [lines, copies] = [byId(id), copy].map((part) => [...part.querySelectorAll(".swatch .curve")]);
+    copies.forEach((line, i) => { for (const name of ["stroke", "stroke-dasharray"]) line.setAttribute(name, getComputedStyle(lines[i]).getPropertyValue(name)); });
     for (const control of copy.querySelectorAll("button")) control.replaceWith(control.classList.contains("remove") ? "" : control.textContent);
     return element("div", { class: "scroll" }, copy);
   };
   const plots = [...document.querySelectorAll(".plot")].filter((host) => host.clientWidth);
-  const figures = plots.map((host) => {
-    const figure = element("figure", {}, element("figcaption", {}, contentOf(host).title));
-    figure.insertAdjacentHTML("beforeend", svgText(host));
-    return figure;
-  });
+  const figures = plots.map((host) => element("figure", {}, element("figcaption", {}, contentOf(host).title), element("slot", { name: host.id })));
   const [first] = variants;
-  page.title = `thud: ${first.label}`;
   page.body.append(
     element("h1", { class: first.answer.headline.result }, `${first.label}: ${first.answer.headline.text}`), element("p", {}, first.answer.headline.detail ?? ""),
     ...(variants.length > 1 ? [element("h2", {}, "Comparison"), table("variants")] : []),
@@ -120,5 +118,8 @@ export function pageOf(variants, version) {
     ...variants.filter(({ answer }) => answer.warnings.length).flatMap(({ label, answer }) => [element("h2", {}, `Warnings: ${label}`), element("ul", {}, ...answer.warnings.map((text) => element("li", {}, text)))]),
     element("p", {}, element("small", {}, `thud ${version}, ${new Date().toISOString().slice(0, 10)}. Values not listed are the defaults.`)));
   for (const node of page.querySelectorAll("[title]")) node.removeAttribute("title");
-  return `<!doctype html>\n${page.documentElement.outerHTML}`;
+  // As text, since the policy of this page would forbid the styles of the other one.
+  const title = element("title", {}, `thud: ${first.label}`).outerHTML;
+  const body = plots.reduce((text, host) => text.replace(`<slot name="${host.id}"></slot>`, () => svgText(host)), page.body.outerHTML);
+  return `<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">${title}<style>${STYLE}</style></head>\n${body}</html>\n`;
 }

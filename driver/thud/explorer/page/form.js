@@ -5,6 +5,9 @@ import { button, byId, capitalize, element, scaled } from "./page.js";
 export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
 export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {} };
 
+// Digits of a number in its field.
+const DIGITS = 6;
+
 const groupsOf = (part) => about.form.filter((group) => group.part === part);
 const commonGroups = () => about.form.filter((group) => group.part === group.name && group.part !== "room");
 const findGroup = (part, name) => groupsOf(part).find((group) => group.name === name);
@@ -286,7 +289,7 @@ function numberInput(field, id, onInput, onInvalid) {
   let current = scaled(valueOf(field), -field.power);
   // A zero that is not a number, such as "none", is an empty field.
   const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;]+)/) ?? [];
-  const textOf = (value) => (zero && value === 0 ? "" : value);
+  const textOf = (value) => (zero && value === 0 ? "" : Number(value.toPrecision(DIGITS)));
   const number = element("input", { id, type: "number", step: "any", value: textOf(current), placeholder: zero, class: zero && "open" });
   const send = (entered) => {
     const converted = scaled(entered, field.power);

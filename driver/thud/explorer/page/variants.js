@@ -1,5 +1,5 @@
 // Variants: what they are called, by what differs, and their table.
-import { button, byId, capitalize, element, rounded, scaled, signed } from "./page.js";
+import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
 import { STYLES, swatch } from "./plot.js";
 import { about, factsOf, findField, sorted } from "./form.js";
 
@@ -104,7 +104,7 @@ export function showVariants(variants, { remove, rename }) {
     const value = valueOf(variant);
     if (value === null || value === undefined) return element("td", {}, "–");
     const reference = valueOf(first);
-    const text = rounded(Number(value.toFixed(decimals)), "");
+    const text = minus(value.toFixed(decimals));
     if (variant === first || reference === null || reference === undefined) return element("td", {}, text);
     const difference = Number((value - reference).toFixed(decimals));
     return element("td", {}, text, element("small", {}, difference ? `${signed(difference, "dB", decimals)}` : "±0"));
@@ -113,7 +113,7 @@ export function showVariants(variants, { remove, rename }) {
     const name = element("button", { type: "button", class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` }, variant.label);
     name.addEventListener("click", () => renameIn(name, variant, rename));
     const result = variant.answer.headline.result;
-    return element("tr", {}, element("th", { scope: "row" }, swatch(variant.style), " ", name),
+    return element("tr", {}, element("th", { scope: "row" }, element("span", { class: "named" }, swatch(variant.style), name)),
       element("td", { class: result }, isRoom ? variant.answer.room.interval : { conforms: "conforms", fails: "does not conform", undecided: "undecided", level: variant.answer.verdict }[result]),
       ...columns.map((column) => cell(variant, column)),
       element("td", {}, i ? button("×", () => remove(variant), { class: "remove", "aria-label": `Remove ${variant.label}` }) : ""));
@@ -139,8 +139,8 @@ function renameIn(name, variant, rename) {
 
 function sourceColumns([first]) {
   const bands = first.answer.criteria.filter((criterion) => criterion.band).map((criterion, i) => [criterion.name.replace(" Hz", ""), ({ answer }) => answer.criteria[i].value, "dB", 1]);
-  const number = (title, name, unit, decimals) => [title, ({ answer }) => answer.numbers.find(([own]) => own === name)?.[1], unit, decimals];
-  return [...bands, number("Peak", "peak force", "N", 0), number("Contact", "contact time", "ms", 2)];
+  const number = (title, name, unit, decimals) => [title, ({ answer }) => answer.numbers.find(([own]) => name.test(own))?.[1], unit, decimals];
+  return [...bands, number("Peak", /^peak.* force/, "N", 0), number("Contact", /^contact time/, "ms", 2)];
 }
 
 function roomColumns([first]) {
