@@ -243,11 +243,29 @@ def test_wall_denser_than_any_material_is_refused(wall: float) -> None:
     new_case(values | {"model": {"name": "two_mass"}})
 
 
+@pytest.mark.parametrize("name", FLOORS)
+def test_floors_that_radiate_have_a_room(name: str) -> None:
+    (facts,) = (facts for facts in floor_facts() if facts["name"] == name)
+    values = {"model": {"name": "modal_ball"}, "floor": {"name": name}, "room": {"volume": 50.0}}
+    case = {**values, **facts["values"]}  # type: ignore[dict-item]
+    if facts["has_room"]:
+        assert answer_case(new_case(case))["headline"]["result"] == "level"
+    else:
+        assert "has no plate" in error_of(case)["error"]
+
+
+def test_lengths_that_may_be_zero_are_in_the_unit_of_their_maximum() -> None:
+    for name in ("screed_thickness", "subceiling_thickness"):
+        field = FIELDS["plate", name]
+        assert (field["unit"], field["power"]) == ("mm", -3)
+        assert field["slider"]["ends"][0] == 0
+
+
 def test_steps_of_fields_are_powers_of_ten() -> None:
     expected = {
         ("ball", "wall_thickness"): 1, ("ball", "mass"): 0.1, ("ball", "youngs_modulus"): 0.1,
         ("drop", "height"): 0.01, ("plate", "thickness"): 10, ("modal_ball", "loss_factor"): 0.001,
-        ("sampling", "substeps"): 1,
+        ("sampling", "substeps"): 1, ("plate", "screed_thickness"): 10, ("room", "length"): 0.1,
     }  # fmt: skip
     assert {key: FIELDS[key]["step"] for key in expected} == pytest.approx(expected)
     assert all(field["advanced"] for (group, _), field in FIELDS.items() if group == "mesh")

@@ -29,6 +29,11 @@ MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
 INSET = 0.01
 # Number of steps from zero to a value, at least.
 STEPS = 15
+# Steps of fields whose default is 0, by the unit of the key.
+STEPS_OF_UNITS = {
+    "m": 0.1, "m3": 1.0, "dB": 1.0, "kg/m2": 1.0, "s": 0.001, "s/m": 0.01, "Pa": 1000.0,
+    "Hz": 100.0,
+}  # fmt: skip
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Groups of keys that are not on the page.
 OMITTED_GROUPS = ("case", "modes", "compression", "output")
@@ -117,20 +122,21 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "condition": condition_of(key),
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
-        # Times remain in seconds: a reverberation time of 500 ms would be unusual.
-        unit = key.unit if key.unit == "s" else display_unit(key.unit, default)[0]
+        unit = _unit(key, default)
         power = power_of(unit or "1", key.unit, key.name)
         suffix = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
         allowed = f"allowed: {_limit(key.lower, power)} to {_limit(key.upper, power)}{suffix}"
         value, lower, upper = (_converted(x, power) for x in (default, key.lower, key.upper))
+        ends = lower, upper, MAX_LENGTH if default else scaled(MAX_LENGTH, -power)
+        is_whole = key.kind == "whole"
         field |= {
             "unit": _typeset(unit),
             "power": power,
             "lower": lower,
             "upper": upper,
             "help": f"{'' if meaning == label else meaning + '; '}{allowed.rstrip()}",
-            "step": _step(value or 0.0, lower, upper, whole=key.kind == "whole"),
-            "slider": _slider(value or 0.0, lower, upper, whole=key.kind == "whole"),
+            "step": 1 if is_whole else _step(key.unit, value or 0.0, *ends),
+            "slider": _slider(value or 0.0, *ends, whole=is_whole),
         }
     return field
 
@@ -162,23 +168,35 @@ def _limit(limit: float | str, power: int) -> str:
     return re.sub(r"1e\+0?(\d+)", lambda match: "10" + match[1].translate(_SUPERSCRIPTS), number)
 
 
-def _step(value: float, lower: float | None, upper: float | None, *, whole: bool) -> float | None:
+def _unit(key: Key, default: float) -> str:
+    """Return the unit of the field of a key."""
+    # Times remain in seconds: a reverberation time of 500 ms would be unusual.
+    if key.unit == "s":
+        return key.unit
+    # Lengths that may be 0 have the unit of their maximum.
+    size = (
+        key.upper if key.unit == "m" and not default and not isinstance(key.upper, str) else default
+    )
+    return display_unit(key.unit, size)[0]
+
+
+def _step(
+    unit: str, value: float, lower: float | None, upper: float | None, max_length: float
+) -> float | None:
     """Return a power of ten by which arrow keys change a value; None if no size is known."""
-    length = abs(value)
-    if not length and lower is not None and upper is not None and upper - lower <= MAX_LENGTH:
-        length = upper - lower
-    if whole:
-        return 1
-    return 10.0 ** math.floor(math.log10(length / STEPS)) if length else None
+    size = abs(value)
+    if not size and lower is not None and upper is not None and upper - lower <= max_length:
+        size = upper - lower
+    return 10.0 ** math.floor(math.log10(size / STEPS)) if size else STEPS_OF_UNITS.get(unit)
 
 
 def _slider(
-    value: float, lower: float | None, upper: float | None, *, whole: bool
+    value: float, lower: float | None, upper: float | None, max_length: float, *, whole: bool
 ) -> dict[str, Any] | None:
     """Return ends and scale of a slider around a value; None if there is no range for a slider."""
     if lower is not None and upper is not None and lower >= 0:
         length = upper - lower
-        if length <= MAX_LENGTH and (value <= 0 or value >= lower + MIN_FRACTION * length):
+        if length <= max_length and (value <= 0 or value >= lower + MIN_FRACTION * length):
             # The limits may not be allowed values, but the default is.
             inner = lower + INSET * length, upper - INSET * length
             return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}

@@ -47,6 +47,8 @@ class Facts:
         Parameters of a source that may be changed so that it conforms.
     fitted : tuple of str
         Parameters that a recording determines.
+    has_room : bool
+        Whether a room below a floor can be predicted.
     """
 
     title: str = ""
@@ -56,6 +58,7 @@ class Facts:
     unused: tuple[str, ...] = ()
     tuned: tuple[str, ...] = ()
     fitted: tuple[str, ...] = ()
+    has_room: bool = True
 
     def data(self, name: str) -> dict[str, object]:
         """Return the facts of a model or a floor with a name, for the page."""
@@ -65,6 +68,7 @@ class Facts:
             "purpose": self.purpose,
             "validity": self.validity,
             "values": self._values(),
+            "has_room": self.has_room,
         }
 
     def _values(self) -> Values:
@@ -163,7 +167,10 @@ MODEL_FACTS = {
 }
 FLOOR_FACTS = {
     "rigid": Facts(
-        "Rigid test floor", "The floor on which the standards assess a source", "It does not move."
+        "Rigid test floor",
+        "The floor on which the standards assess a source",
+        "It does not move.",
+        has_room=False,
     ),
     "plate": Facts(
         "Plate",
@@ -184,11 +191,13 @@ FLOOR_FACTS = {
         "Infinite plate",
         "The mean of a floor: a resistance without reflections",
         "Force only: no level in a room below.",
+        has_room=False,
     ),
     "oscillator": Facts(
         "Oscillator",
         "A floor with one resonance, such as a mock-up",
         "Force only: no level in a room below.",
+        has_room=False,
     ),
     "measured_mobility": Facts(
         "Measured mobility",
