@@ -4,9 +4,9 @@ import { ConnectionError, ServerError, ask, follow, fragment, getAbout } from ".
 import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms, showWarnings } from "./results.js";
 import { STORE, firstAnswer } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
-import { about, caseValues, isCase, markField, sorted, state, takeValues } from "./form.js";
+import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
 import { addFiles, buildDoor, recording, recordingBody, reportButton, showAsks } from "./recording.js";
-import { freeStyle, inputRows, nameVariants, showVariants } from "./variants.js";
+import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
 

@@ -7,7 +7,7 @@ export const recording = { files: [] };
 
 /** Build the form of the recording; `onChange` is called when it has to be assessed again. */
 export function buildRecording(onChange) {
-  const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, `recording_${field.name}`, onChange));
+  const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, onChange));
   byId("inputs").replaceChildren(
     element("div", { id: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
       element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS")),
@@ -43,19 +43,19 @@ function showFiles(onChange) {
     }, { class: "remove", "aria-label": `Remove ${file.name}` }))));
 }
 
-function recordingField({ name, label, kind, hint, choices }, id, onChange) {
+function recordingField({ name, label, kind, hint, choices }, onChange) {
+  const id = `recording_${name}`;
   const options = Object.entries({ "": "not known", ...choices }).map(([value, text]) => element("option", { value }, text));
   const isNumber = kind === "number";
   const input = kind === "choice" ? element("select", { id }, ...options)
     : element("input", { id, type: isNumber ? "number" : "text", step: isNumber && "any", "aria-describedby": `${id}.error` });
   input.value = state.recording[name] ?? "";
-  input.addEventListener("change", () => {
+  // A file may be dropped while the field still has the focus.
+  input.addEventListener("input", () => {
     if (input.value) state.recording[name] = input.value;
     else delete state.recording[name];
-    const twin = byId(`recording_${name}`);
-    if (twin) twin.value = input.value;
-    if (recording.files.length) onChange();
   });
+  input.addEventListener("change", () => { if (recording.files.length) onChange(); });
   return element("div", { class: "field" }, element("label", { for: id }, label + hint), input, element("p", { class: "error", id: `${id}.error` }));
 }
 
@@ -75,13 +75,16 @@ export function showAsks(asks, onChange) {
   place.hidden = !open.length;
   place.replaceChildren(...open.map(({ reason, values }) => {
     const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
-    const inputs = fields.map((field) => recordingField(field, `ask_${field.name}`, () => {}));
-    for (const { name } of fields) inputs.find((input) => input.querySelector(`#ask_${name}`)).querySelector("input, select").value = state.recording[name] ?? values[name];
+    const inputs = fields.map(({ name, label }) => {
+      const id = `ask_${name}`;
+      const input = element("input", { id, type: "number", step: "any", value: state.recording[name] ?? values[name] });
+      return element("div", { class: "field" }, element("label", { for: id }, label), input);
+    });
     return element("div", {}, element("p", {}, reason), ...inputs, button("Assess with this", () => {
       for (const { name } of fields) {
         const { value } = byId(`ask_${name}`);
         if (value) state.recording[name] = value;
-        if (byId(`recording_${name}`)) byId(`recording_${name}`).value = value;
+        byId(`recording_${name}`).value = value;
       }
       onChange();
     }, { class: "strong" }));
