@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
     from thud.impact.floor_impact import FloorImpact
     from thud.impact.impact import Impact
-    from thud.level.assessment import Criterion
+    from thud.level.assessment import Criterion, Verdict
     from thud.level.impact_result import ImpactResult
 
     Answer = dict[str, Any]
@@ -99,7 +99,8 @@ def answer_case(case: Case) -> Answer:
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
     force = case.levels.force
-    answer = common_answer(impact, *contact_force(impact, force))
+    assessed = impact.assess()
+    answer = common_answer(impact, assessed, *contact_force(impact, force))
     answer["force"]["title"] = FORCE_NAMES[force]
     answer["warnings"] += impact.warnings
     error = float(impact.numerical_error.level.max())
@@ -107,7 +108,7 @@ def answer_case(case: Case) -> Answer:
     if not math.isnan(error):
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
     verdict = assess_impact(impact)
-    answer["headline"] = source_headline(impact.assess(), verdict)
+    answer["headline"] = source_headline(assessed, verdict)
     if verdict:
         answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}
         answer["warnings"] += verdict.warnings
@@ -129,10 +130,12 @@ def answer_case(case: Case) -> Answer:
 
 
 def common_answer(
-    source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64]
+    source: ImpactResult,
+    verdict: Verdict,
+    times: NDArray[np.float64],
+    force: NDArray[np.float64],
 ) -> Answer:
     """Return the entries that all answers have; times are in ms, and `force` is in kN."""
-    verdict = source.assess()
     return {
         "force": curve(times, 1e3 * force),
         "levels": {

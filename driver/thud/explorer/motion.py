@@ -33,6 +33,8 @@ DECIMALS = 1
 # Free modes of the section of a modal ball, and elements of their mesh.
 MODES = 12
 MESH = Modes(MODES, radial_elements=2, polar_elements=24)
+# Minimum amplitude of the lowest point of an excited mode, relative to its maximum.
+MIN_AMPLITUDE = 1e-6
 # Number of contact radii for which the forces on the modes are tabulated.
 RADII = 24
 
@@ -173,8 +175,9 @@ def _modal_section(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
         ball.outer_radius, ball.wall_thickness, ball.mass, ball.youngs_modulus, ball.poisson_ratio
     )
     pole = modes.shape[:, 0, -1, 1]
-    # Shapes of unit modal mass.
-    scale = np.sqrt(modes.participation / ball.mass) / pole
+    # Shapes of unit modal mass; a mode whose lowest point rests is not excited.
+    moves = np.abs(pole) > MIN_AMPLITUDE
+    scale = np.sqrt(modes.participation / ball.mass) / np.where(moves, pole, np.inf)
     shapes = modes.shape * scale[:, None, None, None]
     loads = _loads(modes.start[:, -1, 0], shapes[:, :, -1, 1], impact, ball.outer_radius)
     omega = 2 * math.pi * modes.frequency
@@ -219,12 +222,8 @@ def _loads(distance: Array, upward: Array, impact: Impact, radius: float) -> Arr
     # Midpoints of rings of equal force below Hertz's pressure.
     fractions = (np.arange(16) + 0.5) / 16
     rings = np.sqrt(1 - (1 - fractions) ** (2 / 3))
-    table = np.array(
-        [
-            [np.interp(a * rings, distance[lower], row[lower]).mean() for a in radii]
-            for row in upward
-        ]
-    )
+    points = np.outer(radii, rings)
+    table = [np.interp(points, distance[lower], row[lower]).mean(axis=1) for row in upward]
     contact = impact.model_histories["contact_radius_m"]
     return np.array([impact.floor_force * np.interp(contact, radii, row) for row in table])
 

@@ -42,11 +42,12 @@ def answer_recording(
     """
     start = time.perf_counter()
     recording, in_words = read_copies(paths, names, table)
-    answer = common_answer(recording, *contact_force(recording, "floor"))
+    verdict = recording.assess()
+    answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
     for entry, row in zip(answer["criteria"], criteria_data(recording), strict=True):
         entry["value_text"] = value_text(row)
         entry["uncertainty_text"] = expanded_text(row)
-    answer["headline"] = source_headline(recording.assess(), None)
+    answer["headline"] = source_headline(verdict, None)
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording)
     # The page shows the name of a single file next to its warnings.
