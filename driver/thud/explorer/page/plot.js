@@ -20,7 +20,7 @@ const watcher = new ResizeObserver((entries) => entries.forEach((entry) => redra
  * `content` has a title and either `rows` of bars, [title, low, high], or `curves`. These have name,
  * style, x, y and the options `marks`, `thin` and `ends` ([low, high] of each value). The axes `x`
  * and `y` have a title and a unit; `x.bands` is a list of names of bands. `limits` are [lower, upper]
- * of each band, and `missed` says which of them the first curve exceeds. With `hasCursor` the first
+ * of each band, and `results` are those of the first curve. With `hasCursor` the first
  * curve has the cursor of `setCursor`.
  */
 export function plot(host, content) {
@@ -113,7 +113,7 @@ function drawCurves(content, width, height) {
   const toY = (value) => box.bottom - ((value - up[0]) / (up[1] - up[0])) * (box.bottom - box.top);
   const image = svgElement("svg", { width, height, role: "img", "aria-label": describeCurves(content) });
   for (const [i, [lower, upper]] of (content.limits ?? []).entries())
-    image.append(svgElement("rect", { class: content.missed?.[i] ? "limits missed" : "limits", x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
+    image.append(svgElement("rect", { class: `limits ${content.results?.[i] ?? ""}`, x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
   for (const value of marksUp) {
     image.append(svgElement("line", { class: value === 0 ? "axis" : "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }));
     image.append(svgElement("text", { class: "quiet", x: box.left - 5, y: toY(value) + 4, "text-anchor": "end" }, minus(value)));

@@ -2,6 +2,7 @@
 import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
 import { interpolate, plot, swatch } from "./plot.js";
 
+const RESULTS = { conforms: "conforms", inconclusive: "undecided" };
 const SIGNS = { conforms: "✓", fails: "✕", undecided: "?", level: "" };
 // Uncertainties that are smaller are not drawn, dB.
 const MIN_UNCERTAINTY = 0.02;
@@ -33,6 +34,12 @@ function endsOf({ value, uncertainty, range }) {
   return uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : [];
 }
 
+/** Return whether a range lies within the limits, outside, or both. */
+function resultOf([low, high], { lower, upper }) {
+  if (low >= lower && high <= upper) return "conforms";
+  return high < lower || low > upper ? "fails" : "undecided";
+}
+
 /** Show force and levels of variants; options: third octaves, and differences to the first variant. */
 export function showForces(variants, { thirds, differences }) {
   const isDifference = differences && variants.length > 1;
@@ -55,7 +62,7 @@ export function showForces(variants, { thirds, differences }) {
     x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
     y: { title: isDifference ? `Difference to ${first.label}` : "Level", unit: "dB", reference: isDifference ? "" : " re 1 N", zero: isDifference },
     limits: thirds || isDifference ? undefined : octaves.map((criterion) => [criterion.lower, criterion.upper]),
-    missed: octaves.map((criterion) => criterion.verdict !== "conforms"),
+    results: octaves.map((criterion) => (endsOf(criterion).length && first.answer.model_verdict ? resultOf(endsOf(criterion), criterion) : RESULTS[criterion.verdict] ?? "fails")),
   });
   const curves = shown.flatMap((variant) => {
     const { force, floor } = variant.answer;
@@ -124,7 +131,7 @@ function missedSide(criterion) {
 export function showCriteria(variants) {
   const cell = (criterion) => {
     const text = criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
-    const value = element("td", { class: `value ${{ conforms: "conforms", inconclusive: "undecided" }[criterion.verdict] ?? "fails"}` }, text);
+    const value = element("td", { class: `value ${RESULTS[criterion.verdict] ?? "fails"}` }, text);
     if (criterion.uncertainty && !criterion.range) {
       const uncertainty = criterion.uncertainty_text ?? Number(criterion.uncertainty.toPrecision(2));
       value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertainty}`));
