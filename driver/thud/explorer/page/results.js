@@ -34,8 +34,11 @@ function endsOf({ value, uncertainty, range }) {
   return uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : [];
 }
 
-/** Return whether a range lies within the limits, outside, or both. */
-function resultOf([low, high], { lower, upper }) {
+/** Return the result of a criterion; with the range of a model, that over the range. */
+function resultOf(criterion) {
+  const { lower, upper, range, verdict } = criterion;
+  const [low, high] = range ? endsOf(criterion) : [];
+  if (low === undefined) return RESULTS[verdict] ?? "fails";
   if (low >= lower && high <= upper) return "conforms";
   return high < lower || low > upper ? "fails" : "undecided";
 }
@@ -62,7 +65,7 @@ export function showForces(variants, { thirds, differences }) {
     x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
     y: { title: isDifference ? `Difference to ${first.label}` : "Level", unit: "dB", reference: isDifference ? "" : " re 1 N", zero: isDifference },
     limits: thirds || isDifference ? undefined : octaves.map((criterion) => [criterion.lower, criterion.upper]),
-    results: octaves.map((criterion) => (endsOf(criterion).length && first.answer.model_verdict ? resultOf(endsOf(criterion), criterion) : RESULTS[criterion.verdict] ?? "fails")),
+    results: octaves.map(resultOf),
   });
   const curves = shown.flatMap((variant) => {
     const { force, floor } = variant.answer;
@@ -131,7 +134,7 @@ function missedSide(criterion) {
 export function showCriteria(variants) {
   const cell = (criterion) => {
     const text = criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
-    const value = element("td", { class: `value ${RESULTS[criterion.verdict] ?? "fails"}` }, text);
+    const value = element("td", { class: `value ${resultOf(criterion)}` }, text);
     if (criterion.uncertainty && !criterion.range) {
       const uncertainty = criterion.uncertainty_text ?? Number(criterion.uncertainty.toPrecision(2));
       value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertainty}`));
