@@ -2,7 +2,7 @@
 import { byId, button, element, saveFile } from "./page.js";
 import { ConnectionError, ServerError, ask, follow, fragment, getAbout } from "./request.js";
 import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms, showWarnings } from "./results.js";
-import { STORE, firstAnswer } from "./first.js";
+import { STORE, firstVariant } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
 import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
 import { addFiles, buildDoor, recording, recordingBody, reportButton, showAsks } from "./recording.js";
@@ -109,6 +109,7 @@ async function solve() {
     hideMessage();
     setOutdated(false, thisJob.repeat);
     showAll();
+    commitSoon();
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
@@ -320,8 +321,9 @@ const withoutMotion = (variant) => ({ ...variant, answer: { ...variant.answer, m
 
 /** Store case and variants in this browser; without room for the answers, only the case. */
 function store() {
-  const entry = { start: JSON.stringify(about.start), state, kept: kept.map(withoutMotion) };
-  for (const content of [entry, { ...entry, kept: [] }]) {
+  const own = current[state.door];
+  const entry = { start: JSON.stringify(about.start), state, shown: own?.values ? withoutMotion(own) : null, kept: kept.map(withoutMotion) };
+  for (const content of [entry, { ...entry, shown: null, kept: [] }]) {
     try {
       localStorage.setItem(STORE, JSON.stringify(content));
       return;
@@ -480,8 +482,7 @@ async function main() {
   listen();
   const link = fragment.get("case");
   const door = DOORS.find((name) => fragment.has(name));
-  // The answer that the page contains lacks the motion.
-  if (firstAnswer) current.ball = { door: "ball", style: 0, values: firstAnswer.values, answer: firstAnswer.answer, isPartial: true };
+  if (firstVariant) current[firstVariant.door] = firstVariant;
   const isRestored = link === null && restoreStored();
   if (isRestored) openDoor(door ?? state.door);
   else begin(about.start);
