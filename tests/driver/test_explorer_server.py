@@ -187,7 +187,7 @@ def test_heads_have_a_time() -> None:
 def test_answers_have_to_be_read() -> None:
     before = "from thud.explorer import connections; connections.HEAD_TIME = 0.5"
     count = 20_000
-    ask = b"GET /page/page.js HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * count
+    ask = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * count
     read = 0
     with serve(before=before) as server:
         host, port, _ = place_of(server[0])
@@ -197,7 +197,7 @@ def test_answers_have_to_be_read() -> None:
             time.sleep(5)
             while part := connection.recv(2**20):
                 read += len(part)
-    assert read < count * 1000
+    assert read < count * 10_000
 
 
 def test_version_6_of_this_machine_is_served() -> None:

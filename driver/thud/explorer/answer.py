@@ -1,62 +1,57 @@
-"""Results of a case or a recording for the page, as data for JSON."""
+"""Results of a case for the page, as data for JSON."""
 
 from __future__ import annotations
 
 import math
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
-from thud.base.checks import refuse, shown
-from thud.base.errors import ThudError
+from thud.base.checks import refuse
 from thud.case.case import tables_case
 from thud.case.keys import humanize
-from thud.explorer.recording_fields import name_fields
+from thud.explorer.criteria import criterion_facts, room_headline, source_headline
+from thud.explorer.messages import in_words
+from thud.explorer.models import MODEL_FACTS
+from thud.explorer.motion import motion_of
+from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
-from thud.impact.floor_impact import FloorImpact
 from thud.level.estimate import NUMERICAL_ERROR
-from thud.level.levels import get_bands
+from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import class_text
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
-from thud.recordings.config import config_from
-from thud.recordings.read_recording import read_recording
-from thud.report.contents import criteria_data
-from thud.report.rows import expanded_text, value_text
+from thud.report.predicted_floor import contribution_title
 from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
+    from thud.base._schema import LimitsSource
     from thud.case.case import Case
     from thud.floors.prediction import RoomPrediction
+    from thud.impact.floor_impact import FloorImpact
     from thud.impact.impact import Impact
-    from thud.level.assessment import Criterion
+    from thud.level.assessment import Criterion, Verdict
     from thud.level.impact_result import ImpactResult
 
     Answer = dict[str, Any]
 
-# Maximum number of points of a curve on the page, and of instants of an animation.
-MAX_POINTS = 400
-MAX_INSTANTS = 60
 # Time between instants of finite elements, s.
 SNAPSHOT_INTERVAL = 1e-3
 # Maximum number of samples of a record.
 MAX_SAMPLES = 200_000
 # Maximum estimated duration of a computation while a slider moves, s.
 MAX_QUICK_TIME = 0.1
-# Length of the displayed time range divided by the contact time.
-TIME_RANGE = 1.05
-# Significant digits of curves.
-DIGITS = 6
+# Maximum density of a wall, kg/m3: that of the densest metal, osmium.
+MAX_DENSITY = 22_600.0
 
 
 def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
@@ -65,10 +60,28 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     Raise InputError if a value is not allowed, or TypeError or ValueError if its type is wrong.
     """
     case = tables_case(values)
+    _require_density(case)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:
         refuse(f"&sampling: {samples:g} samples are too many for the page", f"up to {MAX_SAMPLES}")
     return case
+
+
+def _require_density(case: Case) -> None:
+    """Raise InputError if the wall of a ball is denser than any material."""
+    ball, facts = case.ball, MODEL_FACTS.get(case.model.name if case.model else "")
+    numbers = (ball.outer_radius, ball.wall_thickness, ball.mass)
+    is_number = all(type(number) in {int, float} and number > 0 for number in numbers)
+    if (facts and "wall_thickness" in facts.unused) or not is_number:
+        return
+    radius, wall, mass = numbers
+    volume = 4 / 3 * math.pi * (radius**3 - max(radius - wall, 0.0) ** 3)
+    if volume <= 0 or mass / volume > MAX_DENSITY:
+        density = f"{mass / volume:.2g} kg/m3" if volume > 0 else "an infinite density"
+        refuse(
+            f"&ball: wall_thickness = {wall!r} gives the wall {density}",
+            f"a thicker wall or less mass, up to {MAX_DENSITY:g} kg/m3",
+        )
 
 
 def answer_quickly(case: Case) -> Answer | None:
@@ -86,7 +99,8 @@ def answer_case(case: Case) -> Answer:
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
     force = case.levels.force
-    answer = _answer(impact, *contact_force(impact, force))
+    assessed = impact.assess()
+    answer = common_answer(impact, assessed, *contact_force(impact, force))
     answer["force"]["title"] = FORCE_NAMES[force]
     answer["warnings"] += impact.warnings
     error = float(impact.numerical_error.level.max())
@@ -94,60 +108,45 @@ def answer_case(case: Case) -> Answer:
     if not math.isnan(error):
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
     verdict = assess_impact(impact)
+    answer["headline"] = source_headline(assessed, verdict)
     if verdict:
         answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}
         answer["warnings"] += verdict.warnings
         for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
             entry["range"] = criterion.range
     on_floor = impact.on_floor
-    answer["motion"] = _motion(on_floor or impact)
+    answer["motion"] = motion_of(on_floor or impact)
     answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
     if case.room is not None and case.floor is not None:
-        answer["room"] = _room(impact)
-        warnings = answer["room"].pop("warnings")
-        answer["warnings"] += [warning for warning in warnings if warning not in answer["warnings"]]
+        prediction = predict_level(impact)
+        answer["room"] = _room(prediction)
+        classes = class_text(prediction.octave_rating.korean_class or 0)
+        answer["headline"] = room_headline(prediction, classes)
+        known = answer["warnings"]
+        answer["warnings"] += [text for text in prediction.warnings if text not in known]
+    answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
     answer["seconds"] = time.perf_counter() - start
     return answer
 
 
-def answer_recording(path: str, name: str, config: Mapping[str, object]) -> Answer:
-    """Return the answer of a recording.
-
-    `path` is a copy of the file, `name` the name of the original file, and `config` a table of the
-    configuration.
-    """
-    start = time.perf_counter()
-    copy = Path(path).name
-    try:
-        recording = read_recording(path, config=config_from(config))
-        answer = _answer(recording, *contact_force(recording, "floor"))
-    except ThudError as error:
-        # The message names the original file instead of the copy.
-        message = name_fields(str(error)).replace(path, copy).replace(copy, shown(name))
-        raise type(error)(message) from error
-    for entry, row in zip(answer["criteria"], criteria_data(recording), strict=True):
-        entry["value_text"] = value_text(row)
-        entry["uncertainty_text"] = expanded_text(row)
-    answer["seconds"] = time.perf_counter() - start
-    answer["drops"] = len(recording.drops)
-    # The page shows the name of the recording next to its warnings.
-    answer["warnings"] += [
-        name_fields(warning.removeprefix(f"{copy}: ")).replace(copy, name)
-        for warning in recording.warnings
-    ]
-    return answer
-
-
-def _answer(source: ImpactResult, times: NDArray[np.float64], force: NDArray[np.float64]) -> Answer:
+def common_answer(
+    source: ImpactResult,
+    verdict: Verdict,
+    times: NDArray[np.float64],
+    force: NDArray[np.float64],
+) -> Answer:
     """Return the entries that all answers have; times are in ms, and `force` is in kN."""
-    verdict = source.assess()
     return {
-        "force": _curve(times, 1e3 * force),
+        "force": curve(times, 1e3 * force),
         "levels": {
-            "frequency": _to_json(get_bands().nominal),
-            "level": _to_json(source.levels()),
+            "frequency": to_json(get_bands().nominal),
+            "level": to_json(source.levels()),
+            "thirds": {
+                "frequency": to_json(get_bands(BANDWIDTHS[1]).nominal),
+                "level": to_json(source.levels(BANDWIDTHS[1])),
+            },
         },
-        "criteria": [_criterion(criterion) for criterion in verdict.criteria],
+        "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
         "conforms": bool(verdict.conforms),
         "verdict": verdict.result,
         "numbers": _numbers(source),
@@ -166,7 +165,7 @@ def _numbers(source: ImpactResult) -> list[list[Any]]:
     return rows
 
 
-def _criterion(criterion: Criterion) -> Answer:
+def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     """Return a criterion for the page; times are in ms."""
     scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
     name, band = criterion.name.rpartition("octave_")[1:]
@@ -184,37 +183,8 @@ def _criterion(criterion: Criterion) -> Answer:
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
         "verdict": criterion.result,
+        **criterion_facts(criterion.name, source),
     }
-
-
-def _motion(impact: Impact) -> Answer | None:
-    """Return the surfaces of the ball relative to the floor, and the floor, mm, at times, ms.
-
-    None for models without a shape. The shape of the shell model is a sphere that is flattened by
-    its deflection.
-    """
-    end = impact.touch_time + TIME_RANGE * impact.contact_time
-    motion = impact.motion
-    if motion is None and "shell_force" not in impact.components:
-        return None
-    times = impact.time if motion is None else motion.time
-    chosen = _thin_out(np.flatnonzero(times <= end), MAX_INSTANTS)
-    answer: Answer = {"time": _to_json(1e3 * (times[chosen] - impact.touch_time))}
-    if motion is not None:
-        depth = motion.floor_displacement[chosen]
-        relative = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
-        answer["outer"], answer["inner"] = (
-            [[[round(float(x), 2) for x in point] for point in line] for line in 1e3 * surface]
-            for surface in (relative[:, :, -1], relative[:, :, 0])
-        )
-    else:
-        floor = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
-        depth = floor[chosen]
-        ball = impact.case.ball
-        answer["deflection"] = _to_json(1e3 * impact.deflection[chosen])
-        answer |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
-    answer["floor"] = _to_json(1e3 * depth)
-    return answer
 
 
 def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
@@ -225,8 +195,8 @@ def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
     header, *rows = on_floor.rows()
     return {
         "name": humanize(on_floor.floor.name),
-        "force": _curve(contact[0], 1e3 * contact[1]),
-        "velocity": _curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
+        "force": curve(contact[0], 1e3 * contact[1]),
+        "velocity": curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
         "numbers": [
             [
                 "peak force relative to rigid floor",
@@ -242,15 +212,20 @@ def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
     }
 
 
-def _room(impact: Impact) -> Answer:
-    """Return the levels in the room below."""
-    prediction = predict_level(impact)
+def _room(prediction: RoomPrediction) -> Answer:
+    """Return the levels in the room below, dB, with the range of the rating and its causes."""
+    low, high = prediction.interval
     return {
-        "frequency": _to_json(prediction.frequency),
-        "level": _to_json(prediction.level),
-        "modal_level": _to_json(prediction.modal_level[: prediction.n_modal]),
+        "frequency": to_json(prediction.frequency),
+        "level": to_json(prediction.level),
+        "modal_level": to_json(prediction.modal_level[: prediction.n_modal]),
+        "rated": {"value": prediction.rated, "low": low, "high": high},
+        "interval": prediction.rated_text,
+        "contributions": [
+            [contribution_title(name), *ends] for name, ends in prediction.contributions.items()
+        ],
+        "source_warnings": list(prediction.source_warnings),
         "ratings": _ratings_text(prediction),
-        "warnings": list(prediction.warnings),
     }
 
 
@@ -267,21 +242,3 @@ def _ratings_text(prediction: RoomPrediction) -> str:
     ]
     required = prediction.requirement
     return "; ".join([*words, *([str(required)] if required else [])])
-
-
-def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
-    """Return a curve of at most `MAX_POINTS` points."""
-    chosen = _thin_out(np.arange(len(times)), MAX_POINTS)
-    return {"time": _to_json(times[chosen]), "value": _to_json(values[chosen])}
-
-
-def _thin_out(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:
-    """Return at most `count` of the indices, evenly spaced, including the first and the last."""
-    chosen = np.linspace(0, len(indices) - 1, min(len(indices), count)).astype(int)
-    result: NDArray[np.intp] = indices[np.unique(chosen)]
-    return result
-
-
-def _to_json(values: Iterable[float]) -> list[float | None]:
-    """Return numbers for JSON, with None for NaN and infinity."""
-    return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values]

@@ -1,22 +1,22 @@
-"""Files for the page: case, force, report, sound, and a study of changed keys."""
+"""Files for the page: case, script, force, sound, and a study of changed keys."""
 
 from __future__ import annotations
 
 import io
 import json
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base.checks import refuse, require_number, shown
+from thud.base.key import Group
 from thud.case.case import check_case
 from thud.case.keys import find_key, key_owners, known_keys
-from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
 from thud.export.room_sound import listen
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
-from thud.plot.pages import comparison_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,6 +40,34 @@ def namelist(values: Values) -> bytes:
     return f"{case.to_namelist()}\n".encode()
 
 
+def script(values: Values) -> bytes:
+    """Return a Python script that computes the case."""
+    case = new_case(values)
+    check_case(case)
+    arguments = [f"name={case.name!r}"]
+    for field in fields(case):
+        group = getattr(case, field.name)
+        # A case without a model, or with the default one, has no argument.
+        if not isinstance(group, Group):
+            continue
+        stated = _stated(group)
+        if stated or field.name in {"model", "floor", "room"}:
+            listed = ", ".join(f"{name}={value!r}" for name, value in stated.items())
+            arguments.append(f"{field.name}=thud.{type(group).__name__}({listed})")
+    lines = ["import thud", "", "case = thud.Case(", *(f"    {text}," for text in arguments), ")"]
+    lines += ["impact = thud.solve(case)", "print(impact.levels().round(2))"]
+    lines += ["print(impact.assess())"]
+    if case.floor and case.room:
+        lines += ["print(thud.predict_level(impact))"]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _stated(group: Group) -> dict[str, object]:
+    """Return the values of a group that differ from their defaults."""
+    defaults = type(group)()
+    return {name: value for name, value in vars(group).items() if value != getattr(defaults, name)}
+
+
 def force(values: Values) -> bytes:
     """Return time and assessed force as comma-separated values."""
     impact = compute(new_case(values))
@@ -53,16 +81,6 @@ def force(values: Values) -> bytes:
         comments="",
     )
     return table.getvalue().encode()
-
-
-def report(values: Values) -> bytes:
-    """Return the comparison page of this case only."""
-    impact = compute(new_case(values))
-    comparison = compare({impact.case.name: impact})
-    source = impact.case.limits.source
-    return comparison_html(
-        comparison.impacts, None, source, comparison.rows(), comparison.reasons
-    ).encode()
 
 
 def sound(values: Values) -> bytes:
@@ -125,8 +143,8 @@ def _toml(value: object) -> str:
 # Function that returns the content, and media type, by the name of the file.
 DOWNLOADS: dict[str, tuple[Callable[[Values], bytes], str]] = {
     "case.nml": (namelist, "text/plain"),
+    "case.py": (script, "text/x-python"),
     "force.csv": (force, "text/csv"),
-    "report.html": (report, "text/html"),
     "room.wav": (sound, "audio/wav"),
     "study.toml": (study, "application/toml"),
 }

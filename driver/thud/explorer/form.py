@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, ROOM_SOURCE
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
+from thud.explorer.models import condition_of, is_folded, users_of
 from thud.floors.constructions import constructions
 
 if TYPE_CHECKING:
@@ -25,6 +27,13 @@ SLIDER_FACTOR = 3.0
 MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
 # Fraction of the allowed range that a linear slider omits at both ends.
 INSET = 0.01
+# Number of steps from zero to a value, at least.
+STEPS = 15
+# Steps of fields whose default is 0, by the unit of the key.
+STEPS_OF_UNITS = {
+    "m": 0.1, "m3": 1.0, "dB": 1.0, "kg/m2": 1.0, "s": 0.001, "s/m": 0.01, "Pa": 1000.0,
+    "Hz": 100.0,
+}  # fmt: skip
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Groups of keys that are not on the page.
 OMITTED_GROUPS = ("case", "modes", "compression", "output")
@@ -34,9 +43,10 @@ def form() -> list[dict[str, Any]]:
     """Return the groups of fields.
 
     A group has part (``"model"``, ``"floor"``, ``"room"`` or its name), name, title and fields. A
-    field has group and name of its key, label, kind, help, choices and default. A field of a number
-    also has a unit, the power of ten that converts it to the unit of the key, limits of the allowed
-    range in its unit (None: open), and a slider.
+    field has group and name of its key, label, kind, help, choices, default, the models that use it
+    (None: all), whether it is advanced, and the choice with which it has an effect (None: always).
+    A field of a number also has a unit, the power of ten that converts it to the unit of the key,
+    limits of the allowed range in its unit (None: open), a round step, and a slider.
     """
     groups = [
         _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
@@ -47,6 +57,12 @@ def form() -> list[dict[str, Any]]:
     floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
     room = _options("room", "room", OPTIONAL_GROUPS["room"])
     return [*groups, *models, *floors, room]
+
+
+@cache
+def fields_by_key() -> dict[tuple[str, str], dict[str, Any]]:
+    """Return the fields of the page by group and key."""
+    return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
 
 
 def construction_form() -> list[dict[str, Any]]:
@@ -71,17 +87,6 @@ def construction_form() -> list[dict[str, Any]]:
         }
         for entry in constructions()
     ]
-
-
-def room_source() -> dict[str, dict[str, object]]:
-    """Return name and options of the model of a room whose case names none, by group."""
-    defaults = type(ROOM_SOURCE)()
-    options = {
-        option.name: getattr(ROOM_SOURCE, option.name)
-        for option in fields(ROOM_SOURCE)
-        if getattr(ROOM_SOURCE, option.name) != getattr(defaults, option.name)
-    }
-    return {"model": {"name": ROOM_SOURCE.name}, ROOM_SOURCE.name: options}
 
 
 def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
@@ -110,22 +115,28 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "choices": {choice: humanize(choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
         "unit": _typeset(key.unit),
+        "si_unit": key.unit,
         "power": 0,
+        "models": users_of(key),
+        "advanced": is_folded(key),
+        "condition": condition_of(key),
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
-        # Times remain in seconds: a reverberation time of 500 ms would be unusual.
-        unit = key.unit if key.unit == "s" else display_unit(key.unit, default)[0]
+        unit = _unit(key, default)
         power = power_of(unit or "1", key.unit, key.name)
         suffix = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
         allowed = f"allowed: {_limit(key.lower, power)} to {_limit(key.upper, power)}{suffix}"
         value, lower, upper = (_converted(x, power) for x in (default, key.lower, key.upper))
+        ends = lower, upper, MAX_LENGTH if default else scaled(MAX_LENGTH, -power)
+        is_whole = key.kind == "whole"
         field |= {
             "unit": _typeset(unit),
             "power": power,
             "lower": lower,
             "upper": upper,
             "help": f"{'' if meaning == label else meaning + '; '}{allowed.rstrip()}",
-            "slider": _slider(value or 0.0, lower, upper, whole=key.kind == "whole"),
+            "step": 1 if is_whole else _step(key.unit, value or 0.0, *ends),
+            "slider": _slider(value or 0.0, *ends, whole=is_whole),
         }
     return field
 
@@ -157,13 +168,35 @@ def _limit(limit: float | str, power: int) -> str:
     return re.sub(r"1e\+0?(\d+)", lambda match: "10" + match[1].translate(_SUPERSCRIPTS), number)
 
 
+def _unit(key: Key, default: float) -> str:
+    """Return the unit of the field of a key."""
+    # Times remain in seconds: a reverberation time of 500 ms would be unusual.
+    if key.unit == "s":
+        return key.unit
+    # Lengths that may be 0 have the unit of their maximum.
+    size = (
+        key.upper if key.unit == "m" and not default and not isinstance(key.upper, str) else default
+    )
+    return display_unit(key.unit, size)[0]
+
+
+def _step(
+    unit: str, value: float, lower: float | None, upper: float | None, max_length: float
+) -> float | None:
+    """Return a power of ten by which arrow keys change a value; None if no size is known."""
+    size = abs(value)
+    if not size and lower is not None and upper is not None and upper - lower <= max_length:
+        size = upper - lower
+    return 10.0 ** math.floor(math.log10(size / STEPS)) if size else STEPS_OF_UNITS.get(unit)
+
+
 def _slider(
-    value: float, lower: float | None, upper: float | None, *, whole: bool
+    value: float, lower: float | None, upper: float | None, max_length: float, *, whole: bool
 ) -> dict[str, Any] | None:
     """Return ends and scale of a slider around a value; None if there is no range for a slider."""
     if lower is not None and upper is not None and lower >= 0:
         length = upper - lower
-        if length <= MAX_LENGTH and (value <= 0 or value >= lower + MIN_FRACTION * length):
+        if length <= max_length and (value <= 0 or value >= lower + MIN_FRACTION * length):
             # The limits may not be allowed values, but the default is.
             inner = lower + INSET * length, upper - INSET * length
             return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}

@@ -7,6 +7,7 @@ import resource
 import signal
 import tempfile
 import threading
+from collections.abc import Generator
 from contextlib import suppress
 from multiprocessing import forkserver, get_context
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,12 @@ import anyio
 from tqdm import tqdm
 
 from thud.base.bridge import progress
-from thud.base.errors import InputError, ThudError
-from thud.explorer.answer import answer_case, answer_quickly, answer_recording, new_case
+from thud.base.errors import ThudError
+from thud.explorer.answer import answer_case, answer_quickly, new_case
 from thud.explorer.downloads import DOWNLOADS
+from thud.explorer.improve import fit_recording, improve
+from thud.explorer.messages import describe_error
+from thud.explorer.recording import answer_recording
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable
@@ -26,11 +30,14 @@ if TYPE_CHECKING:
 
     Report = dict[str, Any]
 
-# Functions of the tasks by name; arguments and return values are plain data.
+# Functions of the tasks by name; arguments and return values are plain data. Generators yield begin
+# and end of the fraction of the work that the next computation is.
 TASKS: dict[str, Callable[..., Any]] = {
     "quick case": lambda values: answer_quickly(new_case(values)),
     "case": lambda values: answer_case(new_case(values)),
     "recording": answer_recording,
+    "improve": improve,
+    "fit": fit_recording,
     "download": lambda name, values: DOWNLOADS[name][0](values),
 }
 # Errors of invalid values; values of wrong types raise TypeError or ValueError when they are used.
@@ -164,23 +171,35 @@ def _run_tasks(connection: Connection) -> None:
 def _run_task(connection: Connection, task: str, arguments: tuple[Any, ...]) -> Report:
     """Return the last report of a task, after sending reports of its progress."""
     finished = threading.Event()
+    span = [0.0, 1.0]
 
     def report_progress() -> None:
         try:
             while not finished.wait(INTERVAL):
-                connection.send({"done": progress()})
+                begin, end = span
+                connection.send({"done": begin + (end - begin) * progress()})
         except OSError:
             os._exit(1)
 
     thread = threading.Thread(target=report_progress, daemon=True)
     thread.start()
     try:
-        return {"answer": TASKS[task](*arguments)}
+        return {"answer": _finish(TASKS[task](*arguments), span)}
     except MemoryError:
         limit = f"{MAX_MEMORY / 1e9:g} GB"
         return {"error": f"the computation needs more than {limit} of memory; allowed: less"}
     except (*INPUT_ERRORS, OSError) as error:
-        return {"error": str(error) or InputError.__name__}
+        return describe_error(error)
     finally:
         finished.set()
         thread.join()
+
+
+def _finish(answer: Any, span: list[float]) -> Any:  # noqa: ANN401 - of any task
+    """Return an answer, after the work of a generator; `span` is the fraction of its next step."""
+    while isinstance(answer, Generator):
+        try:
+            span[:] = next(answer)
+        except StopIteration as end:
+            answer = end.value
+    return answer

@@ -76,6 +76,8 @@ class Field:
 
 
 FILTERS = {"none": "flat", "bessel": "Bessel", "butterworth": "Butterworth"}
+SOURCES = {"rubber_ball": "rubber ball", "tyre": "tyre"}
+POLARITIES = {"positive": "positive", "negative": "negative"}
 FIELDS = (
     Field("height", "Drop height, m"),
     Field("mass", "Mass, kg"),
@@ -90,12 +92,19 @@ FIELDS = (
         "calibration_uncertainty", "Uncertainty of the calibration, %",
         unit=PERCENT, folded=True,
     ),
-    Field("plate_f0", "First resonance of the force plate, Hz", folded=True),
-    Field("plate_Q", "Quality factor of the force plate", folded=True),
+    Field("source", "Source", "choice", choices=SOURCES),
+    Field("plate_f0", "First resonance of the force plate, Hz"),
+    Field("plate_Q", "Quality factor of the force plate"),
+    Field("plate_share", "Share of this resonance in the static response", folded=True),
     Field("plate_flat_limit", "Force plate flat within 2 % up to, Hz", folded=True),
     Field("filter_kind", "Filter of the recorder", "choice", choices=FILTERS, folded=True),
     Field("filter_order", "Order of the filter", folded=True),
     Field("filter_cutoff", "Cutoff of the filter (−3 dB), Hz", folded=True),
+    Field("polarity", "Sign of a compression", "choice", choices=POLARITIES, folded=True),
+    Field("sample_rate", "Sample rate, Hz", folded=True),
+    Field("laboratory", "Laboratory", "text", folded=True),
+    Field("ball", "Name of the ball", "text", folded=True),
+    Field("serial", "Serial number", "text", folded=True),
 )  # fmt: skip
 
 
@@ -143,8 +152,21 @@ def name_fields(message: str) -> str:
             rf"(?<![\w“]){key}(?= = | and channels are| are stated)", item.quoted, message
         )
     for table in TABLES:
+        message = message.replace(f"[{table}]: f0 = ", f"[{table}]: {_label('plate_f0')} = ")
+        message = message.replace(", Q = ", f", {_label('plate_Q')} = ")
+        message = message.replace(f"[{table}] share", _label("plate_share"))
         message = message.replace(f"[{table}]", f"the fields of the {table}")
     return message
+
+
+def recording_field_of(message: str) -> str | None:
+    """Return the name of the first field that a message names; None if there is none."""
+    places = {message.find(item.quoted): item.name for item in FIELDS if item.quoted in message}
+    return places[min(places)] if places else None
+
+
+def _label(name: str) -> str:
+    return next(item.quoted for item in FIELDS if item.name == name)
 
 
 def _in_percent(number: re.Match[str]) -> str:

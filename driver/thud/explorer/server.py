@@ -4,58 +4,63 @@ from __future__ import annotations
 
 import json
 import secrets
+import shutil
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
-from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import anyio
 from starlette.applications import Starlette
+from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
+from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import ClientDisconnect
-from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
+from thud.explorer.criteria import glossary
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import construction_form, form, room_source
+from thud.explorer.form import construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
+from thud.explorer.messages import describe_error
+from thud.explorer.models import changed_values, floor_facts, model_facts, standard_ball
+from thud.explorer.page_file import new_page
+from thud.explorer.presets import presets
 from thud.explorer.recording_fields import recording_form, recording_table
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
 
     from starlette.requests import Request
     from starlette.types import Receive, Scope, Send
 
     Endpoint = Callable[[Request], Awaitable[Response]]
 
-# Maximum size of a case and of a recording, bytes.
+# Maximum size of a case and of the files of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
+# Maximum number of files and of fields in a form.
+MAX_FILES = 100
+MAX_FIELDS = 100
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Maximum pause between two chunks of a body, s.
 BODY_TIMEOUT = 20.0
+# Level of compression: higher ones save a few percent and take twice as long.
+COMPRESSION = 6
 # Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
 # slow task.
 TIME_LIMIT = 300.0
 QUICK_TIME_LIMIT = 1.0
-# Files of the page, by name.
-FILES = {file.name: file for file in (resources.files("thud.explorer") / "page").iterdir()}
-TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-# The page loads files of this server only; it plays sounds that it has downloaded with its token.
-POLICY = (
-    "default-src 'self'; img-src 'self' data:; media-src blob:; "
-    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
-)
 HEADERS = {
-    "Content-Security-Policy": POLICY,
+    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
@@ -92,19 +97,23 @@ def new_application(
     application = Starlette(
         routes=[
             Route("/", _page),
-            Route("/page/{name}", _page),
             *(
                 Route(path, _guarded(endpoint), methods=methods)
                 for path, endpoint, methods in (
                     ("/about", _about, ["GET"]),
                     ("/solve", _solve, ["POST"]),
                     ("/measure", _measure, ["POST"]),
+                    ("/improve", _improve, ["POST"]),
+                    ("/fit", _fit, ["POST"]),
                     ("/download/{name}", _download, ["POST"]),
                 )
             ),
         ],
-        middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
-        exception_handlers=dict.fromkeys(INPUT_ERRORS, _report_error)
+        middleware=[
+            Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts)),
+            Middleware(GZipMiddleware, compresslevel=COMPRESSION),
+        ],
+        exception_handlers=dict.fromkeys((*INPUT_ERRORS, HTTPException, _TaskError), _report_error)
         | {ClientDisconnect: _ignore_error},
         lifespan=lifespan,
     )
@@ -112,11 +121,17 @@ def new_application(
         "form": form(),
         "constructions": construction_form(),
         "recording": recording_form(),
+        "models": model_facts(),
+        "floors": floor_facts(),
+        "presets": presets(),
+        "glossary": glossary(),
         "version": version(),
         "start": start,
-        "room_source": room_source(),
+        "room_source": changed_values(standard_ball()),
         "max_recording": MAX_RECORDING,
     }
+    # The page itself is sent without a token, and holds nothing of a user.
+    application.state.page = new_page(None if start else presets()[0]["values"])
     application.state.token = token
     application.state.slow = slow
     application.state.quick = quick
@@ -125,12 +140,14 @@ def new_application(
 
 
 async def _page(request: Request) -> Response:
-    name = request.path_params.get("name", "index.html")
-    if name not in FILES:
-        raise HTTPException(404, "there is no such file")
-    return Response(
-        FILES[name].read_bytes(), media_type=TYPES[name.rpartition(".")[2]], headers=HEADERS
-    )
+    page = request.app.state.page
+    headers = {
+        **HEADERS, "Content-Security-Policy": page.policy, "Cache-Control": "no-cache",
+        "ETag": page.tag,
+    }  # fmt: skip
+    if page.tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(page.content, media_type="text/html", headers=headers)
 
 
 async def _about(request: Request) -> Response:
@@ -146,19 +163,73 @@ async def _solve(request: Request) -> Response:
 
 
 async def _measure(request: Request) -> Response:
-    query = dict(request.query_params)
-    config = recording_table(query)
-    name = query.get("name", "recording.wav")
-    ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
+    return await _with_files(request, "recording", lambda form: (recording_table(form),))
+
+
+async def _improve(request: Request) -> Response:
+    reports = request.app.state.slow.run("improve", await _values(request))
+    return _Reports(reports, AsyncExitStack())
+
+
+async def _fit(request: Request) -> Response:
+    return await _with_files(
+        request, "fit", lambda form: (recording_table(form), _groups(form.get("case", "")))
+    )
+
+
+async def _with_files(
+    request: Request, task: str, arguments: Callable[[Mapping[str, str]], tuple[object, ...]]
+) -> Response:
+    """Return reports of a slow task on the files of a form.
+
+    Its arguments are the paths of copies of the files, their names, and the `arguments` of the
+    fields of the form. The names of the files are not used in paths.
+    """
     state = request.app.state
     async with AsyncExitStack() as stack:
         await stack.enter_async_context(state.copies)
-        path = Path(stack.enter_context(TemporaryDirectory()), f"recording.{ending}")
-        async with await anyio.open_file(path, "wb") as copy:
-            async for chunk in _body(request, MAX_RECORDING):
-                await copy.write(chunk)
-        reports = state.slow.run("recording", str(path), name, config)
-        return _Reports(reports, stack.pop_all())
+        folder = stack.enter_context(TemporaryDirectory())
+        async with _received(request) as form:
+            fields = {name: value for name, value in form.items() if isinstance(value, str)}
+            further = arguments({name: text for name, text in fields.items() if text})
+            files = [value for value in form.getlist("file") if isinstance(value, UploadFile)]
+            if not files:
+                raise HTTPException(400, "the request contains no file")
+            names = [file.filename or "recording" for file in files]
+            paths = [str(Path(folder, f"recording_{i}{_ending(n)}")) for i, n in enumerate(names)]
+            for file, path in zip(files, paths, strict=True):
+                await anyio.to_thread.run_sync(_copy, file.file, path)
+        return _Reports(state.slow.run(task, paths, names, *further), stack.pop_all())
+
+
+@asynccontextmanager
+async def _received(request: Request) -> AsyncGenerator[FormData, None]:
+    """Yield the form in the body of a request, and close its files."""
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        raise HTTPException(400, "the request does not contain a form with files")
+    parser = MultiPartParser(
+        request.headers, _body(request, MAX_RECORDING),
+        max_files=MAX_FILES, max_fields=MAX_FIELDS, max_part_size=MAX_CASE,
+    )  # fmt: skip
+    try:
+        form = await parser.parse()
+    except MultiPartException as error:
+        raise HTTPException(400, f"the form cannot be read: {error.message}") from None
+    try:
+        yield form
+    finally:
+        await form.close()
+
+
+def _ending(name: str) -> str:
+    """Return the ending of a name of a file, of letters and digits only."""
+    ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
+    return f".{ending}"
+
+
+def _copy(source: BinaryIO, path: str) -> None:
+    with Path(path).open("wb") as target:
+        shutil.copyfileobj(source, target)
 
 
 async def _download(request: Request) -> Response:
@@ -184,7 +255,7 @@ async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None
             pass
         group.cancel_scope.cancel()
     if "error" in report:
-        raise HTTPException(400, report["error"])
+        raise _TaskError(report)
     if "answer" not in report:
         raise ClientDisconnect
     return report["answer"]
@@ -207,12 +278,25 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
 
 
 async def _report_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
-    return PlainTextResponse(str(error), 400, headers=HEADERS)
+    if isinstance(error, _TaskError):
+        return JSONResponse(error.report, 400, headers=HEADERS)
+    if isinstance(error, HTTPException):
+        report = {"error": error.detail, "field": None}
+        return JSONResponse(report, error.status_code, headers=HEADERS)
+    return JSONResponse(describe_error(error), 400, headers=HEADERS)
 
 
 async def _ignore_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
     """Return an empty response, which nobody reads, to a page that has disconnected."""
     return Response(status_code=400)
+
+
+class _TaskError(Exception):
+    """A task has ended with an error; `report` is its last report."""
+
+    def __init__(self, report: dict[str, Any]) -> None:
+        super().__init__(report["error"])
+        self.report = report
 
 
 class _Reports(StreamingResponse):
@@ -231,7 +315,7 @@ class _Reports(StreamingResponse):
             await super().__call__(scope, receive, send)
 
 
-async def _body(request: Request, max_length: int) -> AsyncIterator[bytes]:
+async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None]:
     """Yield the chunks of a body; raise HTTPException if it is too long or stops."""
     length = 0
     chunks = request.stream()
@@ -253,8 +337,13 @@ async def _body(request: Request, max_length: int) -> AsyncIterator[bytes]:
 
 async def _values(request: Request) -> dict[str, dict[str, Any]]:
     """Return the values in the body of a request, by group and key."""
+    return _groups(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+
+
+def _groups(content: bytes | str) -> dict[str, dict[str, Any]]:
+    """Return the values of JSON, by group and key."""
     try:
-        values = json.loads(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+        values = json.loads(content)
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
     if not isinstance(values, dict):

@@ -252,10 +252,10 @@ def _stated(value: float | None, uncertainty: float | None) -> Estimate:
 
 
 def _count_peaks(drop: Drop) -> float:
-    """Return the number of peaks of the force; NaN if some may be noise."""
+    """Return the number of peaks of the force; NaN if some may be noise or a ringing plate."""
     force = drop.force[slice(*drop.gate)]
     count = peak_count(force, drop.sample_rate)
     # Noise that is slower than the contact adds no peaks.
     noise = drop.noise.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
     clear = PROMINENCE * drop.peak_force.value >= MIN_PROMINENCE * noise
-    return float(count) if clear or count == 1 else math.nan
+    return float(count) if count == 1 or (clear and not drop.ringing) else math.nan

@@ -238,7 +238,7 @@ class Recording(Displayed):
         """Possible faults of the recording as a whole, a sentence each."""
         config, warnings = self.config, list[str]()
         if math.isnan(self.estimates["peaks"].value):
-            warnings.append("the number of peaks is unknown: some may be noise")
+            warnings.append("the number of peaks is unknown: some may be noise or the plate")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
             warnings.append(f"the restitution is known of {known} of {len(self.drops)} drops only")

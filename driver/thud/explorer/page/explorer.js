@@ -1,18 +1,27 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
-import { addRoom, build, buildRecording, caseValues, describeChanges, fillConstruction, isCase, markField, startWith, state, titleOf } from "./form.js";
-import { byId, element } from "./page.js";
-import { listenToBall } from "./ball.js";
+import { byId, button, element, saveFile } from "./page.js";
+import { ConnectionError, ServerError, ask, follow, fragment, getAbout } from "./request.js";
+import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms, showWarnings } from "./results.js";
+import { STORE, firstVariant } from "./first.js";
+import { listenToBall, showBall } from "./ball.js";
+import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
+import { addFiles, buildDoor, recording, recordingBody, reportButton, showAsks } from "./recording.js";
+import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
-import { ConnectionError, ServerError, ask, follow, linkedCase, storeToken } from "./request.js";
-import { show } from "./results.js";
+import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
 
-// Pause after a change before a slow case is requested, ms.
+// Pause after a change before a slow case is requested, and before a change can be undone, ms.
 const PAUSE = 120;
+const COMMIT_PAUSE = 400;
 // Time between attempts to reach the server, ms.
 const RETRY_INTERVAL = 1500;
-const pinned = [];
-let about = null;
-let current = null;
+const RECORDING_TEXT = "Choose the record of one drop or more. The answer is the verdict with its uncertainty, the levels within the limits of the standards, and a calibration report to save. Missing values can be stated afterwards: the page asks for those that matter.";
+const DOORS = ["recording", "ball", "floor"];
+// The current variant of each door, and those that were kept.
+const current = { recording: null, ball: null, floor: null };
+let kept = [];
+// Text on the last fit, and the values that it belongs to.
+let fitted = { text: "", values: "" };
 let job = null;
 let timer = 0;
 let retryTimer = 0;
@@ -26,8 +35,22 @@ function showMessage(message) {
 
 function hideMessage() {
   byId("message").hidden = true;
-  document.body.classList.remove("outdated");
   markField(null);
+}
+
+/** Mark the results as those of other values than the current ones. */
+function setOutdated(isOutdated, isBusy = isOutdated) {
+  document.body.classList.toggle("outdated", isOutdated);
+  byId("panel").setAttribute("aria-busy", String(isBusy));
+}
+
+/** Show that a field has no valid value; without a name, that it is being typed. */
+function onInvalid(name, message) {
+  setOutdated(true, false);
+  if (!name) return;
+  hideMessage();
+  markField(name, message);
+  showMessage(message);
 }
 
 /** Show an error; if the server cannot be reached, try again later. */
@@ -35,7 +58,7 @@ function showError(error) {
   if (error.name === "AbortError") return;
   if (!(error instanceof ConnectionError || error instanceof ServerError)) throw error;
   showMessage(error.message);
-  markField(error.message);
+  markField(error.field, error.message);
   if (error instanceof ConnectionError) {
     clearTimeout(retryTimer);
     retryTimer = setTimeout(() => ask("about").then(() => { hideMessage(); solve(); }, showError), RETRY_INTERVAL);
@@ -47,9 +70,7 @@ function showError(error) {
 /** Return the answer of a task; show its progress and a button to cancel it, by default from its first report. */
 async function runTask(name, path, body, controller, { showNow = false, onReport = () => {} } = {}) {
   const bar = element("progress", { max: 1, "aria-label": name });
-  const button = element("button", { type: "button" }, "Cancel");
-  button.addEventListener("click", () => controller.abort());
-  const line = element("div", { class: "task" }, element("span", {}, name), bar, button);
+  const line = element("div", { class: "task" }, element("span", {}, name), bar, button("Cancel", () => controller.abort()));
   const showTask = () => { if (!line.isConnected) byId("tasks").append(line); };
   if (showNow) showTask();
   try {
@@ -63,23 +84,37 @@ async function runTask(name, path, body, controller, { showNow = false, onReport
   }
 }
 
-/** Compute the case of the form, after cancelling a slow computation or waiting for a quick one. */
+/** Compute the case or assess the recording, after cancelling a slow computation or waiting for a quick one. */
 async function solve() {
   clearTimeout(timer);
   if (job && !job.slow) { job.repeat = true; return; }
   job?.controller.abort();
-  const thisJob = { controller: new AbortController(), slow: false, repeat: false, start: performance.now() };
+  const { door } = state;
+  const isRecording = door === "recording";
+  if (isRecording && !recording.files.length) { current.recording = null; setOutdated(false); showAll(); return; }
+  const thisJob = { controller: new AbortController(), slow: isRecording, repeat: false, start: performance.now() };
   job = thisJob;
+  byId("panel").setAttribute("aria-busy", "true");
+  // A quick answer comes before the eye would see the change.
+  const dimming = setTimeout(() => setOutdated(true), PAUSE);
   try {
-    const values = caseValues();
-    const answer = await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; } });
+    const values = isRecording ? null : caseValues(door);
+    const answer = isRecording
+      ? await runTask(`Assessing ${recording.files.map(({ name }) => name).join(", ")}`, "measure", checkedBody(), thisJob.controller, { showNow: true })
+      : await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
+    clearTimeout(dimming);
+    if (isRecording) current.recording = recordedVariant(answer);
+    else current[door] = { door, style: 0, values, answer, slow: thisJob.slow };
+    if (state.door !== door || job !== thisJob) return;
     hideMessage();
-    current = { name: titleOf("model", state.model), short: titleOf("model", state.model), description: describeChanges(), values, answer, slow: thisJob.slow };
-    refresh();
+    setOutdated(false, thisJob.repeat);
+    showAll();
+    commitSoon();
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
-    if (error.name !== "AbortError") document.body.classList.add("outdated");
+    clearTimeout(dimming);
+    if (job === thisJob) setOutdated(true, false);
     showError(error);
   } finally {
     if (job === thisJob) {
@@ -89,128 +124,373 @@ async function solve() {
   }
 }
 
+/** Return the body of a request with the recording; throw ServerError if a file is too large. */
+function checkedBody(values) {
+  const large = recording.files.find(({ size }) => size > about.max_recording);
+  if (large) throw new ServerError({ error: `${large.name} is larger than ${about.max_recording / 1e6} MB; allowed: less` });
+  return recordingBody(values);
+}
+
+function recordedVariant(answer) {
+  const [{ name }, ...others] = recording.files;
+  const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
+  const stated = Object.entries(state.recording).map(([key, text]) => [about.recording.find((field) => field.name === key)?.label ?? key, text]);
+  return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer };
+}
+
 /** Compute the case after a change of the form; a slow case only after a pause. */
 function onChange() {
-  if (!(job ?? current)?.slow) return solve();
+  commitSoon();
+  hideMessage();
+  const isSlow = (job ?? current[state.door])?.slow || state.door === "recording";
+  if (!isSlow) { solve(); return; }
   job?.controller.abort();
+  setOutdated(true);
   clearTimeout(timer);
   timer = setTimeout(solve, PAUSE);
 }
 
-/** Return a name that no variant has, with a number if needed. */
-function newName(name) {
-  const isUsed = (text) => pinned.some((variant) => variant.name === text);
-  let [text, number] = [name, 1];
-  while (isUsed(text)) text = `${name} (${number += 1})`;
-  return text;
+// ---- Results.
+
+/** Return the variants of the current door, its own first. */
+function variantsOfDoor() {
+  const { door } = state;
+  const own = current[door];
+  if (door === "floor") return [own, ...kept.filter((variant) => variant.door === "floor")].filter(Boolean);
+  const others = kept.filter((variant) => variant.door !== "floor");
+  if (door === "ball" && current.recording) others.unshift({ ...current.recording, style: freeStyle(others) });
+  return [own, ...others].filter(Boolean);
 }
 
-async function measure(file) {
-  if (file.size > about.max_recording) return showMessage(`${file.name} is larger than ${about.max_recording / 1e6} MB; allowed: less`);
-  const query = new URLSearchParams({ name: file.name });
-  for (const field of document.querySelectorAll("[id^=recording_]")) {
-    if (field.value) query.set(field.id.slice("recording_".length), field.value);
+/** Show the answers of the current door. */
+function showAll() {
+  const { door } = state;
+  const variants = variantsOfDoor();
+  const own = current[door];
+  const isEmpty = !own;
+  document.body.dataset.door = door;
+  document.body.classList.toggle("measured", Boolean(current.recording));
+  hideTip();
+  byId("variants_section").hidden = variants.length < 2;
+  byId("keep").hidden = isEmpty;
+  byId("next").replaceChildren();
+  byId("result").replaceChildren();
+  showAsks(own && door === "recording" ? own.answer.asks : [], onChange);
+  if (isEmpty) {
+    showNothing(door);
+    return;
   }
-  try {
-    const answer = await runTask(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { showNow: true });
-    hideMessage();
-    const name = newName(`${file.name}, ${answer.drops} drop${answer.drops === 1 ? "" : "s"}`);
-    pinned.push({ name, short: name, description: answer.verdict, answer, pinned: true });
-    refresh();
-  } catch (error) { showError(error); }
+  nameVariants(variants);
+  const options = { thirds: byId("thirds").checked, differences: byId("differences").checked };
+  showHeadline(own);
+  showWarnings(own);
+  const hasRoom = Boolean(own.answer.room);
+  byId("levels_figure").hidden = hasRoom;
+  byId("force_figure").hidden = hasRoom;
+  byId("force_figure").classList.toggle("second", !hasRoom);
+  byId("criteria_section").hidden = door === "floor";
+  showRooms(variants, options);
+  if (!hasRoom) showForces(variants, options);
+  showFloors(variants);
+  if (door !== "floor") showCriteria(variants);
+  showBall(door === "recording" ? null : own.answer.motion);
+  showVariants(variants, { remove: removeVariant, rename: renameVariant });
+  showSounds(hasRoom ? variants : [], showError);
+  if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
+  if (door === "ball" && own.answer.headline.result !== "conforms") byId("next").append(button("Smallest change that conforms", improve, { id: "improve" }));
+  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted.text));
+  if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
 }
 
-async function download(name) {
-  const values = caseValues();
-  if (name === "study.toml") values.moved = state.moved;
-  try {
-    const response = await ask(`download/${name}`, { method: "POST", body: JSON.stringify(values) });
-    const link = element("a", { href: URL.createObjectURL(await response.blob()), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-    hideMessage();
-  } catch (error) { showError(error); }
+/** Return the result of a fit, and its details folded. */
+function fitTexts(text) {
+  const [, first, rest] = text.match(/^(.*?\)\.) ?(.*)$/s) ?? [null, text, ""];
+  return [element("p", {}, first), ...(rest ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, rest))] : [])];
 }
 
-function refresh() {
-  const variants = current ? [current, ...pinned] : pinned;
-  show(variants, (variant) => { pinned.splice(pinned.indexOf(variant), 1); refresh(); });
-  showSounds(variants, showError);
+/** Show the door without an answer. */
+function showNothing(door) {
+  byId("verdict").className = "";
+  byId("verdict").replaceChildren(element("b", {}, door === "recording" ? "Does my source conform?" : "Computing …"));
+  byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
+  for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
+  for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
 }
 
-// ---- Events.
+// ---- Variants.
 
-function pin() {
-  if (!current) return;
-  const letter = String.fromCharCode(65 + (pinned.filter((variant) => variant.letter).length % 26));
-  pinned.push({ ...current, name: `${letter}: ${current.name}`, short: `${letter}: ${current.name}`, letter, pinned: true });
-  refresh();
+function keep() {
+  const own = current[state.door];
+  if (!own) return;
+  kept = [...kept, { ...own, style: freeStyle(variantsOfDoor()) }];
+  showAll();
+  commit();
+}
+
+function removeVariant(variant) {
+  if (kept.includes(variant)) kept = kept.filter((other) => other !== variant);
+  else current.recording = null;
+  showAll();
+  byId("keep").focus();
+  commit();
+}
+
+/** Give a variant a name of the user; an empty one takes it back, and null changes nothing. */
+function renameVariant(variant, text) {
+  if (text === "") delete variant.title;
+  else if (text !== null && text !== variant.label) variant.title = text;
+  showAll();
+  store();
+}
+
+// ---- Doors, history, storage and link.
+
+/** Open a door, and compute its case if that is not known. */
+function openDoor(door, { focus = false } = {}) {
+  job?.controller.abort();
+  job = null;
+  state.door = door;
+  for (const name of DOORS) {
+    const tab = byId(`door_${name}`);
+    tab.setAttribute("aria-selected", String(name === door));
+    tab.tabIndex = name === door ? 0 : -1;
+    if (name === door && focus) tab.focus();
+  }
+  byId("panel").setAttribute("aria-labelledby", `door_${door}`);
+  history.replaceState(null, "", `#${door}`);
+  document.body.dataset.door = door;
+  buildDoor(onChange, onInvalid);
+  hideMessage();
+  const isCurrent = Boolean(current[door]) && (door === "recording" || JSON.stringify(current[door].values) === JSON.stringify(caseValues(door)));
+  showAll();
+  setOutdated(!isCurrent && Boolean(current[door]), !isCurrent);
+  if (!isCurrent || current[door].isPartial) solve();
+  commitSoon();
+}
+
+const steps = { list: [], at: -1, timer: 0 };
+const snapshot = () => ({ state: JSON.stringify(state), kept, recorded: current.recording, files: recording.files });
+
+function commitSoon() {
+  clearTimeout(steps.timer);
+  steps.timer = setTimeout(commit, COMMIT_PAUSE);
+}
+
+/** Remember the case and its variants, so that a change can be undone. */
+function commit() {
+  clearTimeout(steps.timer);
+  const [last, next] = [steps.list[steps.at], snapshot()];
+  const isEqual = last && last.kept === next.kept && last.files === next.files && sameCase(last.state, next.state);
+  store();
+  if (isEqual) return;
+  steps.list.splice(steps.at + 1, Infinity, next);
+  steps.at = steps.list.length - 1;
+  showSteps();
+}
+
+function sameCase(one, other) {
+  const text = (entry) => JSON.stringify({ ...JSON.parse(entry), moved: null, door: null });
+  return text(one) === text(other);
+}
+
+function showSteps() {
+  byId("undo").disabled = steps.at <= 0;
+  byId("redo").disabled = steps.at >= steps.list.length - 1;
+}
+
+function goTo(at) {
+  commit();
+  const step = steps.list[at];
+  if (!step) return;
+  steps.at = at;
+  restore(JSON.parse(step.state));
+  kept = step.kept;
+  current.recording = step.recorded;
+  recording.files = step.files;
+  showSteps();
+  const { door } = state;
+  openDoor(door);
+  store();
+}
+
+function restore(values) {
+  for (const name of Object.keys(state)) state[name] = values[name] ?? state[name];
+}
+
+const withoutMotion = (variant) => ({ ...variant, answer: { ...variant.answer, motion: null, report: null } });
+
+/** Store case and variants in this browser; without room for the answers, only the case. */
+function store() {
+  const own = current[state.door];
+  const entry = { start: JSON.stringify(about.start), state, shown: own?.values ? withoutMotion(own) : null, kept: kept.map(withoutMotion) };
+  for (const content of [entry, { ...entry, shown: null, kept: [] }]) {
+    try {
+      localStorage.setItem(STORE, JSON.stringify(content));
+      return;
+    } catch { /* The storage is full. */ }
+  }
+}
+
+/** Restore what this browser has stored for the same start of the page; return whether there was something. */
+function restoreStored() {
+  let stored = null;
+  try { stored = JSON.parse(localStorage.getItem(STORE)); } catch { /* Not written by this page. */ }
+  if (stored?.start !== JSON.stringify(about.start) || !about.models.some(({ name }) => name === stored.state?.model)) return false;
+  restore(stored.state);
+  kept = stored.kept;
+  return true;
 }
 
 async function copyLink() {
-  const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(caseValues()))}`;
-  history.replaceState(null, "", address);
-  const copied = await navigator.clipboard?.writeText(address).then(() => true, () => false);
-  byId("link").textContent = copied ? "Link copied" : "Link is in the address bar";
-  setTimeout(() => { byId("link").textContent = "Copy link"; }, 2000);
+  const variants = kept.filter(({ values }) => values).map(({ door, values, title }) => ({ door, values, title }));
+  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants };
+  const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
+  const isCopied = await copyText(address, "Copy this link");
+  if (isCopied) flash("link", "Link copied");
+  if (kept.some(({ values }) => !values) || state.door === "recording") showMessage("The link holds the models; recordings are too large for a link: use “Save as HTML”");
+}
+
+function flash(id, text) {
+  const target = typeof id === "string" ? byId(id) : id;
+  const before = target.textContent;
+  target.textContent = text;
+  setTimeout(() => { target.textContent = before; }, 1500);
+}
+
+/** Take over the content of a link; return whether it is one of this page. */
+async function takeLink(text) {
+  let content = null;
+  try { content = JSON.parse(text); } catch { return false; }
+  const { door, ball, floor, variants } = content ?? {};
+  if (!DOORS.includes(door) || ![ball, floor].every(isCase) || !Array.isArray(variants) || !variants.every((variant) => isCase(variant?.values))) return false;
+  takeValues(floor);
+  state.door = door;
+  for (const variant of variants) {
+    const answer = await runTask("Computing", "solve", JSON.stringify(variant.values), new AbortController()).catch(showError);
+    if (answer) kept = [...kept, { door: variant.door, style: freeStyle(kept.filter((other) => (other.door === "floor") === (variant.door === "floor"))), values: variant.values, title: variant.title, answer }];
+  }
+  return true;
+}
+
+function reset() {
+  localStorage.removeItem(STORE);
+  kept = [];
+  recording.files = [];
+  Object.assign(current, { recording: null, ball: null, floor: null });
+  begin(about.start);
+  commit();
+}
+
+/** Begin with the values of a case, or with the first preset. */
+function begin(start) {
+  Object.assign(state, { values: {}, unknowns: {}, moved: {}, recording: {}, model: about.presets[0].values.model.name });
+  const floors = about.presets.find((preset) => preset.door === "floor");
+  takeValues(floors.values);
+  if (Object.keys(start).length) takeValues(start);
+  openDoor(start.floor || start.room ? "floor" : "ball");
+}
+
+// ---- Actions.
+
+async function fit() {
+  byId("fit").disabled = true;
+  try {
+    const { values, text } = await runTask("Fitting a ball to the recording", "fit", checkedBody(caseValues("ball")), new AbortController(), { showNow: true });
+    takeValues(values);
+    fitted = { text, values: JSON.stringify(caseValues("ball")) };
+    openDoor("ball");
+  } catch (error) { showError(error); } finally { if (byId("fit")) byId("fit").disabled = false; }
+}
+
+async function improve() {
+  const asked = byId("improve");
+  asked.disabled = true;
+  try {
+    const { changes, none, note } = await runTask("Looking for a change that conforms", "improve", JSON.stringify(caseValues("ball")), new AbortController(), { showNow: true });
+    const apply = ({ key, value }) => {
+      const [group, name] = key.split(".");
+      const values = caseValues("ball");
+      (values[group] ??= {})[name] = value;
+      takeValues(values);
+      openDoor("ball");
+    };
+    const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
+    byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
+  } catch (error) { showError(error); } finally { asked.disabled = false; }
+}
+
+async function download(name, copyButton) {
+  const values = caseValues();
+  if (name === "study.toml") values.moved = state.moved;
+  try {
+    const file = await fileOf(name, values);
+    if (!copyButton) saveFile(name, file);
+    else if (await copyText(await file.text(), copyButton.textContent)) flash(copyButton, "Copied");
+    hideMessage();
+  } catch (error) { showError(error); }
 }
 
 function listen() {
-  byId("form").addEventListener("submit", (event) => event.preventDefault());
-  const rebuild = () => {
-    // Losing the focus enters the text being typed, before the field is replaced.
-    if (byId("form").contains(document.activeElement) && document.activeElement.matches("input")) document.activeElement.blur();
-    build(onChange);
-    onChange();
-  };
-  byId("model").addEventListener("change", (event) => { state.model = event.target.value; rebuild(); });
-  byId("floor").addEventListener("change", (event) => {
-    state.floor = event.target.value;
-    state.room &&= Boolean(state.floor);
-    rebuild();
+  byId("inputs").addEventListener("submit", (event) => event.preventDefault());
+  for (const door of DOORS) byId(`door_${door}`).addEventListener("click", () => openDoor(door));
+  byId("doors").addEventListener("keydown", (event) => {
+    const move = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
+    if (move) openDoor(DOORS[(DOORS.indexOf(state.door) + move + 3) % 3], { focus: true });
   });
-  byId("construction").addEventListener("change", (event) => { fillConstruction(event.target.value); rebuild(); });
-  byId("has_room").addEventListener("change", (event) => {
-    if (event.target.checked) addRoom();
-    else state.room = false;
-    rebuild();
-  });
-  byId("pin").addEventListener("click", pin);
-  byId("reset").addEventListener("click", () => { pinned.length = 0; startWith(about.start, onChange); onChange(); });
+  byId("keep").addEventListener("click", keep);
+  byId("undo").addEventListener("click", () => goTo(steps.at - 1));
+  byId("redo").addEventListener("click", () => goTo(steps.at + 1));
+  byId("reset").addEventListener("click", reset);
   byId("link").addEventListener("click", copyLink);
-  for (const button of document.querySelectorAll("[data-file]")) button.addEventListener("click", () => download(button.dataset.file));
-  byId("file").addEventListener("change", (event) => {
-    if (event.target.files[0]) measure(event.target.files[0]);
-    // Otherwise choosing the same file again, with another calibration, would raise no event.
-    event.target.value = "";
+  byId("save_page").addEventListener("click", () => { const variants = variantsOfDoor(); if (variants.length) saveFile("thud.html", pageOf(variants, about.version), "text/html"); });
+  for (const name of ["thirds", "differences"]) byId(name).addEventListener("change", showAll);
+  for (const target of document.querySelectorAll("[data-file]")) target.addEventListener("click", () => download(target.dataset.file));
+  for (const target of document.querySelectorAll("[data-copy]")) target.addEventListener("click", () => download(target.dataset.copy, target));
+  addEventListener("keydown", (event) => {
+    if (event.key === "Escape") { hideTip(); for (const menu of document.querySelectorAll(".menu[open]")) { menu.open = false; menu.firstElementChild.focus(); } }
+    const isTyping = event.target.matches?.("textarea, [type=text], [type=number]") && document.body.classList.contains("outdated");
+    if (!(event.ctrlKey || event.metaKey) || isTyping) return;
+    const isRedo = event.key === "y" || (event.key.toLowerCase() === "z" && event.shiftKey);
+    if (event.key.toLowerCase() !== "z" && !isRedo) return;
+    event.preventDefault();
+    goTo(steps.at + (isRedo ? 1 : -1));
   });
+  addEventListener("click", (event) => { for (const menu of document.querySelectorAll(".menu[open]")) if (!menu.contains(event.target) || event.target.closest("button")) menu.open = false; });
   addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("dragging"); });
   addEventListener("dragleave", () => document.body.classList.remove("dragging"));
   addEventListener("drop", (event) => {
     event.preventDefault();
     document.body.classList.remove("dragging");
-    for (const file of event.dataTransfer.files) measure(file);
+    if (!event.dataTransfer.files.length) return;
+    const files = [...event.dataTransfer.files];
+    if (state.door !== "recording") openDoor("recording");
+    addFiles(files, onChange);
   });
   listenToBall();
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", refresh);
 }
 
-async function begin() {
-  storeToken();
+async function main() {
   try {
-    about = await (await ask("about")).json();
-  } catch (error) { return showMessage(error.message); }
-  state.form = about.form;
-  state.constructions = about.constructions;
-  state.roomSource = about.room_source;
-  buildRecording(about.recording);
-  let start = about.start;
-  try { start = JSON.parse(linkedCase()) ?? start; } catch { start = null; }
-  const isValid = isCase(start);
-  startWith(isValid ? start : about.start, onChange);
+    Object.assign(about, await getAbout());
+  } catch (error) {
+    byId("verdict").replaceChildren();
+    showMessage(error.message);
+    if (error instanceof ConnectionError) retryTimer = setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);
+    return;
+  }
+  addPlotMenus();
   listen();
-  await solve();
-  if (!isValid) showMessage("the link does not contain a case; allowed: links copied from this page");
+  const link = fragment.get("case");
+  const door = DOORS.find((name) => fragment.has(name));
+  if (firstVariant) current[firstVariant.door] = firstVariant;
+  const isRestored = link === null && restoreStored();
+  if (isRestored) openDoor(door ?? state.door);
+  else begin(about.start);
+  if (link !== null) {
+    if (await takeLink(link)) openDoor(state.door);
+    else showMessage("The link does not contain a case; allowed: links copied from this page");
+  } else if (door && !isRestored) openDoor(door);
+  commit();
 }
 
-begin();
+main();

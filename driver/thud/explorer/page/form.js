@@ -1,263 +1,365 @@
-// Form of the case, with fields from the declarations of the keys.
-import { byId, capitalize, element, scaled } from "./page.js";
+// The case and its form: fields from the declarations of the keys, presets, models, constructions and the room.
+import { button, byId, capitalize, element, scaled } from "./page.js";
 
-/** State of the case: values that differ from their defaults, chosen construction, ranges of moved sliders, and what is not known, by model. */
-export const state = { form: [], constructions: [], roomSource: {}, values: {}, model: "", floor: "", chosen: "", room: false, moved: {}, unknowns: {} };
+/** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, ranges of moved fields, and what is not known, by model. */
+export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
+export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {} };
 
-const groupsOf = (part) => state.form.filter((group) => group.part === part);
-const commonGroups = () => state.form.filter((group) => group.part === group.name && group.part !== "room");
-/** Return the group of a model or floor. */
+// Digits of a number in its field.
+const DIGITS = 6;
+
+const groupsOf = (part) => about.form.filter((group) => group.part === part);
+const commonGroups = () => about.form.filter((group) => group.part === group.name && group.part !== "room");
 const findGroup = (part, name) => groupsOf(part).find((group) => group.name === name);
+const sourceGroups = () => [...commonGroups(), findGroup("model", state.model)].filter(Boolean);
+const floorGroups = () => [...(state.floor ? [findGroup("floor", state.floor)] : []), ...(state.room ? groupsOf("room") : [])];
 
-/** Return the title of a model or floor. */
-export function titleOf(part, name) {
-  return findGroup(part, name)?.title ?? name;
+/** Return what the server says of a model or a floor. */
+export const factsOf = (part, name) => about[`${part}s`].find((facts) => facts.name === name) ?? { title: name, values: {} };
+
+/** Return the field of a key. */
+export function findField(group, name) {
+  return about.form.flatMap(({ fields }) => fields).find((field) => field.group === group && field.name === name);
 }
 
-/** Return the groups of the current model, floor and room. */
-function usedGroups() {
-  const groups = [...commonGroups(), findGroup("model", state.model)];
-  if (state.floor) groups.push(findGroup("floor", state.floor));
-  if (state.room) groups.push(...groupsOf("room"));
-  return groups;
+/** Return whether a field has an effect on the case. */
+function isUsed(field) {
+  if (field.models && !field.models.includes(state.model)) return false;
+  if (!field.condition) return true;
+  const { group, name, values } = field.condition;
+  return values.includes(valueOf(findField(group, name)));
 }
 
-/** Return the values of the case by group and key. */
-export function caseValues() {
-  const values = { case: { name: "explored" }, model: { name: state.model } };
-  if (state.floor) values.floor = { name: state.floor };
-  for (const { fields } of usedGroups())
-    for (const { group } of fields) if (state.values[group]) values[group] = state.values[group];
-  if (state.room) values.room ??= {};
-  if (state.unknowns[state.model]) values.unknowns = state.unknowns[state.model];
-  return structuredClone(values);
-}
+const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 
-/** Return the fields that a construction fills: those of its floor, and of the ceiling of the room. */
-const floorFields = (construction) => findGroup("floor", construction.floor).fields;
-const ceilingFields = () => findGroup("room", "room").fields.filter((field) => field.name.startsWith("ceiling_"));
-
-/** Return the construction whose values the form has, if there is one; of several, the chosen one. */
-function findConstruction() {
-  const hasValues = (fields, values) => fields.every((field) => JSON.stringify(getValue(field)) === JSON.stringify(values[field.name] ?? field.default));
-  const found = state.constructions.filter((construction) => construction.floor === state.floor && hasValues(floorFields(construction), construction.keys)
-    && (state.room ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
-  return found.find(({ name }) => name === state.chosen) ?? found[0];
-}
-
-/** Fill the fields of floor and ceiling with the values of a construction; a ceiling needs the room below. */
-export function fillConstruction(name) {
-  const construction = state.constructions.find((entry) => entry.name === name);
-  if (!construction) return;
-  state.chosen = name;
-  state.floor = construction.floor;
-  if (Object.keys(construction.room).length && !state.room) addRoom();
-  for (const field of floorFields(construction)) setValue(field, construction.keys[field.name] ?? field.default);
-  if (state.room) for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? field.default);
-}
-
-/** Show which construction the form has. */
-function showConstruction() {
-  const construction = findConstruction();
-  byId("construction").value = construction?.name ?? "";
-  byId("construction_text").textContent = construction?.text ?? "";
-  byId("construction_text").hidden = !construction;
-}
-
-/** Return a text of floor, room and the values that differ from their defaults. */
-export function describeChanges() {
-  const changes = [];
-  const construction = findConstruction();
-  const filled = construction ? [...floorFields(construction), ...ceilingFields()] : [];
-  if (state.floor) changes.push(`Floor: ${construction?.name ?? titleOf("floor", state.floor)}`);
-  if (state.room) changes.push("Room below");
-  for (const { fields } of usedGroups()) {
-    for (const field of fields) {
-      if (filled.includes(field)) continue;
-      const value = state.values[field.group]?.[field.name];
-      if (value === undefined) continue;
-      const shown = field.choices[value] ?? (typeof value === "number" ? scaled(value, -field.power) : String(value));
-      changes.push(`${field.label} ${shown} ${field.unit}`.trim());
-    }
-  }
-  return changes.join(", ");
-}
-
-/** Return whether values are a case with a known model and floor. */
-export function isCase(values) {
-  if (!values || typeof values !== "object") return false;
-  const isKnown = (part) => !values[part] || findGroup(part, values[part].name);
-  return Boolean(isKnown("model") && isKnown("floor"));
-}
-
-/** Fill the form with the values of a case. */
-export function startWith(values, onChange) {
-  const { model, floor, ...rest } = values.room && !values.model ? { ...values, ...state.roomSource } : values;
-  Object.assign(state, { model: model?.name ?? groupsOf("model")[0].name, floor: floor?.name ?? "", room: Boolean(rest.room), values: {}, moved: {} });
-  state.unknowns = rest.unknowns ? { [state.model]: rest.unknowns } : {};
-  for (const { fields } of usedGroups()) {
-    for (const field of fields) {
-      let value = rest[field.group]?.[field.name];
-      if (value === undefined || value === null) continue;
-      if (field.kind === "list" && !Array.isArray(value)) value = [value];
-      setValue(field, value);
-    }
-  }
-  build(onChange);
-}
-
-/** Add the room; a model that was left at its default becomes the source of a room whose case names none. */
-export function addRoom() {
-  state.room = true;
-  state.floor ||= "plate";
-  const { model, ...options } = state.roomSource;
-  if (state.model !== groupsOf("model")[0].name || state.values[state.model]) return;
-  state.model = model.name;
-  for (const [group, values] of Object.entries(options)) state.values[group] ??= { ...values };
-}
-
-function getValue(field) {
+function valueOf(field) {
   return state.values[field.group]?.[field.name] ?? field.default;
 }
 
 function setValue(field, value) {
   const group = (state.values[field.group] ??= {});
-  if (JSON.stringify(value) === JSON.stringify(field.default)) delete group[field.name];
+  if (isSame(value, field.default)) delete group[field.name];
   else group[field.name] = value;
   if (!Object.keys(group).length) delete state.values[field.group];
 }
 
-/** Build the form for the current model, floor and room; `onChange` is called after each change. */
-export function build(onChange) {
-  const sources = findConstruction()?.sources ?? {};
-  const named = (names) => commonGroups().filter((group) => names.includes(group.name));
-  const elements = (groups, isOpen) => groups.filter((group) => group?.fields.length).map((group) => groupElement(group, isOpen, onChange, ["floor", "room"].includes(group.part) ? sources : {}));
-  byId("groups").replaceChildren(...elements([...named(["ball", "drop"]), findGroup("model", state.model)], true));
-  byId("floor_groups").replaceChildren(...elements([findGroup("floor", state.floor)], true));
-  byId("room_groups").replaceChildren(...elements(state.room ? groupsOf("room") : [], true));
-  byId("other_groups").replaceChildren(...elements(commonGroups().filter((group) => !["ball", "drop"].includes(group.name)), false));
-  const options = (name) => groupsOf(name).map((group) => element("option", { value: group.name }, group.title));
-  byId("model").replaceChildren(...options("model"));
-  byId("floor").replaceChildren(element("option", { value: "" }, "Rigid test floor"), ...options("floor").filter((option) => option.value !== "rigid"));
-  const kinds = [...new Set(state.constructions.map(({ kind }) => kind))];
-  const ofKind = (kind) => state.constructions.filter((construction) => construction.kind === kind).map(({ name }) => element("option", { value: name }, name));
-  byId("construction").replaceChildren(element("option", { value: "" }, "None of the library"), ...kinds.map((kind) => element("optgroup", { label: kind }, ...ofKind(kind))));
-  showConstruction();
-  byId("model").value = state.model;
-  byId("floor").value = state.floor;
-  byId("has_room").checked = state.room;
+/** Return the values of the case of a door by group and key, without those that have no effect. */
+export function caseValues(door = state.door) {
+  const values = { model: { name: state.model } };
+  const hasFloor = door === "floor";
+  if (hasFloor && state.floor) values.floor = { name: state.floor };
+  for (const { fields } of [...sourceGroups(), ...(hasFloor ? floorGroups() : [])]) {
+    for (const field of fields) {
+      const value = state.values[field.group]?.[field.name];
+      if (value !== undefined && isUsed(field)) (values[field.group] ??= {})[field.name] = value;
+    }
+  }
+  if (hasFloor && state.room) values.room ??= {};
+  if (state.unknowns[state.model]) values.unknowns = state.unknowns[state.model];
+  return structuredClone(values);
 }
 
-/** Return the element of a group; `sources` are those of the values of a construction. */
-function groupElement(group, open, onChange, sources) {
-  return element("details", { open }, element("summary", {}, group.title), ...group.fields.map((field) => fieldElement(field, onChange, sources[field.name])));
+/** Return whether values are a case with a known model and floor. */
+export function isCase(values) {
+  if (!values || typeof values !== "object" || Array.isArray(values)) return false;
+  const isKnown = (part) => !values[part] || findGroup(part, values[part].name);
+  return Boolean(isKnown("model") && isKnown("floor")) && Object.values(values).every((group) => group && typeof group === "object" && !Array.isArray(group));
 }
 
-function fieldElement(field, onChange, source) {
+/** Take over the source of a case, or all of it. */
+export function takeValues(values) {
+  const { model, floor, ...rest } = values.model ? values : { ...values, ...about.presets[0].values };
+  for (const { fields } of sourceGroups()) for (const field of fields) if (field.group !== "model") delete state.values[field.group];
+  state.model = model.name;
+  if (floor) setFloor(floor.name);
+  if (floor || rest.room) {
+    state.room = Boolean(rest.room);
+    state.floor = floor?.name ?? "plate";
+    for (const { fields } of floorGroups()) for (const field of fields) delete state.values[field.group];
+  }
+  if (rest.unknowns) state.unknowns[model.name] = rest.unknowns;
+  for (const { fields } of [...sourceGroups(), ...floorGroups()]) {
+    for (const field of fields) {
+      const value = rest[field.group]?.[field.name];
+      if (value === undefined || value === null) continue;
+      setValue(field, field.kind === "list" && !Array.isArray(value) ? [value] : value);
+    }
+  }
+}
+
+/** Replace the values that belong to a model or a floor, where they were not changed, by those of another. */
+function exchange(old, next) {
+  for (const [group, values] of Object.entries(old)) {
+    for (const [name, value] of Object.entries(values)) {
+      const field = findField(group, name);
+      if (field && isSame(valueOf(field), value)) setValue(field, field.default);
+    }
+  }
+  for (const [group, values] of Object.entries(next)) for (const [name, value] of Object.entries(values)) {
+    const field = findField(group, name);
+    if (field) setValue(field, value);
+  }
+}
+
+/** Return whether the floor has a plate that radiates into a room. */
+const hasRoom = () => factsOf("floor", state.floor).has_room !== false;
+
+function setModel(name) {
+  exchange(factsOf("model", state.model).values, factsOf("model", name).values);
+  state.model = name;
+}
+
+function setFloor(name) {
+  exchange(factsOf("floor", state.floor).values, factsOf("floor", name).values);
+  state.floor = name;
+  state.room &&= hasRoom();
+}
+
+// ---- Constructions.
+
+/** Return the fields that a construction fills: those of its floor, and of the ceiling of the room. */
+const filledFields = (construction) => findGroup("floor", construction.floor).fields;
+const ceilingFields = () => findGroup("room", "room").fields.filter((field) => field.name.startsWith("ceiling_"));
+
+/** Return the construction whose values the form has, if there is one; of several, the chosen one. */
+function findConstruction() {
+  const hasValues = (fields, values) => fields.every((field) => isSame(valueOf(field), values[field.name] ?? field.default));
+  const equal = about.constructions.filter((construction) => construction.floor === state.floor && hasValues(filledFields(construction), construction.keys)
+    && (state.room ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
+  return equal.find(({ name }) => name === state.chosen) ?? equal[0];
+}
+
+/** Fill the fields of floor and ceiling with the values of a construction; a ceiling needs the room below. */
+export function fillConstruction(name) {
+  const construction = about.constructions.find((entry) => entry.name === name);
+  if (!construction) return;
+  Object.assign(state, { chosen: name, floor: construction.floor, room: state.room || Object.keys(construction.room).length > 0 });
+  for (const field of filledFields(construction)) setValue(field, construction.keys[field.name] ?? field.default);
+  for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? field.default);
+}
+
+// ---- Form.
+
+/** Build the form of the current door; `onChange` is called after each change, `onInvalid` when a field has no valid or no current value. */
+export function buildInputs(onChange, onInvalid) {
+  const focus = document.activeElement?.id;
+  const scroll = byId("inputs").scrollTop;
+  const handlers = { onChange, onInvalid, rebuild: () => { buildInputs(onChange, onInvalid); onChange(); } };
+  byId("inputs").replaceChildren(...(state.door === "floor" ? floorInputs(handlers) : ballInputs(handlers)));
+  byId("inputs").scrollTop = scroll;
+  if (focus && document.activeElement?.id !== focus) byId(focus)?.focus();
+}
+
+function ballInputs(handlers) {
+  const current = caseValues("ball");
+  const choices = about.presets.filter((preset) => preset.door === "ball").map((preset) => button(preset.title, () => { takeValues(preset.values); handlers.rebuild(); },
+    { id: `preset_${preset.name}`, "aria-pressed": String(isSame(sorted(preset.values), sorted(current))), title: preset.text }));
+  const chosen = about.presets.find((preset) => isSame(sorted(preset.values), sorted(current)));
+  const common = commonGroups();
+  const own = findGroup("model", state.model);
+  return [
+    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), element("p", { class: "help" }, chosen ? `${chosen.text}.` : "Changed.")),
+    choiceOf("model", "Model", about.models.map(({ name, title }) => [name, title]), state.model, (name) => { setModel(name); handlers.rebuild(); },
+      element("p", { class: "help" }, `${factsOf("model", state.model).purpose}. `, element("em", {}, factsOf("model", state.model).validity))),
+    ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),
+    foldedElement([own, ...common], handlers),
+  ];
+}
+
+function floorInputs(handlers) {
+  const construction = findConstruction();
+  const kinds = [...new Set(about.constructions.map(({ kind }) => kind))];
+  const options = [["", "None of the library"], ...kinds.map((kind) => [kind, about.constructions.filter((entry) => entry.kind === kind).map(({ name }) => [name, name])])];
+  const sources = construction?.sources ?? {};
+  const balls = about.presets.filter((preset) => preset.door === "ball");
+  const source = balls.find((preset) => isSame(sorted(preset.values), sorted(caseValues("ball"))));
+  const box = element("input", { type: "checkbox", id: "has_room" });
+  box.checked = state.room;
+  box.disabled = !hasRoom();
+  box.addEventListener("change", () => { state.room = box.checked; handlers.rebuild(); });
+  return [
+    choiceOf("construction", "Construction", options, construction?.name ?? "", (name) => { fillConstruction(name); handlers.rebuild(); },
+      element("p", { class: "help", id: "construction_text" }, construction?.text ?? "Changed values of a floor.")),
+    choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls.map(({ name, title }) => [name, title])], source?.name ?? "",
+      (name) => { takeValues(balls.find((preset) => preset.name === name).values); handlers.rebuild(); }),
+    element("label", { class: "toggle" }, box, "Room below"),
+    ...(state.room ? groupsOf("room").map((group) => groupElement(group, handlers, sources)) : []),
+    choiceOf("floor", "Kind of floor", about.floors.filter(({ name }) => name !== "rigid").map(({ name, title }) => [name, title]), state.floor, (name) => { setFloor(name); handlers.rebuild(); },
+      element("p", { class: "help" }, `${factsOf("floor", state.floor).purpose}. `, element("em", {}, factsOf("floor", state.floor).validity))),
+    groupElement(findGroup("floor", state.floor), handlers, sources),
+    foldedElement(floorGroups(), handlers, sources),
+  ];
+}
+
+/** Return values in the order of their names, without empty groups, for comparisons. */
+export function sorted(values) {
+  const order = (entries) => Object.fromEntries(Object.entries(entries).sort(([one], [other]) => (one < other ? -1 : 1)));
+  return order(Object.fromEntries(Object.entries(values).filter(([name, group]) => name === "room" || Object.keys(group).length).map(([name, group]) => [name, order(group)])));
+}
+
+function choiceOf(id, label, options, value, onSelect, ...rest) {
+  const optionOf = ([name, title]) => (Array.isArray(title) ? element("optgroup", { label: name }, ...title.map(optionOf)) : element("option", { value: name }, title));
+  const select = element("select", { id }, ...options.map(optionOf));
+  select.value = value;
+  select.addEventListener("change", () => onSelect(select.value));
+  return element("div", {}, element("div", { class: "field" }, element("label", { for: id }, element("b", {}, label)), select), ...rest);
+}
+
+const titleOf = (group) => (["model", "floor"].includes(group.part) ? factsOf(group.part, group.name).title : group.title);
+
+/** Return the element of the fields of a group that are not folded; `sources` are those of the values of a construction. */
+function groupElement(group, handlers, sources = {}) {
+  const fields = group.fields.filter((field) => isUsed(field) && !field.advanced).map((field) => fieldElement(field, handlers, sources[field.name]));
+  return fields.length ? element("fieldset", {}, element("legend", {}, titleOf(group)), ...fields) : "";
+}
+
+let isUnfolded = false;
+
+/** Return the element of the folded fields of groups. */
+function foldedElement(groups, handlers, sources = {}) {
+  const parts = groups.map((group) => [group, group.fields.filter((field) => isUsed(field) && field.advanced)]).filter(([, fields]) => fields.length);
+  const result = element("details", { open: isUnfolded, class: "folded" }, element("summary", {}, `More: ${parts.map(([group]) => titleOf(group).toLowerCase()).join(", ")}`),
+    ...parts.map(([group, fields]) => element("fieldset", {}, element("legend", {}, titleOf(group)), ...fields.map((field) => fieldElement(field, handlers, sources[field.name])))));
+  result.addEventListener("toggle", () => { isUnfolded = result.open; });
+  return result;
+}
+
+function fieldElement(field, handlers, source) {
   const id = `${field.group}.${field.name}`;
-  const label = element("label", { for: id, title: field.help }, field.unit ? `${field.label}, ${field.unit}` : field.label);
+  const label = element("label", { for: id }, field.unit ? `${field.label}, ${field.unit}` : field.label);
   const help = element("p", { class: "help", id: `${id}.help` }, source ? `${field.help}. Source of the value: ${source}.` : `${field.help}.`);
+  const error = element("p", { class: "error", id: `${id}.error` });
   const onInput = (value) => {
+    const changesFields = about.form.some(({ fields }) => fields.some(({ condition }) => condition?.group === field.group && condition.name === field.name));
     setValue(field, value);
     help.textContent = `${field.help}.`;
-    showConstruction();
-    onChange();
+    if (changesFields) handlers.rebuild();
+    else handlers.onChange();
+    showChoices();
   };
-  const newInputs = { choice: choiceInput, flag: flagInput, list: listInput }[field.kind] ?? numberInput;
-  const inputs = newInputs(field, id, onInput);
-  for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help`);
-  return element("div", { class: "field" }, label, ...inputs, help);
+  const newInputs = { choice: choiceInput, flag: flagInput, list: listInput, text: textInput }[field.kind] ?? numberInput;
+  const inputs = newInputs(field, id, onInput, handlers.onInvalid);
+  for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help ${id}.error`);
+  return element("div", { class: "field" }, label, ...inputs, help, error);
+}
+
+/** Show which preset or construction the form has. */
+function showChoices() {
+  const current = sorted(caseValues("ball"));
+  for (const preset of about.presets) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isSame(sorted(preset.values), current)));
+  if (!byId("construction")) return;
+  const construction = findConstruction();
+  byId("construction").value = construction?.name ?? "";
+  byId("construction_text").textContent = construction?.text ?? "Changed values of a floor.";
 }
 
 function choiceInput(field, id, onInput) {
   const options = Object.entries(field.choices).map(([value, text]) => element("option", { value }, capitalize(text)));
   const select = element("select", { id }, ...options);
-  select.value = getValue(field);
+  select.value = valueOf(field);
   select.addEventListener("change", () => onInput(select.value));
   return [select];
 }
 
 function flagInput(field, id, onInput) {
   const box = element("input", { id, type: "checkbox" });
-  box.checked = getValue(field);
+  box.checked = valueOf(field);
   box.addEventListener("change", () => onInput(box.checked));
   return [box];
 }
 
-function listInput(field, id, onInput) {
-  const text = element("input", { id, type: "text", value: [getValue(field)].flat().join(" "), placeholder: "such as 10 20" });
+function textInput(field, id, onInput) {
+  const text = element("input", { id, type: "text", value: valueOf(field) });
+  text.addEventListener("change", () => onInput(text.value));
+  return [text];
+}
+
+function listInput(field, id, onInput, onInvalid) {
+  const text = element("input", { id, type: "text", value: [valueOf(field)].flat().join(" "), placeholder: "such as 10 20" });
+  text.addEventListener("input", () => onInvalid(null));
   text.addEventListener("change", () => {
     const numbers = text.value.split(/[\s;,]+/).filter(Boolean).map(Number);
-    text.setAttribute("aria-invalid", String(numbers.some(Number.isNaN)));
-    if (!numbers.some(Number.isNaN)) onInput(numbers);
+    if (numbers.some(Number.isNaN)) onInvalid(id, `${field.label}: “${text.value}” is not a list of numbers`);
+    else onInput(numbers);
   });
   return [text];
 }
 
-function numberInput(field, id, onInput) {
-  const value = scaled(getValue(field), -field.power);
-  const isWhole = field.kind === "whole";
-  const number = element("input", { id, type: "number", step: isWhole ? 1 : "any", min: field.lower, max: field.upper, value });
+function numberInput(field, id, onInput, onInvalid) {
+  let current = scaled(valueOf(field), -field.power);
+  // A zero that is not a number, such as "none", is an empty field.
+  const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;]+)/) ?? [];
+  const textOf = (value) => (zero && value === 0 ? "" : Number(value.toPrecision(DIGITS)));
+  const number = element("input", { id, type: "number", step: "any", value: textOf(current), placeholder: zero, class: zero && "open" });
   const send = (entered) => {
-    const key = `${field.group}.${field.name}`;
     const converted = scaled(entered, field.power);
-    const ends = (state.moved[key] ??= [getValue(field), getValue(field)]);
-    state.moved[key] = [Math.min(ends[0], converted), Math.max(ends[1], converted)];
+    const ends = (state.moved[id] ??= [valueOf(field), valueOf(field)]);
+    state.moved[id] = [Math.min(ends[0], converted), Math.max(ends[1], converted)];
+    current = entered;
+    number.value = textOf(entered);
+    slider?.moveTo(entered);
     onInput(converted);
   };
-  const slider = field.slider ? sliderInput(field, value, (entered) => {
-    number.value = entered;
-    number.setAttribute("aria-invalid", "false");
-    send(entered);
-  }) : null;
+  const step = field.step ?? (field.kind === "whole" ? 1 : null);
+  const slider = field.slider && step ? sliderInput(field, current, step, send) : null;
+  // The results belong to the value before.
+  number.addEventListener("input", () => { if (number.value !== String(textOf(current))) onInvalid(null); });
   number.addEventListener("change", () => {
-    const isInvalid = number.value === "" || !Number.isFinite(Number(number.value));
-    number.setAttribute("aria-invalid", String(isInvalid));
-    if (isInvalid) return;
-    slider?.moveTo(Number(number.value));
-    send(Number(number.value));
+    if (zero && number.value === "" && !number.validity.badInput) send(0);
+    else if (number.value === "" || !Number.isFinite(Number(number.value))) onInvalid(id, `${field.label}: enter a number${field.unit ? `, in ${field.unit}` : ""}`);
+    else send(Number(number.value));
   });
+  if (step) number.addEventListener("keydown", (event) => moveByKey(event, Number(number.value), step, field.lower, field.upper, send));
   return slider ? [number, slider] : [number];
 }
 
-/** Return a slider on a linear or logarithmic scale; `onMove` is called with the selected value. */
-function sliderInput(field, value, onMove) {
-  const { ends: [low, high], log } = field.slider;
-  const isWhole = field.kind === "whole";
-  const toSlider = log ? Math.log : (x) => x;
-  const fromSlider = log ? Math.exp : (x) => x;
-  const slider = element("input", { type: "range", "aria-label": field.label, min: toSlider(low), max: toSlider(high), step: isWhole ? 1 : "any" });
-  const announce = (selected) => slider.setAttribute("aria-valuetext", `${selected} ${field.unit}`.trim());
-  slider.moveTo = (selected) => { slider.value = toSlider(selected); announce(selected); };
+/** Move a value to the next round number with the arrow keys, ten steps with Page Up and Page Down. */
+function moveByKey(event, value, step, low, high, onMove) {
+  const steps = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10, ...(event.target.type === "range" ? { ArrowRight: 1, ArrowLeft: -1 } : {}) }[event.key];
+  if (!steps || event.altKey || event.ctrlKey || event.metaKey) return;
+  event.preventDefault();
+  const ratio = value / step;
+  const next = (steps > 0 ? Math.floor(ratio + 1e-6) : Math.ceil(ratio - 1e-6)) + steps;
+  const moved = rounding(next, step);
+  if (moved >= (low ?? -Infinity) && moved <= (high ?? Infinity)) onMove(moved);
+}
+
+/** Return a whole number of steps, a power of ten, without errors of rounding. */
+function rounding(count, step) {
+  return scaled(Math.round(count), Math.round(Math.log10(step)));
+}
+
+/** Return a slider on a linear or logarithmic scale with round values; `onMove` is called with the selected value. */
+function sliderInput(field, value, step, onMove) {
+  const [low, high] = [rounding(Math.ceil(field.slider.ends[0] / step - 1e-6), step), rounding(Math.floor(field.slider.ends[1] / step + 1e-6), step)];
+  const [toSlider, fromSlider] = field.slider.log && low > 0 ? [Math.log, Math.exp] : [(x) => x, (x) => x];
+  const slider = element("input", { type: "range", "aria-label": field.label, min: toSlider(low), max: toSlider(high), step: "any" });
+  let current = value;
+  slider.moveTo = (selected) => {
+    current = selected;
+    slider.value = toSlider(selected);
+    slider.setAttribute("aria-valuetext", `${selected} ${field.unit}`.trim());
+  };
   slider.moveTo(value);
   slider.addEventListener("input", () => {
-    const exact = fromSlider(Number(slider.value));
-    // Rounding must not exceed the ends.
-    const selected = Math.min(high, Math.max(low, isWhole ? Math.round(exact) : Number(exact.toPrecision(4))));
-    announce(selected);
-    onMove(selected);
+    const selected = Math.min(high, Math.max(low, rounding(fromSlider(Number(slider.value)) / step, step)));
+    if (selected !== current) onMove(selected);
+  });
+  slider.addEventListener("keydown", (event) => {
+    if (event.key === "Home" || event.key === "End") { event.preventDefault(); onMove(event.key === "Home" ? low : high); return; }
+    moveByKey(event, current, step, low, high, onMove);
   });
   return slider;
 }
 
-/** Build the fields of what the file of a recording does not state. */
-export function buildRecording(fields) {
-  const elements = (folded) => fields.filter((field) => field.folded === folded).map(recordingField);
-  byId("fields_of_recording").replaceChildren(...elements(false),
-    element("details", {}, element("summary", {}, "Standard uncertainties, force plate and filter"), ...elements(true)));
-}
-
-function recordingField({ name, label, kind, hint, choices }) {
-  const id = `recording_${name}`;
-  const options = Object.entries({ "": "not known", ...choices }).map(([value, text]) => element("option", { value }, text));
-  const isNumber = kind === "number";
-  const input = kind === "choice" ? element("select", { id }, ...options) : element("input", { id, type: kind, step: isNumber && "any", min: isNumber && "0" });
-  return element("div", { class: "field" }, element("label", { for: id }, label + hint), input);
-}
-
-/** Mark only the field that is named in a message of the server as invalid. */
-export function markField(message) {
-  for (const input of document.querySelectorAll("#form [aria-invalid=true]")) input.setAttribute("aria-invalid", "false");
-  const [, group, name] = message?.match(/&(\w+): (\w+)/) ?? [];
-  byId(`${group}.${name}`)?.setAttribute("aria-invalid", "true");
+/** Mark only one field as invalid, with a sentence below it; none without a name. */
+export function markField(name, message = "") {
+  for (const input of document.querySelectorAll("#panel [aria-invalid]")) input.removeAttribute("aria-invalid");
+  for (const error of document.querySelectorAll("#panel .error")) error.textContent = "";
+  const input = name && (byId(name) ?? byId(`recording_${name}`));
+  if (!input) return;
+  input.closest("details")?.setAttribute("open", "");
+  input.setAttribute("aria-invalid", "true");
+  const error = byId(`${input.id}.error`);
+  if (error) error.textContent = message;
 }

@@ -1,5 +1,5 @@
 // Sound in the room below: a button for each variant with a room, and a player.
-import { byId, element } from "./page.js";
+import { button, byId } from "./page.js";
 import { swatch } from "./plot.js";
 import { ask } from "./request.js";
 
@@ -9,7 +9,8 @@ const sounds = new Map();
 
 /** Show the buttons of the variants with a room; the sounds of removed variants are discarded. */
 export function showSounds(variants, onError) {
-  const rooms = variants.filter((variant) => variant.answer.room);
+  const rooms = variants.filter((variant) => variant.answer.room && variant.values);
+  byId("sound_section").hidden = !rooms.length;
   const cases = rooms.map(caseOf);
   for (const [text, { address }] of sounds) {
     if (cases.includes(text)) continue;
@@ -18,19 +19,19 @@ export function showSounds(variants, onError) {
   }
   byId("sounds_text").textContent = NOTE;
   byId("sounds").replaceChildren(...rooms.map((variant) => {
-    const button = element("button", { type: "button" }, swatch(variants.indexOf(variant)), ` Listen to ${variant.short}`);
-    button.addEventListener("click", () => play(variant, rooms).catch(onError));
-    return button;
+    const result = button("", () => playSound(variant, rooms).catch(onError));
+    result.append(swatch(variant.style), ` Listen to ${variant.label}`);
+    return result;
   }));
 }
 
 const caseOf = (variant) => JSON.stringify(variant.values);
 
-async function play(variant, rooms) {
+async function playSound(variant, rooms) {
   byId("sounds_text").textContent = "Computing the sound …";
   try {
     // All sounds, since the loudest one determines the volume of the others.
-    await Promise.all(rooms.map(load));
+    await Promise.all(rooms.map(loadSound));
   } finally {
     byId("sounds_text").textContent = NOTE;
   }
@@ -46,7 +47,7 @@ async function play(variant, rooms) {
   player.play().catch(() => {});
 }
 
-async function load(variant) {
+async function loadSound(variant) {
   const text = caseOf(variant);
   if (sounds.has(text)) return;
   const response = await ask("download/room.wav", { method: "POST", body: text });

@@ -4,21 +4,28 @@ export const byId = (id) => document.getElementById(id);
 
 /** Return an element with attributes (true: empty value; false or null: omitted) and children. */
 export function element(name, attributes = {}, ...children) {
-  return fill(document.createElement(name), attributes, children);
+  return setUp(document.createElement(name), attributes, children);
 }
 
 /** Return an SVG element, as `element` does. */
 export function svgElement(name, attributes = {}, ...children) {
-  return fill(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
+  return setUp(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
 }
 
-function fill(target, attributes, children) {
+function setUp(target, attributes, children) {
   for (const [key, value] of Object.entries(attributes)) {
     if (value === true) target.setAttribute(key, "");
     else if (value !== null && value !== undefined && value !== false) target.setAttribute(key, value);
   }
   target.append(...children);
   return target;
+}
+
+/** Return a button that calls a function. */
+export function button(text, onClick, attributes = {}) {
+  const result = element("button", { type: "button", ...attributes }, text);
+  result.addEventListener("click", onClick);
+  return result;
 }
 
 /** Return a number times a power of ten, correctly rounded. */
@@ -33,10 +40,10 @@ export function rounded(value, unit = "") {
   return `${minus(unit === "dB" ? value.toFixed(2) : Number(value.toPrecision(4)))} ${unit}`.trim();
 }
 
-/** Return the text of a number with its sign: levels with two decimals, others with two digits. */
-export function signed(value, unit = "") {
+/** Return the text of a number with its sign: levels with `decimals` decimals, others with two digits. */
+export function signed(value, unit = "", decimals = 2) {
   const size = Math.abs(value);
-  return `${value < 0 ? "−" : "+"}${unit === "dB" ? size.toFixed(2) : Number(size.toPrecision(2))}`;
+  return `${value < 0 ? "−" : "+"}${unit === "dB" ? size.toFixed(decimals) : Number(size.toPrecision(2))}`;
 }
 
 /** Return the text of a number with a typographic minus sign. */
@@ -46,4 +53,17 @@ export function minus(value) {
 
 export function capitalize(text) {
   return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+/** Return the nodes of a text in which symbols such as L_FE have subscripts. */
+export function withSymbols(text) {
+  return text.split(/(\bL_[A-Za-z]+(?:,[A-Za-z]+)?)/).map((part) =>
+    (/^L_/.test(part) ? element("span", { class: "symbol" }, element("i", {}, "L"), element("sub", {}, part.slice(2))) : part));
+}
+
+/** Save a text or a blob as a file. */
+export function saveFile(name, content, type = "text/plain") {
+  const link = element("a", { href: URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }

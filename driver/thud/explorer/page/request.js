@@ -1,47 +1,49 @@
 // Requests to the server. Each has the token; long computations answer with a stream of reports.
 
-/** Error that the server reports. */
-export class ServerError extends Error {}
+/** Error that the server reports; `field` is the field it is about, or null. */
+export class ServerError extends Error {
+  constructor({ error, field }) {
+    super(error);
+    this.field = field ?? null;
+  }
+}
 
 /** The server is not running, or it was started again with another token. */
 export class ConnectionError extends Error {}
 
-const parameters = () => new URLSearchParams(location.hash.slice(1));
+const MISSING_TOKEN = "Open the full address shown in the terminal: it holds the token";
+const restart = () => `start it again with: thud-driver explore --port ${location.port}`;
 
-/** Store the token of the address and remove it from the address. */
-export function storeToken() {
-  const fragment = parameters();
-  const token = fragment.get("token");
-  if (!token) return;
-  localStorage.setItem("token", token);
+/** Parameters of the address; the token moves to the storage of the browser. */
+export const fragment = new URLSearchParams(location.hash.slice(1));
+if (fragment.get("token")) {
+  localStorage.setItem("token", fragment.get("token"));
   fragment.delete("token");
   history.replaceState(null, "", fragment.size ? `#${fragment}` : location.pathname);
-}
-
-/** Return the text of the case in the address. */
-export function linkedCase() {
-  return parameters().get("case");
 }
 
 /** Return the response; throw ServerError, ConnectionError or, if the request was cancelled, AbortError. */
 export async function ask(path, options = {}) {
   // Another page in this browser may have stored the token of a new server.
-  const headers = { "X-Thud-Token": localStorage.getItem("token") ?? "" };
+  const token = localStorage.getItem("token");
+  if (!token) throw new ConnectionError(MISSING_TOKEN);
   let response = null;
   try {
-    response = await fetch(path, { ...options, headers });
+    response = await fetch(path, { ...options, headers: { "X-Thud-Token": token } });
   } catch (error) {
     if (error.name === "AbortError") throw error;
-    throw new ConnectionError(`the server does not answer; start it again with: thud-driver explore --port ${location.port}`);
+    throw new ConnectionError(`The server does not answer; ${restart()}`);
   }
   if (response.ok) return response;
-  const message = await response.text();
-  throw response.status === 403 ? new ConnectionError(message) : new ServerError(message);
+  const report = await response.json().catch(() => ({ error: response.statusText }));
+  throw response.status === 403 ? new ConnectionError(report.error) : new ServerError(report);
 }
 
 /** Return the answer at the end of a stream of reports; `onProgress` gets the completed fraction. */
 export async function follow(path, body, signal, onProgress) {
   const response = await ask(path, { method: "POST", body, signal });
+  // A quick answer comes as a whole, not as a stream.
+  if (response.headers.get("Content-Type").startsWith("application/json")) return (await response.json()).answer;
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";
   for (;;) {
@@ -54,9 +56,17 @@ export async function follow(path, body, signal, onProgress) {
     for (const line of lines.filter(Boolean)) {
       const report = JSON.parse(line);
       if ("answer" in report) return report.answer;
-      if ("error" in report) throw new ServerError(report.error);
+      if ("error" in report) throw new ServerError(report);
       onProgress(report.done);
     }
-    if (done) throw new ConnectionError(`the server has stopped; start it again with: thud-driver explore --port ${location.port}`);
+    if (done) throw new ConnectionError(`The server has stopped; ${restart()}`);
   }
 }
+
+const requestAbout = () => ask("about").then((response) => response.json());
+// Requested before the rest of the page has arrived.
+const firstAbout = requestAbout();
+firstAbout.catch(() => {});
+
+/** Return what the server says of itself. */
+export const getAbout = () => firstAbout;

@@ -1,136 +1,211 @@
-// Display of answers: verdict, plots, criteria, floor, room and warnings.
-import { byId, capitalize, element, minus, rounded, signed } from "./page.js";
-import { showBall } from "./ball.js";
-import { plot, swatch } from "./plot.js";
+// Display of answers: headline, plots, criteria, floor, room and warnings.
+import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
+import { interpolate, plot, swatch } from "./plot.js";
 
-/** Show variants, of which the first belongs to the form; `remove` removes a variant. */
-export function show(variants, remove) {
-  if (!variants.length) return;
-  const [first] = variants;
-  summarize(first);
-  const curve = (variant, style, x, y, options = {}) => ({ name: variant.name, style, x, y, ...options });
-  const forces = variants.flatMap((variant, i) => {
-    const { force, floor } = variant.answer;
-    const onFloor = floor ? [curve({ name: `${variant.name}, ${floor.name}` }, i, floor.force.time, floor.force.value, { thin: true })] : [];
-    return [curve(variant, i, force.time, force.value), ...onFloor];
-  });
-  const legend = first.answer.floor ? element("small", {}, ` thin: on the ${first.answer.floor.name}`) : "";
-  byId("force_title").replaceChildren(capitalize(first.answer.force.title ?? "force"), legend);
-  plot(byId("force"), { curves: forces, x: { title: "Time", unit: "ms" }, y: { title: "Force, low-passed at 1.25 kHz", unit: "N", zero: true } });
-  const names = (levels) => levels.frequency.map(String);
-  const bands = (variant, i, levels) => curve(variant, i, levels.frequency.map((_, k) => k), levels.level, { marks: true });
-  plot(byId("levels"), {
-    curves: variants.map((variant, i) => bands(variant, i, variant.answer.levels)),
-    x: { title: "Octave band", unit: "Hz", bands: names(first.answer.levels) },
-    y: { title: "Level", unit: "dB", reference: " re 1 N" },
-    limits: first.answer.criteria.filter((criterion) => criterion.band).map((criterion) => [criterion.lower, criterion.upper]),
-  });
-  showFloors(variants, curve);
-  const rooms = variants.filter((variant) => variant.answer.room);
-  byId("room_section").hidden = !rooms.length;
-  if (rooms.length) {
-    plot(byId("room"), {
-      curves: rooms.flatMap((variant) => {
-        const [i, { room }] = [variants.indexOf(variant), variant.answer];
-        const modal = curve({ name: `${variant.name}, by modes` }, i, room.modal_level.map((_, k) => k), room.modal_level, { thin: true });
-        return [bands(variant, i, room), ...(room.modal_level.length ? [modal] : [])];
-      }),
-      x: { title: "One-third-octave band", unit: "Hz", bands: names(rooms[0].answer.room) },
-      y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
-    });
-    byId("room_text").replaceChildren(...rooms.map((variant) => element("li", {}, label(variants, variant), variant.answer.room.ratings)));
-  }
-  showCriteria(variants);
-  showVariants(variants, remove);
-  showBall(first.answer.motion);
-  const warnings = variants.flatMap((variant) => variant.answer.warnings.map((warning) => [variant, warning]));
-  byId("warnings_section").hidden = !warnings.length;
-  byId("warnings").replaceChildren(...warnings.map(([variant, warning]) => element("li", {}, label(variants, variant), warning)));
+const RESULTS = { conforms: "conforms", inconclusive: "undecided" };
+const SIGNS = { conforms: "✓", fails: "✕", undecided: "?", level: "" };
+// Uncertainties that are smaller are not drawn, dB.
+const MIN_UNCERTAINTY = 0.02;
+
+/** Show the answer to the question; `variant` has a label and an answer. */
+export function showHeadline({ label, answer }) {
+  const { text, result, detail } = answer.headline;
+  const [, first, rest] = text.match(/^([^:(]+)(.*)$/s);
+  byId("verdict").className = result;
+  byId("verdict").replaceChildren(
+    ...(SIGNS[result] ? [element("span", { class: "sign", "aria-hidden": "true" }, SIGNS[result])] : []),
+    element("span", { class: "subject" }, `${label} `),
+    element("b", {}, capitalize(first.trim())), element("span", { class: "why" }, rest.replace(/^\(/, " (")));
+  byId("detail").replaceChildren(...withSymbols(detail ?? ""));
+  byId("numbers").textContent = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`).join(" · ");
 }
 
+/** Show warnings. */
+export function showWarnings({ answer: { warnings } }) {
+  byId("warnings_section").hidden = !warnings.length;
+  byId("warnings_title").textContent = warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`;
+  byId("warnings").replaceChildren(...warnings.map((warning) => element("li", {}, ...withSymbols(warning))));
+}
+
+/** Return the low and high end of a criterion: the range of a model or the uncertainty of a recording. */
+function endsOf({ value, uncertainty, range }) {
+  const ends = range?.match(/^(−?[\d.]+) to (−?[\d.]+)/);
+  if (ends) return ends.slice(1).map((end) => Number(end.replace("−", "-")));
+  return uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : [];
+}
+
+/** Return the result of a criterion; with the range of a model, that over the range. */
+function resultOf(criterion) {
+  const { lower, upper, range, verdict } = criterion;
+  const [low, high] = range ? endsOf(criterion) : [];
+  if (low === undefined) return RESULTS[verdict] ?? "fails";
+  if (low >= lower && high <= upper) return "conforms";
+  return high < lower || low > upper ? "fails" : "undecided";
+}
+
+/** Show force and levels of variants; options: third octaves, and differences to the first variant. */
+export function showForces(variants, { thirds, differences }) {
+  const isDifference = differences && variants.length > 1;
+  const [first] = variants;
+  const shown = isDifference ? variants.slice(1) : variants;
+  const levelsOf = ({ answer }) => (thirds ? answer.levels.thirds : answer.levels);
+  const bands = levelsOf(first).frequency;
+  const octaves = first.answer.criteria.filter((criterion) => criterion.band);
+  plot(byId("levels"), {
+    title: "Force exposure level",
+    curves: shown.map((variant) => {
+      const levels = levelsOf(variant).level;
+      const hasEnds = !thirds && !isDifference;
+      return {
+        name: variant.label, style: variant.style, x: bands.map((_, k) => k), marks: true,
+        y: isDifference ? levels.map((level, k) => minusLevel(level, levelsOf(first).level[k])) : levels,
+        ends: hasEnds ? variant.answer.criteria.filter((criterion) => criterion.band).map(endsOf) : undefined,
+      };
+    }),
+    x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
+    y: { title: isDifference ? `Difference to ${first.label}` : "Level", unit: "dB", reference: isDifference ? "" : " re 1 N", zero: isDifference },
+    limits: thirds || isDifference ? undefined : octaves.map((criterion) => [criterion.lower, criterion.upper]),
+    results: octaves.map(resultOf),
+  });
+  const curves = shown.flatMap((variant) => {
+    const { force, floor } = variant.answer;
+    const reference = first.answer.force;
+    const y = isDifference ? force.time.map((time, i) => force.value[i] - interpolate(reference.time, reference.value, time)) : force.value;
+    const onFloor = floor && !isDifference ? [{ name: `${variant.label}, on the floor`, style: variant.style, x: floor.force.time, y: floor.force.value, thin: true }] : [];
+    return [{ name: variant.label, style: variant.style, x: force.time, y }, ...onFloor];
+  });
+  byId("force_title").textContent = capitalize(first.answer.force.title ?? "force on the floor");
+  plot(byId("force"), {
+    title: byId("force_title").textContent, curves, hasCursor: !isDifference,
+    x: { title: "Time", unit: "ms" },
+    y: { title: isDifference ? `Difference to ${first.label}` : "Force, low-passed at 1.25 kHz", unit: "N", zero: true },
+  });
+}
+
+const minusLevel = (level, reference) => (level === null || reference === null ? null : level - reference);
+
+/** Show the levels in the room below, what makes their range, and the ratings. */
+export function showRooms(variants, { differences }) {
+  const rooms = variants.filter((variant) => variant.answer.room);
+  const hasRoom = Boolean(variants[0].answer.room);
+  for (const name of ["room_figure", "contributions_figure", "ratings_section"]) byId(name).hidden = !hasRoom;
+  if (!hasRoom) return;
+  const [first] = rooms;
+  const isDifference = differences && rooms.length > 1;
+  const difference = (levels, reference) => (isDifference ? levels.map((level, k) => minusLevel(level, reference[k] ?? null)) : levels);
+  byId("room_key").hidden = isDifference || !first.answer.room.modal_level.length;
+  plot(byId("room"), {
+    title: "Level in the room below",
+    curves: (isDifference ? rooms.slice(1) : rooms).flatMap(({ label, style, answer: { room } }) => {
+      const { room: reference } = first.answer;
+      const modal = { name: `${label}, by modes`, style, x: room.modal_level.map((_, k) => k), y: difference(room.modal_level, reference.modal_level), thin: true };
+      return [{ name: label, style, x: room.level.map((_, k) => k), y: difference(room.level, reference.level), marks: true }, ...(room.modal_level.length && !isDifference ? [modal] : [])];
+    }),
+    x: { title: "One-third-octave band", unit: "Hz", bands: first.answer.room.frequency.map(String) },
+    y: { title: isDifference ? `Difference to ${first.label}` : "Maximum Fast level", unit: "dB", reference: isDifference ? "" : " re 20 µPa", zero: isDifference },
+  });
+  plot(byId("contributions"), {
+    title: "Contributions to the range of the level", x: { title: "Change of the level", unit: "dB" },
+    rows: first.answer.room.contributions.filter((row) => sizeOf(row) >= 0.05).sort((one, other) => sizeOf(other) - sizeOf(one)),
+  });
+  byId("ratings").replaceChildren(...rooms.map((variant) => element("li", {}, ...nameOf(variants, variant), ...withSymbols(variant.answer.room.ratings))));
+}
+
+const sizeOf = ([, low, high]) => Math.max(Math.abs(low), Math.abs(high));
+
 /** Return the swatch and the name of a variant; empty if there is only one variant. */
-function label(variants, variant) {
-  return variants.length > 1 ? element("span", {}, swatch(variants.indexOf(variant)), ` ${variant.name}: `) : "";
+function nameOf(variants, variant) {
+  return variants.length > 1 ? [swatch(variant.style), ` ${variant.label}: `] : [];
 }
 
 /** Return the distance of a value from the nearer limit, negative outside. */
-function margin(criterion) {
+function marginOf(criterion) {
   return Math.min(criterion.value - criterion.lower, criterion.upper - criterion.value);
 }
 
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
   if (criterion.verdict === "inconclusive") return "undecided";
-  if (margin(criterion) >= 0) return "";
+  if (marginOf(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
 
-function summarize({ name, answer }) {
-  const failed = answer.criteria.filter((criterion) => criterion.verdict !== "conforms");
-  const model = answer.model_verdict;
-  const reasons = failed.map((criterion) => {
-    const by = criterion.value !== null && margin(criterion) < 0 ? `${Number((-margin(criterion)).toPrecision(2))} ${criterion.unit} `.replace("  ", " ") : "";
-    return `${criterion.name} ${by}${missedSide(criterion)}`;
-  });
-  byId("verdict").textContent = model ? `${name}: ${model.reason}` : `${name} ${answer.verdict}${reasons.length ? `: ${reasons.join(", ")}` : ""}`;
-  byId("verdict").className = (model ? model.result === "conforms" : answer.conforms) ? "conforms" : "fails";
-  const numbers = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`);
-  const time = `computed in ${Number((1e3 * answer.seconds).toPrecision(2))} ms`;
-  byId("numbers").replaceChildren(numbers.join(" · "), element("span", { class: "extra" }, ` · ${time}`));
-}
-
-function showCriteria(variants) {
+/** Show the criteria of the standards; their names explain themselves. */
+export function showCriteria(variants) {
   const cell = (criterion) => {
     const text = criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
-    const value = element("td", { class: `value ${criterion.verdict === "conforms" ? "conforms" : "fails"}` }, text);
-    if (criterion.uncertainty) {
+    const value = element("td", { class: `value ${resultOf(criterion)}` }, text);
+    if (criterion.uncertainty && !criterion.range) {
       const uncertainty = criterion.uncertainty_text ?? Number(criterion.uncertainty.toPrecision(2));
       value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertainty}`));
     }
-    if (criterion.range) value.append(element("small", {}, ` (${criterion.range})`));
-    const exact = criterion.lower === criterion.upper || criterion.value === null;
-    return [value, element("td", { class: "margin" }, exact ? "" : signed(margin(criterion), criterion.unit), " ", missedSide(criterion))];
+    if (criterion.range) value.append(" ", element("small", {}, `(${criterion.range})`));
+    return value;
+  };
+  const margin = (criterion) => {
+    const isExact = criterion.lower === criterion.upper || criterion.value === null;
+    return element("td", { class: "margin" }, isExact ? "" : signed(marginOf(criterion), criterion.unit), " ", missedSide(criterion));
   };
   const rows = variants[0].answer.criteria.map((criterion, i) => element("tr", {},
-    element("th", { scope: "row" }, capitalize(criterion.name) + (criterion.unit ? `, ${criterion.unit}` : "")),
+    element("th", { scope: "row" }, term(criterion)),
     element("td", {}, criterion.lower === criterion.upper ? `${criterion.lower}` : `${criterion.lower} to ${criterion.upper}`),
-    ...variants.flatMap((variant) => cell(variant.answer.criteria[i]))));
-  const heads = variants.flatMap((variant, i) => [
-    element("th", { scope: "col" }, ...(variants.length > 1 ? [swatch(i), ` ${variant.short}`] : ["Value"]), variant.answer.model_verdict ? element("small", {}, " (range 95 %)") : ""),
-    element("th", { scope: "col", class: "margin" }, "Margin"),
+    ...variants.flatMap((variant, k) => [cell(variant.answer.criteria[i]), ...(k ? [] : [margin(criterion)])])));
+  const heads = variants.flatMap((variant, k) => [
+    element("th", { scope: "col" }, ...(variants.length > 1 ? [swatch(variant.style), ` ${variant.label}`] : ["Value"])),
+    ...(k ? [] : [element("th", { scope: "col", class: "margin" }, "Margin")]),
   ]);
-  byId("cards").classList.toggle("many", variants.length > 1);
   byId("criteria").replaceChildren(
     element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Criterion"), element("th", { scope: "col" }, "Limits"), ...heads)),
     element("tbody", {}, ...rows));
+  byId("criteria_section").classList.toggle("half", Boolean(variants[0].answer.motion) && variants.length < 3);
+  const ranges = variants.some(({ answer }) => answer.model_verdict) ? "In parentheses: the range over what is not known of the model, 95 %. " : "";
+  byId("criteria_text").textContent = `${ranges}${variants[0].answer.criteria[0].standard ?? ""}`;
 }
 
-function showVariants(variants, remove) {
-  byId("variants_section").hidden = variants.length < 2;
-  byId("variants").replaceChildren(...variants.map((variant, i) => {
-    const line = element("li", {}, swatch(i), element("b", {}, ` ${variant.short}`), variant.description ? ` ${variant.description} ` : " ");
-    if (variant.pinned) {
-      const button = element("button", { type: "button", "aria-label": `Remove ${variant.short}` }, "×");
-      button.addEventListener("click", () => { remove(variant); byId("pin").focus(); });
-      line.append(button);
-    }
-    return line;
-  }));
+/** Return the name of a criterion, which shows its explanation on hover and focus. */
+function term(criterion) {
+  const name = capitalize(criterion.name) + (criterion.unit ? `, ${criterion.unit}` : "");
+  const result = element("button", { type: "button", class: "term", "aria-describedby": "tip" }, name);
+  const open = () => showTip(result, [
+    ["", criterion.explanation], ["Limits: ", criterion.limit_source], ["Standard: ", criterion.standard],
+  ].filter(([, text]) => text));
+  result.addEventListener("pointerenter", open);
+  result.addEventListener("focus", open);
+  result.addEventListener("click", open);
+  result.addEventListener("pointerleave", hideTip);
+  result.addEventListener("blur", hideTip);
+  return result;
 }
 
-function showFloors(variants, curve) {
+function showTip(owner, lines) {
+  const tip = byId("tip");
+  tip.replaceChildren(...lines.map(([title, text]) => element("p", {}, element("b", {}, title), ...withSymbols(text))));
+  tip.hidden = false;
+  const at = owner.getBoundingClientRect();
+  const isBelow = at.bottom + tip.offsetHeight + 8 < innerHeight;
+  tip.style.left = `${Math.max(8, Math.min(at.left, innerWidth - tip.offsetWidth - 8))}px`;
+  tip.style.top = `${isBelow ? at.bottom + 4 : Math.max(4, at.top - tip.offsetHeight - 4)}px`;
+}
+
+export function hideTip() {
+  byId("tip").hidden = true;
+}
+
+/** Show how the floors move. */
+export function showFloors(variants) {
   const floors = variants.filter((variant) => variant.answer.floor);
-  byId("floor_section").hidden = !floors.length;
-  if (!floors.length) return;
+  byId("floor_section").hidden = !variants[0].answer.floor;
+  if (!variants[0].answer.floor) return;
   byId("floor_title").textContent = `Floor response: ${floors[0].answer.floor.name}`;
   plot(byId("velocity"), {
-    curves: floors.map((variant) => curve(variant, variants.indexOf(variant), variant.answer.floor.velocity.time, variant.answer.floor.velocity.value)),
+    title: "Velocity of the floor",
+    curves: floors.map(({ label, style, answer: { floor } }) => ({ name: label, style, x: floor.velocity.time, y: floor.velocity.value })),
     x: { title: "Time", unit: "ms" }, y: { title: "Velocity of the floor", unit: "mm/s", zero: true },
   });
-  byId("floor_text").replaceChildren(...floors.map((variant) => element("li", {}, label(variants, variant),
-    variant.answer.floor.numbers.map(([title, value, unit]) => `${title} ${unit === "dB" ? `${signed(value, unit)} dB` : rounded(value, unit)}`).join("; "))));
+  const quantity = ([title, value, unit]) => `${title} ${unit === "dB" ? `${signed(value, unit)} dB` : rounded(value, unit)}`;
+  byId("floor_text").replaceChildren(...floors.map((variant) => element("li", {}, ...nameOf(variants, variant), variant.answer.floor.numbers.map(quantity).join("; "))));
   const { header, rows } = floors[0].answer.floor;
   byId("floor_table").replaceChildren(
     element("thead", {}, element("tr", {}, ...header.map((title) => element("th", { scope: "col" }, capitalize(title))))),
-    element("tbody", {}, ...rows.map(([first, ...cells]) => element("tr", {}, element("th", { scope: "row" }, first), ...cells.map((cell) => element("td", {}, minus(cell)))))));
+    element("tbody", {}, ...rows.map(([first, ...cells]) => element("tr", {}, element("th", { scope: "row" }, first), ...cells.map((text) => element("td", {}, minus(text)))))));
 }

@@ -1,0 +1,223 @@
+"""Changes of a source for the page: the smallest that conforms, and a fit to a recording."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud.base._schema import FiniteElement
+from thud.base.checks import refuse
+from thud.base.errors import ThudError
+from thud.base.units import scaled
+from thud.case.keys import find_key, key_owners, limits, value_in, with_values
+from thud.explorer.answer import new_case
+from thud.explorer.criteria import source_headline
+from thud.explorer.form import fields_by_key
+from thud.explorer.messages import lower
+from thud.explorer.models import MODEL_FACTS, Facts
+from thud.explorer.recording import read_copies
+from thud.impact.compute import compute
+from thud.impact.ensemble import solve_many
+from thud.level.assessment import get_criteria
+from thud.studies.fit import fit
+from thud.studies.fitting.force_target import ForceTarget
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Mapping, Sequence
+
+    from thud.case.case import Case
+
+    Values = dict[str, dict[str, Any]]
+    # Yields begin and end of the fraction of the work of the next step, and returns the answer.
+    Work = Generator[tuple[float, float], None, dict[str, Any]]
+    Search = Generator[tuple[float, float], None, dict[str, Any] | None]
+
+# Largest factor by which a parameter is changed, relative step of the search, and number of
+# bisections of a step.
+MAX_FACTOR = 2.0
+STEP = 0.02
+BISECTIONS = 6
+# Elements through the wall and from pole to pole in the search; the mesh of the case decides.
+MESH = 6, 64
+# Minimum number of drops in a block of the search.
+BLOCK = 10
+# Maximum number of further steps if the source does not conform with the mesh of the case.
+FURTHER_STEPS = 5
+NOTE = "By the values of the case alone: what is not known of the source is not considered."
+# Significant digits of changed values.
+DIGITS = 3
+
+
+def improve(values: Values) -> Work:
+    """Search for each parameter of the source the smallest change with which it conforms.
+
+    Only one parameter is changed at a time; what is not known of the source is not considered.
+    """
+    case = new_case(values)
+    verdict = compute(case).assess()
+    if verdict:
+        return {"changes": [], "none": "The source conforms already.", "note": NOTE}
+    model = case.model.name if case.model else ""
+    names = _facts(model).tuned
+    changes = []
+    for i, name in enumerate(names):
+        change = yield from _smallest_change(case, name, i / len(names), 1 / len(names))
+        if change:
+            changes.append(change)
+    changes.sort(key=lambda change: abs(math.log(change["factor"])))
+    if changes:
+        return {"changes": changes, "none": "", "note": NOTE}
+    labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
+    reason = source_headline(verdict, None)["text"]
+    none = (
+        f"No change of a single parameter makes the source conform: tried {labels}, each from half "
+        f"to twice its value in steps of {100 * STEP:g} %. It {reason}."
+    )
+    if not names:
+        none = "This model has no parameters to change."
+    return {"changes": [], "none": none, "note": NOTE}
+
+
+def _facts(model: str) -> Facts:
+    return MODEL_FACTS.get(model, Facts())
+
+
+def _field(case: Case, name: str) -> Mapping[str, Any]:
+    key, _ = find_key(name, key_owners(case))
+    return fields_by_key()[key.group, key.name]
+
+
+def _smallest_change(case: Case, name: str, begin: float, length: float) -> Search:
+    """Return the smallest change of a parameter with which the source conforms; None: none.
+
+    The search goes outwards from the value of the case, in blocks; `begin` and `length` are its
+    fraction of the work.
+    """
+    start = value_in(case, name)
+    if not isinstance(start, int | float) or not start > 0:
+        return None
+    low, high = _range(case, name)
+    count = math.ceil(math.log(MAX_FACTOR) / STEP)
+    exponents = STEP * np.array([sign * i for i in range(1, count + 1) for sign in (1, -1)])
+    columns = start * np.exp(exponents)
+    exponents = exponents[(columns > low) & (columns < high)]
+    coarse = _coarse(case)
+    blocks = np.array_split(exponents, max(1, len(exponents) // BLOCK))
+    for i, block in enumerate(blocks):
+        yield begin + length * i / len(blocks), begin + length * (i + 1) / len(blocks)
+        if not block.size:
+            continue
+        conforms = np.array(solve_many({name: start * np.exp(block)}, coarse).conforms, dtype=bool)
+        for exponent in block[conforms]:
+            if value := _refined(case, coarse, name, float(exponent)):
+                return _change(case, name, start, value)
+    return None
+
+
+def _range(case: Case, name: str) -> tuple[float, float]:
+    """Return the limits of a parameter; those of the standards if it is a criterion itself."""
+    low, high = limits(find_key(name, key_owners(case))[0], case)
+    for criterion in get_criteria(case.limits.source):
+        if criterion.name == name:
+            low, high = max(low, criterion.lower), min(high, criterion.upper)
+    return low, high
+
+
+def _coarse(case: Case) -> Case:
+    """Return a case of finite elements with the mesh of the search."""
+    if not isinstance(case.model, FiniteElement) or case.model.radial_elements:
+        return case
+    radial, polar = MESH
+    model = replace(case.model, radial_elements=radial, polar_elements=polar)
+    return replace(case, model=model)
+
+
+def _refined(case: Case, coarse: Case, name: str, exponent: float) -> float | None:
+    """Return a rounded value near the least change that conforms; None if there is none near it."""
+    start = float(value_in(case, name) or 0.0)
+    inner, outer = exponent - math.copysign(STEP, exponent), exponent
+    for _ in range(BISECTIONS):
+        middle = (inner + outer) / 2
+        if _conforms(coarse, name, start * math.exp(middle)):
+            outer = middle
+        else:
+            inner = middle
+    for i in range(FURTHER_STEPS):
+        exact = start * math.exp(outer + i * math.copysign(STEP / 4, exponent))
+        size = 10.0 ** (math.floor(math.log10(exact)) - DIGITS + 1)
+        steps = math.ceil(exact / size) if exponent > 0 else math.floor(exact / size)
+        value = float(f"{steps * size:.12g}")
+        if _conforms(case, name, value):
+            return value
+    return None
+
+
+def _conforms(case: Case, name: str, value: float) -> bool:
+    try:
+        return compute(with_values(case, {name: value})).assess().conforms
+    except ThudError:
+        return False
+
+
+def _change(case: Case, name: str, start: float, value: float) -> dict[str, Any]:
+    """Return a change of a parameter for the page."""
+    field = _field(case, name)
+    before, after = (float(f"{scaled(x, -field['power']):.6g}") for x in (start, value))
+    percent = f"{100 * (value / start - 1):+.1f}".replace("-", "−")
+    unit = f" {field['unit']}" if field["unit"] else ""
+    return {
+        "key": f"{field['group']}.{field['name']}",
+        "label": field["label"],
+        "unit": field["unit"],
+        "from": before,
+        "to": after,
+        "value": value,
+        "factor": value / start,
+        "text": f"{field['label']} {after:g}{unit} instead of {before:g}{unit} ({percent} %)",
+    }
+
+
+def fit_recording(
+    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object], values: Values
+) -> dict[str, Any]:
+    """Fit parameters of a model to the first drop of a recording.
+
+    Returns
+    -------
+    dict
+        Values of the case with the fitted ones and what the recording states (``"values"``), and
+        a text with their intervals.
+    """
+    recording, _ = read_copies(paths, names, table)
+    stated = {"height": recording.config.height, "mass": recording.config.mass}
+    case = new_case(values)
+    known = {key: value for key, value in stated.items() if value is not None}
+    case = with_values(case, known)
+    model = case.model.name if case.model else ""
+    parameters = _facts(model).fitted
+    if not parameters:
+        refuse(
+            f"the model {model} has no parameters that a recording determines",
+            ", ".join(name for name, facts in MODEL_FACTS.items() if facts.fitted),
+        )
+    with warnings.catch_warnings():
+        # They are part of the text.
+        warnings.simplefilter("ignore")
+        result = fit(ForceTarget(recording), parameters, case)
+    fitted = {name: result.values[name] for name in parameters}
+    intervals = result.intervals()
+    texts = []
+    for name, value in fitted.items():
+        field = _field(case, name)
+        best, low, high = (f"{scaled(x, -field['power']):.4g}" for x in (value, *intervals[name]))
+        texts.append(f"{lower(field['label'])} {best} ({low} to {high}) {field['unit']}".strip())
+    for name, value in (known | fitted).items():
+        key, _ = find_key(name, key_owners(case))
+        values.setdefault(key.group, {})[key.name] = value
+    notes = "".join(f" {note[:1].upper()}{note[1:]}." for note in result.warnings)
+    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %).{notes}"
+    return {"values": values, "text": text}

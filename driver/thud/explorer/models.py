@@ -1,0 +1,297 @@
+"""What the page says of source models and floors: purpose, validity, first values, unused keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import f90nml
+
+from thud.base._schema import FLOORS, KEYS, MODELS, Room
+from thud.base.files import inputs_folder
+from thud.case.case import Case, default_model
+from thud.case.keys import humanize
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from thud.base.key import Key
+
+    Values = dict[str, dict[str, object]]
+
+# Keys of a ball that is more than a mass.
+_BALL = (
+    "outer_radius", "wall_thickness", "youngs_modulus", "poisson_ratio", "gauge_pressure",
+    "ambient_pressure", "heat_capacity_ratio",
+)  # fmt: skip
+# Parameters of a rubber ball that a maker can change.
+_MADE = ("youngs_modulus", "wall_thickness", "outer_radius", "mass")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the page says of a source model or a floor.
+
+    Attributes
+    ----------
+    title : str
+        Title; by default the name in words.
+    purpose, validity : str
+        What it is for, and how far its results can be trusted: one line each.
+    case : callable or None
+        Function that returns the case with whose values the page begins; None: the defaults.
+    unused : tuple of str
+        Keys that all models have, but which have no effect on this one.
+    tuned : tuple of str
+        Parameters of a source that may be changed so that it conforms.
+    fitted : tuple of str
+        Parameters that a recording determines.
+    has_room : bool
+        Whether a room below a floor can be predicted.
+    """
+
+    title: str = ""
+    purpose: str = ""
+    validity: str = ""
+    case: Callable[[], Case] | None = None
+    unused: tuple[str, ...] = ()
+    tuned: tuple[str, ...] = ()
+    fitted: tuple[str, ...] = ()
+    has_room: bool = True
+
+    def data(self, name: str) -> dict[str, object]:
+        """Return the facts of a model or a floor with a name, for the page."""
+        return {
+            "name": name,
+            "title": self.title or humanize(name).capitalize(),
+            "purpose": self.purpose,
+            "validity": self.validity,
+            "values": self._values(),
+            "has_room": self.has_room,
+        }
+
+    def _values(self) -> Values:
+        """Return the first values of the page that differ from the defaults, by group and key."""
+        if self.case is None:
+            return {}
+        values = changed_values(self.case())
+        if "floor" in values:
+            name = str(values["floor"]["name"])
+            return {name: values.get(name, {})}
+        return {group: keys for group, keys in values.items() if group != "model"}
+
+
+def changed_values(case: Case) -> Values:
+    """Return names of model and floor, and the values that differ from their defaults, by group."""
+    groups = case.to_namelist()
+    names = {
+        group: {"name": groups[group]["name"]} for group in ("model", "floor") if group in groups
+    }
+    rooms: Values = {"room": {}} if "room" in groups else {}
+    plain = Case.from_namelist(names | rooms).to_namelist()
+    changed = {
+        group: {key: value for key, value in keys.items() if value != plain[group].get(key)}
+        for group, keys in groups.items()
+        if group not in {"case", *names}
+    }
+    return names | rooms | {group: keys for group, keys in changed.items() if keys}
+
+
+def input_case(name: str) -> Case:
+    """Return the case of an example input; the path of a file in it is absolute."""
+    path = inputs_folder() / name
+    values = f90nml.read(path).todict()
+    for keys in values.values():
+        if "file" in keys:
+            keys["file"] = str(path.parent / keys["file"])
+    return Case.from_namelist(values)
+
+
+def standard_ball() -> Case:
+    """Return the ball of a room whose case names no source; it conforms to the standards."""
+    return Case(model=default_model(Room()))
+
+
+MODEL_FACTS = {
+    "modal_ball": Facts(
+        "Modal ball",
+        "A rubber ball, computed while a slider moves: the exact modes of the sphere",
+        "Octaves from 31.5 to 250 Hz; 500 Hz depends on the damping law. The modes are linear: "
+        "1.6 MPa is an effective modulus.",
+        standard_ball,
+        tuned=("loss_factor", *_MADE),
+        fitted=("youngs_modulus", "loss_factor"),
+    ),
+    "finite_element": Facts(
+        "Finite elements",
+        "A rubber ball in detail: large strains, gas, losses and friction",
+        "Octaves from 31.5 to 250 Hz; 500 Hz varies by 2 dB with the damping law.",
+        partial(input_case, "rubber_ball_fe.nml"),
+        ("gauge_pressure",),
+        ("loss_factor", *_MADE),
+        ("youngs_modulus", "loss_factor"),
+    ),
+    "hollow_sphere": Facts(
+        "Thin shell",
+        "The analytical model of the paper: contact time and peak force",
+        "Octaves 31.5 and 63 Hz; from 125 Hz on 4 to 5 dB too low, as a shell without modes.",
+        tuned=_MADE,
+        fitted=("youngs_modulus",),
+    ),
+    "two_mass": Facts(
+        "Tyre: belt and rim",
+        "The tyre of the bang machine: a belt on its contact patch and a rim above it",
+        "Carcass and damping are chosen so that the tyre conforms: it shows effects of parts.",
+        partial(input_case, "tyre.nml"),
+        _BALL,
+        ("belt_mass", "belt_frequency", "carcass_stiffness", "contact_damping", "mass"),
+        ("carcass_stiffness", "contact_damping"),
+    ),
+    "measured_modes": Facts(
+        "Measured modes",
+        "A ball whose natural frequencies on the floor were measured",
+        "Rigid floor only; frequencies, damping and masses determine the force.",
+        partial(input_case, "measured_modes.nml"),
+        (*_BALL, "substeps"),
+    ),
+    "hunt_crossley": Facts(
+        "One mass on a spring",
+        "The simplest source, by contact time and restitution (Hunt and Crossley)",
+        "A baseline: contact time and restitution do not determine the levels.",
+        partial(input_case, "tyre_one_mass.nml"),
+        _BALL,
+        ("contact_time", "restitution", "exponent", "mass"),
+        ("contact_time", "restitution"),
+    ),
+}
+FLOOR_FACTS = {
+    "rigid": Facts(
+        "Rigid test floor",
+        "The floor on which the standards assess a source",
+        "It does not move.",
+        has_room=False,
+    ),
+    "plate": Facts(
+        "Plate",
+        "Concrete slabs, with floating floor, ceiling and covering",
+        "Rectangular plates; the range of the level names what is not known.",
+    ),
+    "laminate_floor": Facts(
+        "Cross-laminated timber",
+        "Plates of crossed timber layers, with floating floor and ceiling",
+        "Rectangular plates without shear of the joints between panels.",
+    ),
+    "joist_floor": Facts(
+        "Timber joists",
+        "Sheathing on joists, with floating floor and ceiling",
+        "One row of equal joists along the length.",
+    ),
+    "infinite_plate": Facts(
+        "Infinite plate",
+        "The mean of a floor: a resistance without reflections",
+        "Force only: no level in a room below.",
+        has_room=False,
+    ),
+    "oscillator": Facts(
+        "Oscillator",
+        "A floor with one resonance, such as a mock-up",
+        "Force only: no level in a room below.",
+        has_room=False,
+    ),
+    "measured_mobility": Facts(
+        "Measured mobility",
+        "A floor whose mobility under the source was measured and fitted",
+        "Frequencies of the measurement only.",
+        partial(input_case, "floors/measured_slab.nml"),
+    ),
+    "modal_floor": Facts(
+        "Modes of a file",
+        "A floor whose modes another program has computed",
+        "Frequencies of the modes in the file only.",
+        partial(input_case, "floors/modal_slab.nml"),
+    ),
+}
+
+# Keys that are shown at first, by owner or group; the others are folded. Owners and groups that are
+# not listed show all keys.
+SHOWN = {
+    "ball": ("outer_radius", "wall_thickness", "mass", "youngs_modulus"),
+    "drop": ("height",),
+    "limits": ("source",),
+    "sampling": (),
+    "levels": (),
+    "hollow_sphere": (),
+    "modal_ball": ("damping_law", "loss_factor"),
+    "finite_element": ("viscosity", "loss_factor", "fractional_order"),
+    "two_mass": ("belt_mass", "inflation_pressure", "belt_frequency", "contact_damping"),
+    "measured_modes": ("frequency", "damping_ratio", "effective_mass"),
+    "hunt_crossley": ("contact_time", "restitution", "exponent"),
+    "plate": (
+        "length", "width", "thickness", "density", "loss_factor", "support", "screed_thickness",
+        "layer_stiffness", "subceiling_thickness", "covering_improvement",
+    ),
+    "laminate_floor": (
+        "length", "width", "layer_thickness", "loss_factor", "support", "screed_thickness",
+        "layer_stiffness", "subceiling_thickness", "added_mass",
+    ),
+    "joist_floor": (
+        "length", "width", "spacing", "joist_width", "joist_height", "sheathing_thickness",
+        "loss_factor", "support", "screed_thickness", "layer_stiffness", "subceiling_thickness",
+    ),
+    "measured_mobility": ("pole_frequency", "damping_ratio", "length", "width", "thickness"),
+    "modal_floor": ("file", "thickness"),
+    "room": (
+        "length", "width", "height", "reverberation_time", "ceiling_mass", "required",
+        "required_rating",
+    ),
+}  # fmt: skip
+# Choices with which a key has an effect, by owner or group: the key of the choice, and its values.
+CONDITIONS: dict[str, dict[str, tuple[str, tuple[str, ...]]]] = {
+    "modal_ball": {
+        "loss_frequency": ("damping_law", ("rising", "fractional")),
+        "fractional_order": ("damping_law", ("fractional",)),
+    },
+    "finite_element": {
+        "mooney_share": ("law", ("mooney_rivlin",)),
+        "loss_factor": ("viscosity", ("kelvin_voigt", "fractional", "constant_loss")),
+        "loss_frequency": ("viscosity", ("kelvin_voigt", "fractional", "constant_loss")),
+        "fractional_order": ("viscosity", ("fractional",)),
+        "prony_share": ("viscosity", ("prony",)),
+        "prony_time": ("viscosity", ("prony",)),
+    },
+}
+
+
+def model_facts() -> list[dict[str, object]]:
+    """Return the facts of all source models for the page, the most useful model first."""
+    names = dict.fromkeys((*MODEL_FACTS, *MODELS))
+    return [MODEL_FACTS.get(name, Facts()).data(name) for name in names]
+
+
+def floor_facts() -> list[dict[str, object]]:
+    """Return the facts of all floors for the page."""
+    names = dict.fromkeys((*FLOOR_FACTS, *FLOORS))
+    return [FLOOR_FACTS.get(name, Facts()).data(name) for name in names]
+
+
+def users_of(key: Key) -> list[str] | None:
+    """Return the models that use a key that all models have; None: all of them."""
+    unused = {name for name, facts in MODEL_FACTS.items() if key.name in facts.unused}
+    return [name for name in MODELS if name not in unused] if unused and not key.owner else None
+
+
+def is_folded(key: Key) -> bool:
+    """Return whether most users never change a key."""
+    shown = SHOWN.get(key.owner or key.group)
+    return shown is not None and key.name not in shown
+
+
+def condition_of(key: Key) -> dict[str, object] | None:
+    """Return the choice with which a key has an effect: group, name and values; None: always."""
+    entry = CONDITIONS.get(key.owner or key.group, {}).get(key.name)
+    if entry is None:
+        return None
+    name, values = entry
+    group = next(item.group for item in KEYS if item.owner == key.owner and item.name == name)
+    return {"group": group, "name": name, "values": list(values)}

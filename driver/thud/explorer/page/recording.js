@@ -1,0 +1,103 @@
+// The door of a recording: its files, what they do not say, and what its answer asks for.
+import { button, byId, element, saveFile } from "./page.js";
+import { about, buildInputs, state } from "./form.js";
+
+/** Files of the recording, drops of one measurement. */
+export const recording = { files: [] };
+
+/** Build the form of the recording; `onChange` is called when it has to be assessed again. */
+export function buildRecording(onChange) {
+  const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, onChange));
+  byId("inputs").replaceChildren(
+    element("div", { id: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
+      element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS")),
+    element("ul", { id: "files", "aria-label": "Files" }),
+    element("fieldset", {}, element("legend", {}, "What the file does not say"), ...fields(false)),
+    element("details", {}, element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
+  showFiles(onChange);
+}
+
+function fileInput(onChange) {
+  const input = element("input", { type: "file", id: "file", multiple: true });
+  input.addEventListener("change", () => {
+    addFiles([...input.files], onChange);
+    // Otherwise choosing the same file again would raise no event.
+    input.value = "";
+  });
+  return input;
+}
+
+export function addFiles(files, onChange) {
+  recording.files = [...recording.files, ...files];
+  showFiles(onChange);
+  onChange();
+}
+
+function showFiles(onChange) {
+  byId("files")?.replaceChildren(...recording.files.map((file) => element("li", {}, file.name,
+    button("×", () => {
+      recording.files = recording.files.filter((other) => other !== file);
+      showFiles(onChange);
+      byId("file").focus();
+      onChange();
+    }, { class: "remove", "aria-label": `Remove ${file.name}` }))));
+}
+
+function recordingField({ name, label, kind, hint, choices }, onChange) {
+  const id = `recording_${name}`;
+  const options = Object.entries({ "": "not known", ...choices }).map(([value, text]) => element("option", { value }, text));
+  const isNumber = kind === "number";
+  const input = kind === "choice" ? element("select", { id }, ...options)
+    : element("input", { id, type: isNumber ? "number" : "text", step: isNumber && "any", "aria-describedby": `${id}.error` });
+  input.value = state.recording[name] ?? "";
+  // A file may be dropped while the field still has the focus.
+  input.addEventListener("input", () => {
+    if (input.value) state.recording[name] = input.value;
+    else delete state.recording[name];
+  });
+  input.addEventListener("change", () => { if (recording.files.length) onChange(); });
+  return element("div", { class: "field" }, element("label", { for: id }, label + hint), input, element("p", { class: "error", id: `${id}.error` }));
+}
+
+/** Return the body of a request with the files and fields. */
+export function recordingBody(values) {
+  const body = new FormData();
+  if (values) body.set("case", JSON.stringify(values));
+  for (const [name, value] of Object.entries(state.recording)) body.set(name, value);
+  for (const file of recording.files) body.append("file", file);
+  return body;
+}
+
+/** Ask for what the answer lacks, with the values that it found. */
+export function showAsks(asks, onChange) {
+  const place = byId("asks");
+  const open = (asks ?? []).filter(({ values }) => Object.keys(values).some((name) => !state.recording[name]));
+  place.hidden = !open.length;
+  place.replaceChildren(...open.map(({ reason, values }) => {
+    const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
+    const inputs = fields.map(({ name, label }) => {
+      const id = `ask_${name}`;
+      const input = element("input", { id, type: "number", step: "any", value: state.recording[name] ?? values[name] });
+      return element("div", { class: "field" }, element("label", { for: id }, label), input);
+    });
+    return element("div", {}, element("p", {}, reason), ...inputs, button("Assess with this", () => {
+      for (const { name } of fields) {
+        const { value } = byId(`ask_${name}`);
+        if (value) state.recording[name] = value;
+        byId(`recording_${name}`).value = value;
+      }
+      onChange();
+    }, { class: "strong" }));
+  }));
+}
+
+/** Return the button that saves the calibration report of an answer. */
+export function reportButton(answer) {
+  return button("Calibration report", () => saveFile("calibration.html", answer.report, "text/html"), { class: "strong", id: "report" });
+}
+
+/** Build the inputs of the current door. */
+export function buildDoor(onChange, onInvalid) {
+  if (state.door === "recording") buildRecording(onChange);
+  else buildInputs(onChange, onInvalid);
+}

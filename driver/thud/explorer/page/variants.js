@@ -1,0 +1,149 @@
+// Variants: what they are called, by what differs, and their table.
+import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
+import { STYLES, swatch } from "./plot.js";
+import { about, factsOf, findField, sorted } from "./form.js";
+
+// Words of keys in names, if shorter than their labels.
+const WORDS = { youngs_modulus: "E", wall_thickness: "wall", outer_radius: "radius", height: "drop", thickness: "slab", reverberation_time: "T" };
+// Number of differences in a name.
+const MAX_DIFFERENCES = 3;
+const SOURCE_GROUPS = ["sampling", "levels", "limits", "drop", "ball"];
+
+/** Return a free style for a further variant. */
+export function freeStyle(variants) {
+  const used = variants.map(({ style }) => style);
+  for (let style = 1; style < STYLES; style += 1) if (!used.includes(style)) return style;
+  return 1 + (variants.length % (STYLES - 1));
+}
+
+/** Give each variant its label: a name of the user, of the file, or what it is and what differs from the others. */
+export function nameVariants(variants) {
+  const models = variants.filter(({ values }) => values);
+  const described = models.map(describe);
+  const isShared = new Set(described.map(({ base }) => base)).size === 1 && models.length > 1;
+  const keys = [...new Set(described.flatMap(({ changes }) => [...changes.keys()]))]
+    .filter((key) => models.length === 1 || new Set(models.map(({ values }) => valueText(values, key))).size > 1);
+  for (const [i, variant] of models.entries()) {
+    const { base, changes } = described[i];
+    const words = keys.filter((key) => isShared || changes.has(key)).map((key) => wordsOf(key, valueText(variant.values, key)));
+    const shown = [...(isShared && words.length ? [] : [base]), ...words.slice(0, MAX_DIFFERENCES), ...(words.length > MAX_DIFFERENCES ? ["…"] : [])];
+    variant.label = variant.title ?? capitalize(shown.join(", "));
+  }
+  for (const variant of variants) if (!variant.values) variant.label = variant.title ?? variant.name;
+  const seen = new Map();
+  for (const variant of variants) {
+    const count = (seen.get(variant.label) ?? 0) + 1;
+    seen.set(variant.label, count);
+    if (count > 1) variant.label += ` (${count})`;
+  }
+}
+
+/** Return the preset or construction that is closest to a case, and the changed keys, "group.key". */
+function describe({ values }) {
+  const model = values.model.name;
+  const presets = about.presets.filter((preset) => preset.door === "ball" && preset.values.model.name === model)
+    .map((preset) => ({ base: preset.title, values: preset.values }));
+  const source = closest(values, (group) => isSourceGroup(group, model), [...presets, { base: factsOf("model", model).title, values: { model: values.model, ...factsOf("model", model).values } }]);
+  if (!values.floor) return source;
+  const name = values.floor.name;
+  const constructions = about.constructions.filter((entry) => entry.floor === name).map((entry) => ({ base: entry.name, values: { [name]: withoutDefaults(name, entry.keys), room: entry.room } }));
+  const floor = closest(values, (group) => group === name || group === "room", [...constructions, { base: factsOf("floor", name).title, values: factsOf("floor", name).values }]);
+  const isStandard = source.base === about.presets[0].title && !source.changes.size;
+  return { base: isStandard ? floor.base : `${floor.base}, ${source.base.toLowerCase()}`, changes: new Map([...floor.changes, ...source.changes]) };
+}
+
+const isSourceGroup = (group, model) => SOURCE_GROUPS.includes(group) || about.form.some((entry) => entry.part === "model" && entry.name === model && entry.fields.some((field) => field.group === group));
+
+function withoutDefaults(floor, keys) {
+  return Object.fromEntries(Object.entries(keys).filter(([name, value]) => JSON.stringify(findField(floor, name)?.default) !== JSON.stringify(value)));
+}
+
+function closest(values, isOwn, candidates) {
+  const results = candidates.map((candidate) => {
+    const keys = new Set([values, candidate.values].flatMap((groups) => Object.entries(groups).filter(([group]) => isOwn(group)).flatMap(([group, own]) => Object.keys(own).map((name) => `${group}.${name}`))));
+    const changes = [...keys].filter((key) => valueText(values, key) !== valueText(candidate.values, key));
+    return { base: candidate.base, changes: new Map(changes.map((key) => [key, true])) };
+  });
+  return results.reduce((best, result) => (result.changes.size < best.changes.size ? result : best));
+}
+
+/** Return the text of the value of a key, "group.key", in the unit of its field. */
+function valueText(values, key) {
+  const [group, name] = key.split(".");
+  const field = findField(group, name);
+  const value = values[group]?.[name] ?? field?.default;
+  if (typeof value === "number") return `${Number(scaled(value, -(field?.power ?? 0)).toPrecision(4))} ${field?.unit ?? ""}`.trim();
+  if (typeof value === "boolean") return value ? "on" : "off";
+  return field?.choices?.[value] ?? [value].flat().join(" ");
+}
+
+function wordsOf(key, text) {
+  const [group, name] = key.split(".");
+  return `${WORDS[name] ?? findField(group, name)?.label.toLowerCase() ?? name} ${text}`;
+}
+
+/** Return values as rows: group, label and text, for pages. */
+export function inputRows(values) {
+  const rows = [["Source", factsOf("model", values.model.name).title]];
+  if (values.floor) rows.push(["Floor", factsOf("floor", values.floor.name).title]);
+  for (const [group, own] of Object.entries(sorted(values))) {
+    for (const name of Object.keys(own)) {
+      const field = findField(group, name);
+      if (field) rows.push([field.label, valueText(values, `${group}.${name}`)]);
+    }
+  }
+  return rows;
+}
+
+/** Show the table of variants, of which the first belongs to the form; `actions` remove and rename one. */
+export function showVariants(variants, { remove, rename }) {
+  const isRoom = variants.every(({ answer }) => answer.room);
+  const [first] = variants;
+  const columns = isRoom ? roomColumns(variants) : sourceColumns(variants);
+  const cell = (variant, [, valueOf, unit, decimals]) => {
+    const value = valueOf(variant);
+    if (value === null || value === undefined) return element("td", {}, "–");
+    const reference = valueOf(first);
+    const text = minus(value.toFixed(decimals));
+    if (variant === first || reference === null || reference === undefined) return element("td", {}, text);
+    const difference = Number((value - reference).toFixed(decimals));
+    return element("td", {}, text, element("small", {}, difference ? `${signed(difference, "dB", decimals)}` : "±0"));
+  };
+  const rows = variants.map((variant, i) => {
+    const name = element("button", { type: "button", class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` }, variant.label);
+    name.addEventListener("click", () => renameIn(name, variant, rename));
+    const result = variant.answer.headline.result;
+    return element("tr", {}, element("th", { scope: "row" }, element("span", { class: "named" }, swatch(variant.style), name)),
+      element("td", { class: result }, isRoom ? variant.answer.room.interval : { conforms: "conforms", fails: "does not conform", undecided: "undecided", level: variant.answer.verdict }[result]),
+      ...columns.map((column) => cell(variant, column)),
+      element("td", {}, i ? button("×", () => remove(variant), { class: "remove", "aria-label": `Remove ${variant.label}` }) : ""));
+  });
+  byId("variants").replaceChildren(
+    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), element("th", { scope: "col" }, isRoom ? "Level (range)" : "Verdict"),
+      ...columns.map(([title, , unit]) => element("th", { scope: "col" }, title, element("small", {}, ` ${unit}`))), element("td", {}))),
+    element("tbody", {}, ...rows));
+  byId("differences").disabled = variants.length < 2;
+}
+
+function renameIn(name, variant, rename) {
+  const input = element("input", { type: "text", "aria-label": "Name", value: variant.label });
+  const finish = (text) => { if (input.isConnected) rename(variant, text); };
+  input.addEventListener("keydown", (event) => {
+    if (event.key === "Enter") finish(input.value.trim());
+    if (event.key === "Escape") { event.stopPropagation(); finish(null); }
+  });
+  input.addEventListener("blur", () => finish(input.value.trim()));
+  name.replaceWith(input);
+  input.select();
+}
+
+function sourceColumns([first]) {
+  const bands = first.answer.criteria.filter((criterion) => criterion.band).map((criterion, i) => [criterion.name.replace(" Hz", ""), ({ answer }) => answer.criteria[i].value, "dB", 1]);
+  const number = (title, name, unit, decimals) => [title, ({ answer }) => answer.numbers.find(([own]) => name.test(own))?.[1], unit, decimals];
+  return [...bands, number("Peak", /^peak.* force/, "N", 0), number("Contact", /^contact time/, "ms", 2)];
+}
+
+function roomColumns([first]) {
+  const bands = [50, 63, 80, 125, 250, 500].map((band) => [first.answer.room.frequency.indexOf(band), band]).filter(([i]) => i >= 0);
+  return bands.map(([i, band]) => [String(band), ({ answer }) => answer.room.level[i], "dB", 1]);
+}

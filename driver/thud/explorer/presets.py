@@ -1,0 +1,109 @@
+"""Named cases with which the page begins, by door: a ball, a floor and the room below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from thud.explorer.models import changed_values, input_case, standard_ball
+from thud.floors.constructions import construction
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from thud.case.case import Case
+
+# Ratio of the modulus of an aged ball to that of a new one: an assumption (docs, an aged ball).
+AGING = 1.2
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Named case of the page.
+
+    Attributes
+    ----------
+    title, text : str
+        Title, and what it is in one line.
+    door : str
+        Part of the page: ``"ball"`` or ``"floor"``.
+    case : callable
+        Function that returns the case.
+    """
+
+    title: str
+    text: str
+    door: str
+    case: Callable[[], Case]
+
+    def data(self, name: str) -> dict[str, Any]:
+        """Return the preset with its name for the page."""
+        values = changed_values(self.case())
+        return {
+            "name": name,
+            "title": self.title,
+            "text": self.text,
+            "door": self.door,
+            "values": values,
+        }
+
+
+def _aged_ball() -> Case:
+    case = input_case("rubber_ball_fe.nml")
+    ball = replace(case.ball, youngs_modulus=AGING * case.ball.youngs_modulus)
+    return replace(case, ball=ball)
+
+
+PRESETS = {
+    "standard_ball": Preset(
+        "Standard ball", "A rubber ball that conforms, by its modes", "ball", standard_ball
+    ),
+    "finite_elements": Preset(
+        "Standard ball, finite elements",
+        "The same ball in detail; 500 Hz depends on a damping law that nobody has measured",
+        "ball",
+        partial(input_case, "rubber_ball_fe.nml"),
+    ),
+    "aged_ball": Preset(
+        "Aged ball",
+        "Finite elements with a modulus that aging has raised by a fifth, an assumption",
+        "ball",
+        _aged_ball,
+    ),
+    "shell": Preset(
+        "Ball of the paper",
+        "The analytical shell, assessed by its ball force as in the paper",
+        "ball",
+        partial(input_case, "rubber_ball_100cm.nml"),
+    ),
+    "tyre": Preset(
+        "Tyre",
+        "The tyre of the bang machine: belt and rim",
+        "ball",
+        partial(input_case, "tyre.nml"),
+    ),
+    "slab": Preset(
+        "Concrete slab, 180 mm",
+        "A bare slab of 5 m by 4 m and the room below",
+        "floor",
+        lambda: construction("concrete 180").case(),
+    ),
+    "floating_floor": Preset(
+        "Floating screed on 180 mm",
+        "50 mm of screed on mineral wool on the same slab",
+        "floor",
+        lambda: construction("concrete 180, screed on 15 MN/m3").case(),
+    ),
+    "timber": Preset(
+        "Cross-laminated timber, 200 mm",
+        "A bare timber floor, and the room below",
+        "floor",
+        lambda: construction("CLT 200").case(),
+    ),
+}
+
+
+def presets() -> list[dict[str, Any]]:
+    """Return the presets for the page; the first is the case with which it begins."""
+    return [preset.data(name) for name, preset in PRESETS.items()]

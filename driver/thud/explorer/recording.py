@@ -1,0 +1,132 @@
+"""Answer of recorded drops for the page, with their calibration report."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from thud.base.checks import shown
+from thud.base.errors import ThudError
+from thud.explorer.answer import common_answer
+from thud.explorer.criteria import source_headline
+from thud.explorer.recording_fields import name_fields
+from thud.plot.impact_figures import contact_force
+from thud.recordings.config import config_from
+from thud.recordings.recording import Recording
+from thud.recordings.signal_files import open_signals
+from thud.report.contents import criteria_data, report_data
+from thud.report.page import report_page
+from thud.report.rows import expanded_text, value_text
+from thud.report.write import figures, json_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from thud.recordings.config import Config
+    from thud.recordings.signal import Signal
+
+# Maximum length of a name of a file.
+MAX_NAME = 80
+
+
+def answer_recording(
+    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
+) -> dict[str, Any]:
+    """Return the answer of recorded drops of one source.
+
+    `paths` are copies of the files, `names` the names of the original files, and `table` is a table
+    of the configuration.
+    """
+    start = time.perf_counter()
+    recording, in_words = read_copies(paths, names, table)
+    verdict = recording.assess()
+    answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
+    for entry, row in zip(answer["criteria"], criteria_data(recording), strict=True):
+        entry["value_text"] = value_text(row)
+        entry["uncertainty_text"] = expanded_text(row)
+    answer["headline"] = source_headline(verdict, None)
+    answer["drops"] = len(recording.drops)
+    answer["asks"] = _asks(recording)
+    # The page shows the name of a single file next to its warnings.
+    prefix = f"{names[0]}: " if len(names) == 1 else ""
+    answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
+    data = report_data(recording)
+    drawings = [content.decode() for content in figures(recording).values()]
+    answer["report"] = report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
+    answer["seconds"] = time.perf_counter() - start
+    return answer
+
+
+def read_copies(
+    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
+) -> tuple[Recording, Callable[[str], str]]:
+    """Return the recording in copies of files, and a function for its messages.
+
+    The function replaces the names of the copies by those of the original files, and keys of the
+    configuration by fields of the page. Raise InputError, with such a message.
+    """
+    titles = {
+        Path(path).name: "".join(filter(str.isprintable, Path(name).name))[:MAX_NAME] or "recording"
+        for path, name in zip(paths, names, strict=True)
+    }
+
+    def in_words(message: str) -> str:
+        message = name_fields(message)
+        for path, (copy, title) in zip(paths, titles.items(), strict=True):
+            message = message.replace(path, title).replace(copy, title)
+        return message
+
+    try:
+        config = config_from(table)
+        signals = (
+            _renamed(signal, Path(path).name, titles[Path(path).name])
+            for path in paths
+            for signal in _open(path, config)
+        )
+        recording = Recording.from_signals(signals, config)
+    except ThudError as error:
+        message = name_fields(str(error))
+        for path, (copy, title) in zip(paths, titles.items(), strict=True):
+            message = message.replace(path, copy).replace(copy, shown(title))
+        raise type(error)(message) from error
+    return replace(recording, name=Path(next(iter(titles.values()))).stem), in_words
+
+
+def _open(path: str, config: Config) -> Iterator[Signal]:
+    keys = ("channel", "channels", "unit", "calibration", "polarity", "sample_rate")
+    yield from open_signals(path, **{key: getattr(config, key) for key in keys})
+
+
+def _renamed(signal: Signal, copy: str, title: str) -> Signal:
+    """Return a signal with the name of the original file in place of that of its copy."""
+    return replace(
+        signal,
+        name=signal.name.replace(copy, title),
+        warnings=tuple(warning.replace(copy, title) for warning in signal.warnings),
+        cells=tuple(_renamed(cell, copy, title) for cell in signal.cells),
+    )
+
+
+def _asks(recording: Recording) -> list[dict[str, Any]]:
+    """Return the fields that change the verdict and are not stated, with estimates and reasons."""
+    config = recording.config
+    ringing = next((drop.ringing for drop in recording.drops if drop.ringing), None)
+    result: list[dict[str, Any]] = []
+    if ringing:
+        reason = (
+            f"The force plate rings at {ringing.frequency:.0f} Hz after the contact, which changes "
+            "levels up to 500 Hz. State its resonance; the values are estimates from the record."
+        )
+        values = {"plate_f0": f"{ringing.frequency:.0f}", "plate_Q": f"{ringing.quality:.2g}"}
+        result.append({"reason": reason, "values": values})
+    missing = [name for name in ("height", "mass") if getattr(config, name) is None]
+    if missing:
+        reason = (
+            "Without drop height and mass of the source these criteria are inconclusive, and the "
+            "restitution is known only if the file holds bounces."
+        )
+        result.append({"reason": reason, "values": dict.fromkeys(missing, "")})
+    return result

@@ -1,0 +1,272 @@
+"""What the page says of models, floors and keys, its presets, its errors and its headlines."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import thud
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.explorer.answer import answer_case, new_case
+from thud.explorer.form import form
+from thud.explorer.messages import describe_error
+from thud.explorer.models import (
+    CONDITIONS,
+    FLOOR_FACTS,
+    MODEL_FACTS,
+    SHOWN,
+    floor_facts,
+    model_facts,
+    users_of,
+)
+from thud.explorer.presets import presets
+from thud.impact.compute import compute
+
+FIELDS = {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
+# Values of keys that all models have, other than the defaults and allowed for all of them.
+OTHERS: dict[str, dict[str, Any]] = {
+    "ball": {
+        "outer_radius": 0.09, "wall_thickness": 0.031, "mass": 7.2, "youngs_modulus": 1.9e6,
+        "poisson_ratio": 0.47, "gauge_pressure": 2000.0, "ambient_pressure": 9e4,
+        "heat_capacity_ratio": 1.3,
+    },
+    "drop": {"height": 0.9, "gravity": 9.7},
+    "sampling": {"sample_rate": 48000.0, "duration": 0.06, "substeps": 3},
+}  # fmt: skip
+
+
+def values_of(name: str) -> dict[str, Any]:
+    """Return the values with which the page begins with a model."""
+    values = next(facts["values"] for facts in model_facts() if facts["name"] == name)
+    return {"model": {"name": name}, **values}  # type: ignore[dict-item]
+
+
+def error_of(values: dict[str, Any]) -> dict[str, Any]:
+    """Return what the page shows of the error of a case."""
+    with pytest.raises(thud.ThudError) as caught:
+        compute(new_case(values))
+    return describe_error(caught.value)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_begins_with_values_that_compute(name: str) -> None:
+    answer = answer_case(new_case(values_of(name)))
+    assert answer["warnings"] == []
+    json.dumps(answer, allow_nan=False)
+
+
+@pytest.mark.parametrize("name", FLOORS)
+def test_every_floor_begins_with_values_that_compute(name: str) -> None:
+    (values,) = (facts["values"] for facts in floor_facts() if facts["name"] == name)
+    case = {"model": {"name": "hollow_sphere"}, "floor": {"name": name}, **values}  # type: ignore[dict-item]
+    answer = answer_case(new_case(case))
+    assert (answer["floor"] is None) == (name == "rigid")
+    json.dumps(answer, allow_nan=False)
+
+
+def test_finite_elements_begin_with_their_own_modulus() -> None:
+    case = new_case(values_of("finite_element"))
+    assert case.ball == thud.Ball.standard()
+    assert answer_case(case)["headline"]["result"] == "undecided"
+
+
+def test_facts_name_models_floors_and_keys_of_the_library() -> None:
+    assert MODEL_FACTS.keys() == MODELS.keys()
+    assert FLOOR_FACTS.keys() == FLOORS.keys()
+    keys = {(key.owner or key.group, key.name) for key in KEYS}
+    shown = {(owner, name) for owner, names in SHOWN.items() for name in names}
+    assert shown <= keys
+    for owner, entries in CONDITIONS.items():
+        for name, (other, choices) in entries.items():
+            assert (owner, name) in keys
+            (key,) = (key for key in KEYS if key.owner == owner and key.name == other)
+            assert set(choices) < set(key.choices)
+    for facts in (*MODEL_FACTS.values(), *FLOOR_FACTS.values()):
+        assert facts.purpose
+        assert facts.validity.endswith(".")
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_keys_that_a_model_ignores_have_no_effect(model: str) -> None:
+    base = values_of(model)
+    if model == "finite_element":
+        base["mesh"] = {"radial_elements": 4, "polar_elements": 32}
+    expected = compute(new_case(base)).floor_force
+    for group, others in OTHERS.items():
+        for name, value in others.items():
+            (key,) = (
+                key for key in KEYS if not key.owner and (key.group, key.name) == (group, name)
+            )
+            users = users_of(key)
+            is_used = users is None or model in users
+            changed: dict[str, Any] = {**base, group: {**base.get(group, {}), name: value}}
+            if model == "measured_modes":
+                changed[model] = {**base[model], "allow_mass_mismatch": True}
+            if name == "gauge_pressure" and model == "finite_element":
+                assert not is_used
+                assert error_of(changed)["field"] == "ball.gauge_pressure"
+                continue
+            force = compute(new_case(changed)).floor_force
+            if name == "duration":
+                continue
+            is_equal = len(force) == len(expected) and np.allclose(force, expected, 1e-12, 0)
+            # The mass of measured modes is assessed, not computed with.
+            if (model, name) != ("measured_modes", "mass"):
+                assert is_equal != is_used, name
+
+
+def test_keys_of_conditions_have_no_effect_without_their_choice() -> None:
+    for owner, entries in CONDITIONS.items():
+        for name, (other, choices) in entries.items():
+            field = next(f for (_, n), f in FIELDS.items() if n == name and f["condition"])
+            assert field["condition"]["values"]
+            (switch,) = (key for key in KEYS if key.owner == owner and key.name == other)
+            (key,) = (key for key in KEYS if key.owner == owner and key.name == name)
+            off = next(choice for choice in switch.choices if choice not in choices)
+            base = {"model": {"name": owner}, switch.group: {switch.name: off}}
+            if off == "prony":
+                base[switch.group] |= {"prony_share": [0.1], "prony_time": [0.01]}
+            if owner == "finite_element":
+                base["mesh"] = {"radial_elements": 4, "polar_elements": 32}
+            value = {"real": 0.37 if key.upper == 1 else 91.0}.get(key.kind, [0.2])
+            changed = {**base, key.group: {**base.get(key.group, {}), name: value}}
+            if name.startswith("prony_"):
+                assert "do nothing" in error_of(changed)["error"]
+                continue
+            forces = [compute(new_case(case)).floor_force for case in (base, changed)]
+            assert np.array_equal(*forces), (owner, name)
+
+
+def test_page_begins_with_a_ball_that_conforms() -> None:
+    first = presets()[0]
+    assert first["door"] == "ball"
+    answer = answer_case(new_case(first["values"]))
+    assert answer["conforms"]
+    assert answer["headline"]["text"] == "conforms"
+
+
+@pytest.mark.parametrize("preset", presets(), ids=lambda preset: preset["name"])
+def test_presets_have_an_answer(preset: dict[str, Any]) -> None:
+    answer = answer_case(new_case(preset["values"]))
+    is_floor = preset["door"] == "floor"
+    assert (answer["headline"]["result"] == "level") == is_floor
+    assert ("room" in answer) == is_floor
+
+
+def test_headline_of_a_room_is_the_level_with_its_range() -> None:
+    (slab,) = (preset["values"] for preset in presets() if preset["name"] == "slab")
+    answer = answer_case(new_case(slab))
+    prediction = thud.predict_level(floor=thud.construction("concrete 180").floor, room=thud.Room())
+    room = answer["room"]
+    assert answer["headline"]["text"] == room["interval"] == prediction.rated_text
+    assert room["rated"] == pytest.approx(
+        {"value": prediction.rated, "low": prediction.interval[0], "high": prediction.interval[1]}
+    )
+    assert [ends for _, *ends in room["contributions"]] == [
+        pytest.approx(list(ends)) for ends in prediction.contributions.values()
+    ]
+    for required, result in ((40.0, "fails"), (58.0, "undecided"), (80.0, "conforms")):
+        values = {**slab, "room": {"required": required, "required_rating": "thirds"}}
+        assert answer_case(new_case(values))["headline"]["result"] == result
+
+
+def test_every_criterion_names_standard_and_limits_and_explains_itself() -> None:
+    answer = answer_case(new_case(values_of("two_mass")))
+    for criterion in answer["criteria"]:
+        assert "JIS A 1418-2" in criterion["standard"]
+        assert criterion["limit_source"].endswith(".")
+        assert criterion["explanation"].endswith(".")
+    assert "no tolerance" in answer["criteria"][-1]["limit_source"]
+    # The octaves hold the energy of the one-third octaves.
+    levels = answer["levels"]
+    thirds = 10 ** (np.reshape(levels["thirds"]["level"], (5, 3)) / 10)
+    assert 10 * np.log10(thirds.sum(axis=1)) == pytest.approx(levels["level"], abs=1e-3)
+
+
+TOO_THICK = (
+    "Wall thickness = 200 mm is not allowed; allowed: more than 0 mm and less than outer radius, "
+    "89 mm"
+)
+TOO_NARROW = (
+    "Spacing = 10 mm is not allowed; allowed: more than joist width, 60 mm and less than width, "
+    "5000 mm"
+)
+
+
+@pytest.mark.parametrize(
+    ("values", "message", "field"),
+    [
+        (
+            {"ball": {"wall_thickness": 0.2}},
+            TOO_THICK,
+            "ball.wall_thickness",
+        ),
+        (
+            {"floor": {"name": "plate"}, "plate": {"thickness": 5.0}},
+            "Thickness = 5000 mm is not allowed; allowed: 1 to 2000 mm",
+            "plate.thickness",
+        ),
+        (
+            {"sampling": {"sample_rate": 1000.0}},
+            "Sample rate = 1 kHz is not allowed; allowed: 2 to 10000 kHz",
+            "sampling.sample_rate",
+        ),
+        (
+            {"floor": {"name": "joist_floor"}, "joist_floor": {"spacing": 0.01}},
+            TOO_NARROW,
+            "joist_floor.spacing",
+        ),
+        (
+            {"sampling": {"substeps": 0}},
+            "Substeps = 0 is not allowed; allowed: 1 to 10000, whole",
+            "sampling.substeps",
+        ),
+    ],
+)
+def test_errors_speak_the_label_and_the_unit_of_the_field(
+    values: dict[str, Any], message: str, field: str
+) -> None:
+    error = error_of({"model": {"name": "hollow_sphere"}, **values})
+    assert error == {"error": message, "field": field}
+
+
+@pytest.mark.parametrize("wall", [1e-12, 1e-9, 1e-3])
+def test_wall_denser_than_any_material_is_refused(wall: float) -> None:
+    values = {"model": {"name": "modal_ball"}, "ball": {"wall_thickness": wall}}
+    error = error_of(values)
+    assert error["field"] == "ball.wall_thickness"
+    assert error["error"].startswith(f"Wall thickness = {1e3 * wall:g} mm gives the wall ")
+    # A tyre has no such wall.
+    new_case(values | {"model": {"name": "two_mass"}})
+
+
+@pytest.mark.parametrize("name", FLOORS)
+def test_floors_that_radiate_have_a_room(name: str) -> None:
+    (facts,) = (facts for facts in floor_facts() if facts["name"] == name)
+    values = {"model": {"name": "modal_ball"}, "floor": {"name": name}, "room": {"volume": 50.0}}
+    case = {**values, **facts["values"]}  # type: ignore[dict-item]
+    if facts["has_room"]:
+        assert answer_case(new_case(case))["headline"]["result"] == "level"
+    else:
+        assert "has no plate" in error_of(case)["error"]
+
+
+def test_lengths_that_may_be_zero_are_in_the_unit_of_their_maximum() -> None:
+    for name in ("screed_thickness", "subceiling_thickness"):
+        field = FIELDS["plate", name]
+        assert (field["unit"], field["power"]) == ("mm", -3)
+        assert field["slider"]["ends"][0] == 0
+
+
+def test_steps_of_fields_are_powers_of_ten() -> None:
+    expected = {
+        ("ball", "wall_thickness"): 1, ("ball", "mass"): 0.1, ("ball", "youngs_modulus"): 0.1,
+        ("drop", "height"): 0.01, ("plate", "thickness"): 10, ("modal_ball", "loss_factor"): 0.001,
+        ("sampling", "substeps"): 1, ("plate", "screed_thickness"): 10, ("room", "length"): 0.1,
+    }  # fmt: skip
+    assert {key: FIELDS[key]["step"] for key in expected} == pytest.approx(expected)
+    assert all(field["advanced"] for (group, _), field in FIELDS.items() if group == "mesh")
+    assert GROUPS.keys() >= {group for group in SHOWN if group not in {*MODELS, *FLOORS, "room"}}
