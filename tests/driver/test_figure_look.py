@@ -27,7 +27,7 @@ from PIL import Image
 import thud
 from thud import cli, plot, report
 from thud.plot import documentation
-from thud.plot.style import COLORS, line_style, marker_style
+from thud.plot.style import COLORS, WIDTH, line_style, marker_style
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,9 +77,9 @@ def assert_clean(figure: Figure) -> None:
 @pytest.mark.slow
 def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
     figure = documentation_figure(name)
-    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
     assert_clean(figure)
-    words = " ".join(texts(figure))
+    words = " ".join(texts(figure)).replace("\n", " ")
     # Plates press with one force.
     for label in (axes.get_ylabel() for axes in figure.axes if name != "compression"):
         if "orce" in label or "evel" in label:

@@ -9,6 +9,7 @@ import pytest
 
 import thud
 from thud.plot import draw_sweep
+from thud.plot.style import RATING_SYMBOL, WIDTH
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -113,7 +114,7 @@ def test_figure_says_what_lines_and_shades_are(others: dict[str, Any], expected:
 def test_figure_is_a_column_wide(tmp_path: Any) -> None:  # noqa: ANN401 - a path
     values = ["momentum_balance", "retarding", "conservative", "none"]
     figure = draw(parameters={"momentum_flux": {"values": values}, "height": HEIGHTS})
-    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
     thud.plot.save(figure, tmp_path / "sweep.png")
     titles = [axes.title.get_window_extent() for axes in figure.axes]
     assert titles[0].x1 < titles[1].x0
@@ -132,4 +133,4 @@ def test_case_with_a_room_is_drawn(tmp_path: Path) -> None:
     for name, rating in zip(("in the room", "standardized (ISO 16283-2)"), ratings, strict=True):
         assert drawn[name] == pytest.approx(rating)
     assert len(drawn) == 2
-    assert figure.get_supylabel().startswith("L_iA,Fmax")
+    assert figure.get_supylabel().startswith(RATING_SYMBOL)

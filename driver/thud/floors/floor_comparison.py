@@ -60,13 +60,13 @@ class FloorComparison(Displayed, Page):
         return [row for row in rows if row[0] != "required, dB" or any(row[1:])]
 
     def figure(self) -> Figure:
-        """Return the page as a matplotlib figure."""
+        """Return ratings, levels and what they follow from as a matplotlib figure."""
         from thud.plot.pages import draw_floors
 
         return draw_floors(self)
 
     def html(self) -> str:
-        """Return the page as self-contained HTML with interactive plots."""
+        """Return a page with interactive plots and the table as self-contained HTML."""
         from thud.plot.pages import floors_html
 
         return floors_html(self)
