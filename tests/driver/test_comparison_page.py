@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from thud.plot.pages import comparison_figure, comparison_html
 from thud.plot.style import WIDTH
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
@@ -106,20 +108,56 @@ def test_no_cell_is_minus_zero() -> None:
     assert _cell(criterion, QUANTITIES["margin"]) == "0.00"
 
 
-def test_browser_draws_the_curves_and_hides_them(tmp_path: Path) -> None:
+@contextmanager
+def open_in_browser(path: Path, html: str) -> Iterator[Any]:
+    """Open a page of text in a browser."""
     sync_api = pytest.importorskip("playwright.sync_api")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
         pytest.skip("there is no chromium")
-    (tmp_path / "page.html").write_text(comparison_html(IMPACTS, None, "rubber_ball", TABLE))
+    path.write_text(html, encoding="utf-8")
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page()
-        page.goto((tmp_path / "page.html").as_uri())
+        page.goto(path.as_uri())
+        yield page
+        browser.close()
+
+
+def test_browser_draws_the_curves_and_hides_them(tmp_path: Path) -> None:
+    sync_api = pytest.importorskip("playwright.sync_api")
+    html = comparison_html(IMPACTS, None, "rubber_ball", TABLE)
+    with open_in_browser(tmp_path / "page.html", html) as page:
         curves = page.locator(".area path[stroke]")
         # Two curves in three plots; five octaves have a tolerance, the legend shows one more.
         sync_api.expect(curves).to_have_count(6)
         sync_api.expect(page.locator(".band")).to_have_count(6)
         page.locator(".legend button").first.click()
         sync_api.expect(curves).to_have_count(3)
-        browser.close()
+
+
+def assert_scrolls_inside(page: Any, table: Any, width: int) -> None:  # noqa: ANN401 - of playwright
+    """Assert that a table, not the page, scrolls, and keeps the titles of its rows."""
+    page.set_viewport_size({"width": width, "height": 800})
+    # Plots are drawn again.
+    page.wait_for_function(f"document.documentElement.scrollWidth <= {width}", timeout=5000)
+    right = table.evaluate(
+        "e => { e.scrollLeft = 1e4; const t = e.querySelector('tbody td');"
+        "return [e.getBoundingClientRect().right, t.getBoundingClientRect().left]; }"
+    )
+    assert right[0] <= width
+    assert 0 <= right[1] < width / 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [320, 390, 1000])
+def test_table_scrolls_inside_a_narrow_page(width: int, tmp_path: Path) -> None:
+    names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(9)]
+    rows = [("", *names), *(("number of force peaks", *["1574.3 high"] * 9) for _ in range(12))]
+    html = comparison_html(dict.fromkeys(names, SHELL), None, "rubber_ball", rows)
+    with open_in_browser(tmp_path / "page.html", html) as page:
+        assert_scrolls_inside(page, page.locator(".table"), width)
+        # At least two columns of numbers are in sight.
+        second = page.locator("tbody tr").first.locator("td").nth(2)
+        page.locator(".table").evaluate("e => { e.scrollLeft = 0; }")
+        assert second.evaluate("e => e.getBoundingClientRect().right") <= width

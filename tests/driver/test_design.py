@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import REPOSITORY, naming
+from matplotlib.collections import LineCollection
 
 import thud
 
@@ -104,7 +105,8 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     lines = axes.collections[1].levels
     assert len(lines) > 0
     assert set(lines) <= set(bar.get_yticks())
-    assert any(len(c.get_segments()) == len(lines) for c in bar.collections)
+    marks = [c for c in bar.collections if isinstance(c, LineCollection)]
+    assert any(len(mark.get_segments()) == len(lines) for mark in marks)
 
 
 @pytest.mark.filterwarnings("error")

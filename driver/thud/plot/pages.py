@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base.display import html_text
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
@@ -66,7 +67,7 @@ def html_page(
     head, *body = table
     return _PAGE.substitute(
         title=html.escape(title),
-        text=html.escape(text),
+        text=html_text(text),
         head=_row(head, "th"),
         rows="\n".join(_row(row, "td") for row in body),
         plots=json.dumps(plots).replace("<", r"\u003c"),
@@ -97,7 +98,9 @@ def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> 
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
-    return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+    # Names of cases may break behind an underscore.
+    shown = (html_text(cell).replace("_", "_<wbr>") for cell in cells)
+    return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in shown) + "</tr>"
 
 
 _PAGE = Template("""<!DOCTYPE html>
@@ -123,7 +126,16 @@ th { vertical-align: bottom; max-width: 12em; overflow-wrap: break-word; }
 td { white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
   background: var(--page); padding-left: 0; }
+@media (max-width: 40em) {
+  body { margin-top: 0.8em; }
+  table { font-size: 0.85em; }
+  th, td { padding: 0.35em 0 0.35em 0.9em; }
+  th { max-width: 7em; }
+  td { white-space: normal; min-width: 4.5em; max-width: 7em; }
+  th:first-child, td:first-child { max-width: 7.5em; overflow-wrap: break-word; }
+}
 .legend { display: flex; flex-wrap: wrap; gap: 0.4em 1.2em; margin-top: 1.5em; }
+.legend > * { overflow-wrap: anywhere; }
 .legend button { font: inherit; color: inherit; background: none; border: 0; padding: 0;
   text-align: left; cursor: pointer; }
 .legend button[aria-pressed="false"] { opacity: 0.4; }
@@ -135,6 +147,7 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 .plots svg { display: block; }
 .plots .readout svg { display: inline; }
 .plots text { fill: var(--text); font-size: 13px; }
+sub { line-height: 0; }
 .grid { stroke: var(--line); }
 .band { fill: var(--band); }
 .cursor { stroke: var(--text); }
@@ -146,7 +159,7 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 <body>
 <h1>$title</h1>
 <p>$text</p>
-<div class="table"><table>
+<div class="table" role="region" aria-label="Table" tabindex="0"><table>
 <thead>$head</thead>
 <tbody>
 $rows
@@ -306,9 +319,9 @@ def floors_html(comparison: FloorComparison) -> str:
         modal = curve_points(
             names[: prediction.n_modal], prediction.modal_level[: prediction.n_modal]
         )
-        traces[-1].append(
-            {**curve_style(i, f"{name}, by modes"), "mode": "lines", **modal, "showlegend": False}
-        )
+        thin = curve_style(i, f"{name}, by modes")
+        thin["line"]["width"] = 1
+        traces[-1].append({**thin, "mode": "lines", **modal, "showlegend": False})
     plots = [
         {
             "data": data,

@@ -382,7 +382,9 @@ def _draw_classes(
 ) -> None:
     """Draw the limits of the Korean classes as lines, with a legend if there is one."""
     for i, (number, limit) in enumerate(zip(CLASSES[1:], CLASS_LIMITS, strict=True)):
-        if rating.count() and rating.min() < limit < rating.max():
+        # Closer to an end of the ratings the line would be a point in a corner.
+        low, high = limit - _MIN_RANGE, limit + _MIN_RANGE
+        if rating.count() and rating.min() < low and high < rating.max():
             axes.contour(
                 *position, rating, [limit], colors=COLORS[1], linewidths=1.4, linestyles=[LINES[i]]
             )
