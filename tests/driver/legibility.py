@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.collections import Collection
+from matplotlib.colors import to_rgb
 from matplotlib.container import Container
 from matplotlib.lines import Line2D
 from matplotlib.mathtext import MathTextParser
@@ -42,7 +43,7 @@ class Recorder(RendererAgg):
         self.texts: list[Text] = []
         self.sizes: dict[Text, float] = {}
 
-    def draw_text(  # type: ignore[override]  # noqa: PLR0913 - of matplotlib
+    def draw_text(  # type: ignore[override]  # noqa: PLR0913, PLR0917 - of matplotlib
         self, gc: Any, x: float, y: float, s: str, prop: Any, angle: float,  # noqa: ANN401
         ismath: bool | str = False, mtext: Text | None = None,  # noqa: FBT001, FBT002
     ) -> None:  # fmt: skip
@@ -99,7 +100,8 @@ def find_faults(figure: Figure) -> list[str]:
     for text, ink in inks.items():
         if ink.any() and np.ptp(behind[ink], axis=0).max() > CONTRAST:
             faults.append(f"{_quoted(text)} is on a mark")
-        if ink[[0, -1]].any() or ink[:, [0, -1]].any():
+        box = text.get_window_extent()
+        if (box.min < -1).any() or (box.max > figure.bbox.max + 1).any():
             faults.append(f"{_quoted(text)} is cut")
     return faults + [f"{name!r} is not seen" for name in _find_hidden(figure, behind)]
 
@@ -119,8 +121,11 @@ def _find_hidden(figure: Figure, complete: Picture) -> list[str]:
     ]
 
 
-def _is_seen(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: ANN401 - artist or container
-    """Return whether a picture without an artist differs; of a stand-in, whether its color is there."""
+def _is_seen(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: ANN401 - of matplotlib
+    """Return whether a picture without an artist differs.
+
+    Of an artist without data, which stands for others in a legend, the color must be in the axes.
+    """
     parts = [*_parts(artist)]
     if all(map(_is_empty, parts)):
         return any(_has_color(figure, part, complete) for part in parts)
@@ -132,7 +137,7 @@ def _is_seen(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: A
     return int((change > CONTRAST / 2).sum()) >= SEEN
 
 
-def _parts(artist: Any) -> list[Artist]:  # noqa: ANN401 - artist or container
+def _parts(artist: Any) -> list[Artist]:  # noqa: ANN401 - of matplotlib
     if isinstance(artist, Container):
         return [child for child in artist.get_children() if child is not None]
     return [artist]
@@ -146,10 +151,8 @@ def _is_empty(artist: Artist) -> bool:
     return False
 
 
-def _has_color(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: ANN401 - line or area
+def _has_color(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: ANN401 - of matplotlib
     """Return whether the color of an artist is found in axes."""
-    from matplotlib.colors import to_rgb
-
     color = artist.get_color() if isinstance(artist, Line2D) else artist.get_facecolor()[0]
     near = abs(complete - 255 * np.array(to_rgb(color))).max(axis=-1) < CONTRAST / 4
     height = len(complete)

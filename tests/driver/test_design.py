@@ -12,6 +12,8 @@ from conftest import REPOSITORY, naming
 from matplotlib.collections import LineCollection
 
 import thud
+from thud.plot.study_figures import _draw_classes
+from thud.plot.style import empty_axes
 
 MODAL: dict[str, Any] = {
     "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
@@ -90,6 +92,14 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     shown = [text.get_text() for text in axes.get_yticklabels()]
     assert {"1", "1.2", "1.4"} <= set(shown)
     assert thud.plot.draw_design(thud.design(MODAL)).axes[0].get_xscale() == "linear"
+
+
+def test_limit_of_a_class_that_no_sample_passes_is_not_in_the_legend() -> None:
+    x, y = np.arange(3.0), np.arange(4.0)
+    rating = np.ma.masked_invalid(np.linspace(44.99, 52, 12).reshape(4, 3))
+    _, axes = empty_axes(2)
+    _draw_classes(axes, (x, y), rating)
+    assert axes.get_legend_handles_labels()[1] == ["class 4, 49 dB"]
 
 
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:

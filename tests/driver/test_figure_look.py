@@ -99,6 +99,19 @@ def test_long_names_of_many_cases_stay_outside_of_the_axes(shell: thud.Impact, c
     assert min(heights) > 1.8
 
 
+def test_levels_are_drawn_at_their_bands() -> None:
+    """Shifted markers would change the slopes of the lines between them."""
+    impacts = {f"{i}": thud.solve() for i in range(4)}
+    (axes,) = plot.levels(impacts).axes
+    lines = [line for line in axes.lines if line.get_label() in impacts]
+    sizes = [line.get_markersize() for line in lines]
+    for line in lines:
+        np.testing.assert_array_equal(line.get_xdata(), range(5))
+    # Equal levels: each marker is seen around the next.
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(set(sizes)) == 4
+
+
 def test_no_two_of_many_curves_look_the_same() -> None:
     looks = {
         (line_style(i)["color"], str(line_style(i)["linestyle"]), marker_style(i)["marker"])

@@ -98,6 +98,16 @@ def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact
     assert figure.get_figwidth() == pytest.approx(WIDTH)
 
 
+def test_time_of_an_instant_is_nearer_to_its_ball_than_to_others(deformed: thud.Impact) -> None:
+    figure = thud.plot.motion(deformed)
+    figure.draw_without_rendering()
+    panels = [axes for axes in figure.axes if axes.get_title()]
+    for panel, below in zip(panels, panels[3:], strict=False):
+        label = panel.title.get_window_extent()
+        own = panel.get_window_extent().y0 - label.y1
+        assert 0 <= own < label.y0 - below.get_window_extent().y1
+
+
 def test_animation_has_a_picture_for_each_snapshot(tmp_path: Path) -> None:
     impact = thud.solve(model="finite_element", **{**SNAPSHOTS, "snapshot_interval": 4e-3})
     assert impact.motion

@@ -59,6 +59,13 @@ def test_first_numeric_parameter_is_the_axis_and_texts_have_panels() -> None:
     assert "median" not in words(figure)
 
 
+def test_shades_that_are_not_drawn_are_not_announced() -> None:
+    both = {"height": HEIGHTS, "mass": {"values": [2.4, 2.5]}}
+    explained = words(draw(design={"kind": "list"}, parameters=both))
+    assert explained.startswith("Also varied: mass\n")
+    assert "shades" not in explained
+
+
 def test_lowest_panels_have_the_numbers_of_the_axis() -> None:
     fluxes = {"values": ["none", "retarding", "conservative"]}
     figure = draw(parameters={"momentum_flux": fluxes, "height": HEIGHTS})

@@ -144,8 +144,8 @@ footer { margin-top: 0.8em; color: #444; font-size: 0.85em; }
   .scroll th[colspan] span { display: inline-block; max-width: calc(100vw - 3em); position: sticky;
     left: 0; }
   .cards:where(:not(.scroll)) thead { display: none; }
-  .cards:where(:not(.scroll)) tr { display: grid; grid-template-columns: repeat(auto-fill, minmax(6.5em, 1fr));
-    padding: 0.4em 0; border-top: 1px solid #bbb; }
+  .cards:where(:not(.scroll)) tr { display: grid; padding: 0.4em 0;
+    grid-template-columns: repeat(auto-fill, minmax(6.5em, 1fr)); border-top: 1px solid #bbb; }
   .cards:where(:not(.scroll)) :is(td, th) { padding: 0 !important; border: 0 !important;
     text-align: left; white-space: normal; }
   .cards:where(:not(.scroll)) :is(td:first-child, th) { grid-column: 1 / -1; font-weight: bold; }
