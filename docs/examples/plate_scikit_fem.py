@@ -12,12 +12,19 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 from scipy.sparse.linalg import splu
 from skfem import Basis, BilinearForm, DiscreteField, ElementQuadBFS, MeshQuad, condense
 from skfem.helpers import dd, ddot, trace
+
+from thud.plot import add_curves, legend_above, own_style, save
+from thud.plot.style import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LENGTH, WIDTH, THICKNESS = 5.0, 4.0, 0.14  # m
 POINT = (2.0, 1.5)  # m, of impact
@@ -128,25 +135,34 @@ def low_passed(force: np.ndarray, step: float) -> np.ndarray:
     return sosfiltfilt(sections, np.pad(force, (round(BEFORE / step), 0)), padlen=0)
 
 
-def main() -> None:
-    """Compute and draw."""
-    from thud import plot
-
-    force, step = read_force(sys.argv[1] if len(sys.argv) > 1 else None)
+@own_style()
+def draw(force: np.ndarray, step: float) -> Figure:
+    """Compute the velocity of the plate; draw it, and its difference from the modal sum."""
     force = low_passed(force, step)
-    time = step * np.arange(len(force)) - BEFORE
-    found = plate_velocity(new_plate(20), force, step)
-    exact = modal_velocity(force, step)
-    infinite = force / (8 * np.sqrt(STIFFNESS * MASS))
-    print(f"largest velocity {1e3 * np.abs(found).max():.3f} mm/s")
-    print(f"largest difference {1e3 * np.abs(found - exact).max():.4f} mm/s")
-    figure, axes = plot.empty_axes(2.4)
+    time = 1e3 * (step * np.arange(len(force)) - BEFORE)
+    found = 1e3 * plate_velocity(new_plate(20), force, step)
+    exact = 1e3 * modal_velocity(force, step)
+    infinite = 1e3 * force / (8 * np.sqrt(STIFFNESS * MASS))
+    print(f"largest velocity {np.abs(found).max():.3f} mm/s")
+    print(f"largest difference {np.abs(found - exact).max():.4f} mm/s")
+    figure = new_figure(2.9)
+    velocity, difference = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = {"scikit-fem": found, "modal sum": exact, "infinite plate, F/Z": infinite}
-    plot.add_curves(axes, {name: (1e3 * time, 1e3 * v) for name, v in curves.items()})
-    axes.set_xlabel("Time since first touch, ms")
-    axes.set_ylabel("Velocity of the plate, mm/s")
-    plot.legend_above(axes)
-    plot.save(figure, "docs/figures/plate_velocity.png")
+    add_curves(velocity, {name: (time, curve) for name, curve in curves.items()})
+    velocity.tick_params(labelbottom=False)
+    velocity.set_ylabel("Velocity of\nthe plate, mm/s")
+    difference.plot(time, 1e3 * (found - exact), color="black", linewidth=0.8)
+    difference.set_ylabel("scikit-fem −\nmodal sum, µm/s")
+    difference.set_xlabel("Time since first touch, ms")
+    figure.align_ylabels()
+    legend_above(velocity)
+    return figure
+
+
+def main() -> None:
+    """Draw the figure into the working directory."""
+    force, step = read_force(sys.argv[1] if len(sys.argv) > 1 else None)
+    save(draw(force, step), "plate_velocity.png")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import thud
 from thud.plot.impact_figures import draw_forces, draw_levels
-from thud.plot.style import LEVEL, WIDTH, legend_above, new_figure, own_style
+from thud.plot.style import LEVEL, legend_above, new_figure, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,14 +22,20 @@ CASES = {
 
 @own_style()
 def flagship() -> Figure:
-    """Draw forces and octaves of the three cases of `./bootstrap run`."""
+    """Draw force on the floor and octaves of the three cases of `./bootstrap run`."""
     impacts = {
         name: thud.solve(thud.read_case(INPUTS / f"{case}.nml")) for name, case in CASES.items()
     }
-    figure = new_figure(2.4, 2 * WIDTH)
+    figure = new_figure(2.1)
     history, octaves = figure.subplots(1, 2)
-    draw_forces(history, impacts, None)
-    draw_levels({"octave": octaves}, impacts, None, "rubber_ball")
-    octaves.set_ylabel(LEVEL)
+    draw_forces(history, impacts, "floor")
+    history.set_ylabel("Force on the floor, kN")
+    history.set_xlabel("Time, ms")
+    history.set_xticks([0, 10, 20])
+    history.locator_params(axis="y", nbins=4)
+    draw_levels({"octave": octaves}, impacts, "floor", "rubber_ball")
+    octaves.tick_params(axis="x", labelrotation=90)
+    octaves.set_xlabel("Octave, Hz")
+    octaves.set_ylabel(LEVEL.replace("Force exposure l", "L"))
     legend_above(octaves)
     return figure

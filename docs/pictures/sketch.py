@@ -17,20 +17,37 @@ INK = "0.15"
 BLUE, RED, GREEN = COLORS[:3]
 SOLID = "#d7e6f2"
 FLOOR = "0.82"
-SIZE = 8.5
+# Size of the text, pt: indices of formulas have 6 pt.
+SIZE = 8.6
 
 
 def panels(
-    limits: list[tuple[float, float, float, float]], height: float, width: float = 2 * WIDTH
+    *rows: list[tuple[float, float, float, float]], width: float = WIDTH
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its panels, one for each range (left, right, bottom, top)."""
-    figure = Figure(figsize=(width, height), dpi=300, layout="constrained")
-    wide = [right - left for left, right, _, _ in limits]
-    found = figure.subplots(1, len(limits), squeeze=False, gridspec_kw={"width_ratios": wide})[0]
-    for axes, (left, right, bottom, top) in zip(found, limits, strict=True):
-        axes.set(xlim=(left, right), ylim=(bottom, top), aspect="equal")
-        axes.set_axis_off()
-    return figure, list(found)
+    """Return a figure and its panels in rows, one for each range (left, right, bottom, top).
+
+    Each row is as wide as the figure, with one scale for all of its panels.
+    """
+    # Inches of a unit, and heights, of each row.
+    scales = [width / sum(right - left for left, right, _, _ in row) for row in rows]
+    heights = [
+        scale * max(top - bottom for _, _, bottom, top in row)
+        for scale, row in zip(scales, rows, strict=True)
+    ]
+    figure = Figure(figsize=(width, sum(heights)), dpi=300)
+    found = []
+    base = 1.0
+    for row, scale, height in zip(rows, scales, heights, strict=True):
+        base -= height / sum(heights)
+        start = 0.0
+        for left, right, bottom, top in row:
+            size = scale * (right - left) / width, scale * (top - bottom) / sum(heights)
+            axes = figure.add_axes((start, base, *size))
+            axes.set(xlim=(left, right), ylim=(bottom, top))
+            axes.set_axis_off()
+            found.append(axes)
+            start += size[0]
+    return figure, found
 
 
 def text(axes: Axes, x: float, y: float, words: str, **how: object) -> None:

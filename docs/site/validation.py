@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from thud.plot import COLORS, legend_above, own_style, save
-from thud.plot.style import LEVEL, WIDTH, empty_axes, new_figure
+from thud.plot import COLORS, LINES, legend_above, own_style, save
+from thud.plot.style import LEVEL, empty_axes, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,7 +97,7 @@ def draw_orders(curves: dict[str, Any]) -> Figure:
 @own_style()
 def draw_codes(curves: dict[str, Any]) -> Figure:
     """Draw octaves of two impacts by thud and by other element codes, and the differences."""
-    figure = new_figure(3.6)
+    figure = new_figure(3.2)
     levels, change = figure.subplots(2, 1, sharex=True, height_ratios=[2, 1])
     cases: dict[str, dict[str, Any]] = {}
     for name, curve in curves.items():
@@ -107,22 +107,20 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
     place = np.arange(len(octaves))
     for i, (case, by) in enumerate(cases.items()):
         (other,) = by.keys() - {"thud"}
-        levels.plot(place, by["thud"], color=COLORS[i], label=f"{case}: thud")
-        levels.plot(
-            place,
-            by[other],
-            "os"[i],
-            color=COLORS[i],
-            markerfacecolor="none",
-            label=f"{case}: {other}",
-        )
-        difference = by["thud"] - by[other]
-        change.plot(place, difference, "os"[i], color=COLORS[i], markersize=4)
-    change.axhline(0, color="0.4", linewidth=0.8)
+        marks = {"marker": "os"[i], "linestyle": "none", "color": COLORS[i], "markersize": 4.5}
+        line = {"color": COLORS[i], "linestyle": LINES[i]}
+        levels.plot(place, by["thud"], label=f"{case}: thud", **line)
+        levels.plot(place, by[other], markerfacecolor="none", label=f"{case}: {other}", **marks)
+        change.plot(place, by["thud"] - by[other], clip_on=False, **marks)
+    change.axhline(0, color="0.4", linewidth=0.8, zorder=1)
+    for axes in (levels, change):
+        axes.margins(0.08, 0.2)
+    levels.tick_params(labelbottom=False)
     change.set_xticks(place, [f"{octave:g}" for octave in octaves])
     change.set_xlabel("Octave band, Hz")
-    change.set_ylabel("thud −\nother code, dB")
+    change.set_ylabel("thud − other\ncode, dB")
     levels.set_ylabel(LEVEL.replace(", ", ",\n"))
+    figure.align_ylabels()
     legend_above(levels)
     return figure
 
@@ -130,9 +128,10 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
 @own_style()
 def draw_laws(curves: dict[str, Any]) -> Figure:
     """Draw three octaves against the order of the damping law, by thud and another code."""
-    figure = new_figure(2.2, 2 * WIDTH)
     octaves = list(dict.fromkeys(name.split(": ")[0] for name in curves))
-    for axes, octave in zip(figure.subplots(1, len(octaves)), octaves, strict=True):
+    figure = new_figure(0.4 + 0.9 * len(octaves))
+    panels = figure.subplots(len(octaves), 1, sharex=True)
+    for axes, octave in zip(panels, octaves, strict=True):
         for name, curve in curves.items():
             if name.startswith(octave):
                 thud = name.endswith("thud")
@@ -141,12 +140,12 @@ def draw_laws(curves: dict[str, Any]) -> Figure:
                     markerfacecolor="none", label=name.split(": ")[1],
                 )  # fmt: skip
         middle = np.mean(axes.get_ylim())
-        axes.set_ylim(middle - 1.4, middle + 1.4)
-        axes.set_title(octave)
-        axes.set_xlabel("Order of the law")
-    first = figure.axes[0]
-    first.set_ylabel(LEVEL.replace(", ", ",\n"))
-    legend_above(first)
+        axes.set_ylim(middle - 1.5, middle + 1.5)
+        axes.set_title(octave, loc="left")
+        axes.tick_params(labelbottom=axes is panels[-1])
+    panels[-1].set_xlabel("Order of the law")
+    figure.supylabel(LEVEL)
+    legend_above(panels[0])
     return figure
 
 

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import REPOSITORY, naming
+from matplotlib.collections import LineCollection
 
 import thud
+from thud.plot.study_figures import _draw_classes
+from thud.plot.style import empty_axes
 
 MODAL: dict[str, Any] = {
     "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
@@ -91,6 +94,14 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     assert thud.plot.draw_design(thud.design(MODAL)).axes[0].get_xscale() == "linear"
 
 
+def test_limit_of_a_class_that_no_sample_passes_is_not_in_the_legend() -> None:
+    x, y = np.arange(3.0), np.arange(4.0)
+    rating = np.ma.masked_invalid(np.linspace(44.99, 52, 12).reshape(4, 3))
+    _, axes = empty_axes(2)
+    _draw_classes(axes, (x, y), rating)
+    assert axes.get_legend_handles_labels()[1] == ["class 4, 49 dB"]
+
+
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     heights = {"low": 0.1, "high": 0.5, "count": 4}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
@@ -99,9 +110,13 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     margin = thud.design(study).dataset["margin"].values
     assert low <= margin.min()
     assert margin.max() < 0 == high
-    # The zero is white, and round margins have lines with their numbers.
+    # The zero is white, and round margins have lines, also in the bar.
     assert axes.collections[0].norm(0) == 0.5
-    assert len(axes.texts) > 0
+    lines = axes.collections[1].levels
+    assert len(lines) > 0
+    assert set(lines) <= set(bar.get_yticks())
+    marks = [c for c in bar.collections if isinstance(c, LineCollection)]
+    assert any(len(mark.get_segments()) == len(lines) for mark in marks)
 
 
 @pytest.mark.filterwarnings("error")

@@ -27,7 +27,7 @@ from PIL import Image
 import thud
 from thud import cli, plot, report
 from thud.plot import documentation
-from thud.plot.style import COLORS, line_style, marker_style
+from thud.plot.style import COLORS, WIDTH, line_style, marker_style
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,9 +77,9 @@ def assert_clean(figure: Figure) -> None:
 @pytest.mark.slow
 def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
     figure = documentation_figure(name)
-    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
     assert_clean(figure)
-    words = " ".join(texts(figure))
+    words = " ".join(texts(figure)).replace("\n", " ")
     # Plates press with one force.
     for label in (axes.get_ylabel() for axes in figure.axes if name != "compression"):
         if "orce" in label or "evel" in label:
@@ -97,6 +97,19 @@ def test_long_names_of_many_cases_stay_outside_of_the_axes(shell: thud.Impact, c
         heights.append(axes.height / figure.dpi)
     # The legend does not squeeze the axes.
     assert min(heights) > 1.8
+
+
+def test_levels_are_drawn_at_their_bands() -> None:
+    """Shifted markers would change the slopes of the lines between them."""
+    impacts = {f"{i}": thud.solve() for i in range(4)}
+    (axes,) = plot.levels(impacts).axes
+    lines = [line for line in axes.lines if line.get_label() in impacts]
+    sizes = [line.get_markersize() for line in lines]
+    for line in lines:
+        np.testing.assert_array_equal(line.get_xdata(), range(5))
+    # Equal levels: each marker is seen around the next.
+    assert sizes == sorted(sizes, reverse=True)
+    assert len(set(sizes)) == 4
 
 
 def test_no_two_of_many_curves_look_the_same() -> None:

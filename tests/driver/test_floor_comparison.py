@@ -201,7 +201,7 @@ def test_case_that_fails_is_named() -> None:
 
 def test_page_draws_chain_and_both_predictions(found: thud.FloorComparison) -> None:
     figure = found.figure()
-    force, energy, radiated, level, ratings = figure.axes[:5]
+    ratings, level, radiated, energy, force = figure.axes
     thin = found.predictions["thin"]
     for axes, values in (
         (force, 10 * np.log10(thin.energy / thin.conductance)),
@@ -210,9 +210,9 @@ def test_page_draws_chain_and_both_predictions(found: thud.FloorComparison) -> N
         (level, thin.level),
     ):
         assert axes.lines[0].get_ydata() == pytest.approx(values)
-    assert level.lines[1].get_ydata() == pytest.approx(thin.modal_level[: thin.n_modal])
+    assert level.lines[2].get_ydata() == pytest.approx(thin.modal_level[: thin.n_modal])
     predictions = found.predictions.values()
-    drawn = [np.asarray(line.get_ydata()) for line in ratings.lines]
+    drawn = [np.asarray(line.get_xdata()) for line in ratings.lines]
     for wanted in (
         [one.rated for one in predictions],
         [one.interval[0] for one in predictions],

@@ -127,7 +127,7 @@ def test_numbers_of_all_positions_are_shown(room: thud.ModalRoom) -> None:
 
 def test_figures_show_positions_and_shapes(room: thud.ModalRoom) -> None:
     labels = [text.get_text() for text in room.plot().legends[0].get_texts()]
-    assert "energy mean of the positions" in labels
+    assert "mean of positions" in labels
     titles = [axes.get_title() for axes in plate_modes(FLOOR, 4, columns=2).axes]
     unit = 3500 * 0.16 * np.pi / (4 * np.sqrt(3))
     assert titles[0] == f"{unit * (1 / 4.5**2 + 1 / 3.7**2):.1f} Hz"

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import runpy
-import sys
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import REPOSITORY, names_in
+from conftest import REPOSITORY, names_in, python
+from PIL import Image
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
 @pytest.mark.slow
-def test_pictures_are_drawn_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scripts = REPOSITORY / "docs/pictures"
-    monkeypatch.setattr(sys, "path", [str(scripts), *sys.path])
-    runpy.run_path(str(scripts / "draw.py"))["draw"](tmp_path)
-    drawn = set(names_in(tmp_path))
-    kept = set(names_in(REPOSITORY / "docs/figures"))
-    assert {"flagship.png", *(name for name in kept if name.startswith("sketch_"))} == drawn
+def test_script_draws_the_figures_that_are_named(tmp_path: Path) -> None:
+    command = [REPOSITORY / "docs/pictures/draw.py", "sketch_flow", "figure3_levels"]
+    assert python(*command, "--folder", tmp_path).returncode == 0
+    assert names_in(tmp_path) == ["figure3_levels.png", "sketch_flow.svg"]
+    with Image.open(tmp_path / "figure3_levels.png") as picture:
+        assert picture.mode == "P"
+        assert picture.info["Title"] == "Figure3 levels"
+    done = python(*command[:1], "figure_3")
+    assert done.returncode == 2
+    assert "figure_3" in done.stderr
 
 
 def test_every_figure_is_shown() -> None:

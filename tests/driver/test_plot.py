@@ -12,6 +12,7 @@ from PIL import Image
 
 import thud
 from thud.level.levels import low_pass
+from thud.plot.style import WIDTH
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -74,7 +75,7 @@ def test_names_are_no_formulas(tmp_path: Path) -> None:
 
 def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     figure = thud.plot.levels({"a": thud.solve(), "b": thud.solve(drop=thud.Drop(0.1))}, "floor")
-    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
     for ending in ("png", "svg", "pdf"):
         thud.plot.save(figure, tmp_path / f"levels.{ending}")
     assert names_in(tmp_path) == [
@@ -94,7 +95,17 @@ def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact
     assert times == sorted(times)
     assert times[0] == pytest.approx(0, abs=0.6)
     assert times[-1] == pytest.approx(1e3 * deformed.contact_time, abs=0.6)
-    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
+
+
+def test_time_of_an_instant_is_nearer_to_its_ball_than_to_others(deformed: thud.Impact) -> None:
+    figure = thud.plot.motion(deformed)
+    figure.draw_without_rendering()
+    panels = [axes for axes in figure.axes if axes.get_title()]
+    for panel, below in zip(panels, panels[3:], strict=False):
+        label = panel.title.get_window_extent()
+        own = panel.get_window_extent().y0 - label.y1
+        assert 0 <= own < label.y0 - below.get_window_extent().y1
 
 
 def test_animation_has_a_picture_for_each_snapshot(tmp_path: Path) -> None:
@@ -139,8 +150,8 @@ def test_mode_shapes_are_named() -> None:
     assert [axes.get_title() for axes in figure.axes][:4] == [
         f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
     ]
-    assert figure.get_figwidth() == pytest.approx(3.5)
-    assert thud.plot.mode_shapes(modes, columns=6).get_figwidth() == pytest.approx(7)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
+    assert thud.plot.mode_shapes(modes, columns=6).get_figwidth() == pytest.approx(2 * WIDTH)
 
 
 def test_loss_factors_follow_their_laws() -> None:

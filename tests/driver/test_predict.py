@@ -140,7 +140,7 @@ def test_fractions_of_the_paths_are_stated(tmp_path: Path) -> None:
 def test_page_states_ratings_contributions_and_sources(floor: PredictedFloor, page: Path) -> None:
     text = text_of(page, floor)
     # The index of the rating is in an element of its own.
-    plain = text.replace("L iA,Fmax ", "L_iA,Fmax")
+    plain = text.replace(" L  iA,Fmax ", "L_iA,Fmax")
     assert floor.prediction.rated_text in text
     assert f"{floor.prediction.octave_text}, no class" in text
     assert str(floor.prediction.requirement) in plain

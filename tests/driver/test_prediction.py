@@ -314,8 +314,8 @@ def test_share_that_is_radiated_is_that_of_one_side() -> None:
 def test_maxima_are_drawn_on_their_decays(shell: thud.Impact) -> None:
     found = thud.predict_level(shell, thud.Plate(), thud.Room())
     (axes,) = plot.draw_decay(found).axes
-    drawn = [line.get_xydata() for line in axes.get_lines()][:-1]
-    for decay, ((time, level),) in zip(drawn[::2], drawn[1::2], strict=True):
+    *decays, maxima = [line.get_xydata() for line in axes.get_lines()]
+    for decay, (time, level) in zip(decays, maxima, strict=True):
         # Its steps are a hundredth of a second or less.
         assert np.interp(time, *np.transpose(decay)) == pytest.approx(level, abs=0.1)
         assert decay[np.argmax(decay[:, 1]), 0] == pytest.approx(time, abs=10)

@@ -87,23 +87,19 @@ def test_samples_without_results_are_left_out() -> None:
 
 def test_figure_shows_every_index(lumped: Sensitivity) -> None:
     figure = thud.plot.draw_sensitivity(lumped)
-    (axes,) = figure.axes
-    widths = [bar.get_width() for bars in axes.containers[::3] for bar in bars]
-    expected = lumped.indices["total"].transpose("parameter", "output").values.ravel()
-    np.testing.assert_array_equal(widths, expected)
-    # No bar covers another, of its output or of the next one.
-    bars = sorted(axes.patches, key=lambda bar: bar.get_y())
-    ends = [bar.get_y() + bar.get_height() for bar in bars]
-    assert all(end < bar.get_y() for end, bar in zip(ends, bars[1:], strict=False))
+    assert [axes.get_title() for axes in figure.axes] == ["mass", "height", "outer radius"]
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["mass", "height", "outer radius", "total index", "first order"]
-    for place, name in ((1, "total"), (2, "first_order")):
-        for container, parameter in zip(
-            axes.containers[place::3], LUMPED["parameters"], strict=True
-        ):
-            row = lumped.indices.sel(parameter=parameter)
-            ((bars,),) = [container.lines[2]]
-            halves = [np.ptp(segment[:, 0]) / 2 for segment in bars.get_segments() if len(segment)]
+    assert labels == ["total index", "95 % interval", "first order"]
+    for axes, parameter in zip(figure.axes, LUMPED["parameters"], strict=True):
+        row = lumped.indices.sel(parameter=parameter)
+        bars, *intervals = axes.containers
+        np.testing.assert_array_equal([bar.get_width() for bar in bars], row["total"])
+        # No bar covers another.
+        ends = [bar.get_y() + bar.get_height() for bar in bars]
+        assert all(end < bar.get_y() for end, bar in zip(ends, [*bars][1:], strict=False))
+        for container, name in zip(intervals, ("total", "first_order"), strict=True):
+            (lines,) = container.lines[2]
+            halves = [np.ptp(segment[:, 0]) / 2 for segment in lines.get_segments() if len(segment)]
             known = row[f"{name}_interval"].values
             np.testing.assert_allclose(halves, known[np.isfinite(known)], atol=1e-12)
 

@@ -9,6 +9,7 @@ import pytest
 
 import thud
 from thud.plot import draw_sweep
+from thud.plot.style import RATING_SYMBOL, WIDTH
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -56,6 +57,13 @@ def test_first_numeric_parameter_is_the_axis_and_texts_have_panels() -> None:
         np.testing.assert_allclose(curves(axes), levels, atol=1e-6)
     assert "Panels: momentum flux" in words(figure)
     assert "median" not in words(figure)
+
+
+def test_shades_that_are_not_drawn_are_not_announced() -> None:
+    both = {"height": HEIGHTS, "mass": {"values": [2.4, 2.5]}}
+    explained = words(draw(design={"kind": "list"}, parameters=both))
+    assert explained.startswith("Also varied: mass\n")
+    assert "shades" not in explained
 
 
 def test_lowest_panels_have_the_numbers_of_the_axis() -> None:
@@ -113,7 +121,7 @@ def test_figure_says_what_lines_and_shades_are(others: dict[str, Any], expected:
 def test_figure_is_a_column_wide(tmp_path: Any) -> None:  # noqa: ANN401 - a path
     values = ["momentum_balance", "retarding", "conservative", "none"]
     figure = draw(parameters={"momentum_flux": {"values": values}, "height": HEIGHTS})
-    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert figure.get_figwidth() == pytest.approx(WIDTH)
     thud.plot.save(figure, tmp_path / "sweep.png")
     titles = [axes.title.get_window_extent() for axes in figure.axes]
     assert titles[0].x1 < titles[1].x0
@@ -132,4 +140,4 @@ def test_case_with_a_room_is_drawn(tmp_path: Path) -> None:
     for name, rating in zip(("in the room", "standardized (ISO 16283-2)"), ratings, strict=True):
         assert drawn[name] == pytest.approx(rating)
     assert len(drawn) == 2
-    assert figure.get_supylabel().startswith("L_iA,Fmax")
+    assert figure.get_supylabel().startswith(RATING_SYMBOL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from abc import ABC, abstractmethod
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+_SYMBOL = re.compile(r"\b([CL])_(FE|I|iA,Fmax|n,w)\b")
 # Maximum length of a cause in a warning.
 _MAX_CAUSE = 100
 
@@ -28,7 +30,7 @@ class Displayed(Immutable, ABC):
         """Return header and rows of the table."""
 
     def _repr_html_(self) -> str:
-        return f"<p>{_escaped(repr(self)[1:-1])}</p>\n{html_table(self.rows())}"
+        return f"<p>{html_text(repr(self)[1:-1])}</p>\n{html_table(self.rows())}"
 
 
 @contextmanager
@@ -58,11 +60,12 @@ def draw_all(draws: Mapping[str, Callable[[], Figure | None]]) -> dict[str, Figu
 
 def html_table(rows: Iterable[Sequence[str]]) -> str:
     """Return rows of text, the header first, as HTML."""
-    header, *body = (tuple(map(_escaped, row)) for row in rows)
+    header, *body = (tuple(map(html_text, row)) for row in rows)
     lines = [("th", header), *(("td", row) for row in body)]
     cells = ["".join(f"<{tag}>{cell}</{tag}>" for cell in row) for tag, row in lines]
     return "<table>\n" + "".join(f"<tr>{line}</tr>\n" for line in cells) + "</table>"
 
 
-def _escaped(text: str) -> str:
-    return escape(text)
+def html_text(text: str) -> str:
+    """Return a text as HTML, with the indices of symbols such as L_iA,Fmax below the line."""
+    return _SYMBOL.sub(r"<i>\1</i><sub>\2</sub>", escape(text))

@@ -27,7 +27,7 @@ from thud.level.assessment import VERDICTS
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
-from thud.plot.pages import comparison_html, comparison_page
+from thud.plot.pages import comparison_figure, comparison_html
 from thud.plot.save_figures import page_files
 from thud.studies.model_assessment import assess_impacts
 
@@ -137,11 +137,11 @@ class Comparison(Displayed, Page):
         return result
 
     def figure(self) -> Figure:
-        """Return the page as a matplotlib figure."""
-        return comparison_page(self.impacts, self.force, self.source, self.rows(), self.reasons)
+        """Return forces and levels as a matplotlib figure."""
+        return comparison_figure(self.impacts, self.force, self.source)
 
     def html(self) -> str:
-        """Return the page as self-contained HTML with interactive plots."""
+        """Return a page with interactive plots and the table as self-contained HTML."""
         return comparison_html(self.impacts, self.force, self.source, self.rows(), self.reasons)
 
     def files(self) -> dict[str, bytes]:

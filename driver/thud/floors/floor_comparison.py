@@ -70,13 +70,13 @@ class FloorComparison(Displayed, Page):
         return [(name, *row[1:]) for name, row in zip(names, rows, strict=True)]
 
     def figure(self) -> Figure:
-        """Return the page as a matplotlib figure."""
+        """Return ratings, levels and what they follow from as a matplotlib figure."""
         from thud.plot.pages import draw_floors
 
         return draw_floors(self)
 
     def html(self) -> str:
-        """Return the page as self-contained HTML with interactive plots."""
+        """Return a page with interactive plots and the table as self-contained HTML."""
         from thud.plot.pages import floors_html
 
         return floors_html(self)

@@ -43,7 +43,7 @@ from thud.plot.impact_figures import (
     level_changes as level_changes,
     levels as levels,
 )
-from thud.plot.pages import comparison_page as comparison_page
+from thud.plot.pages import comparison_figure as comparison_figure
 from thud.plot.recording_figures import (
     recording_forces as recording_forces,
     recording_levels as recording_levels,

@@ -39,7 +39,7 @@ INSTANTS = 9
 # Nodes between two arrows, from pole to pole and through the wall.
 ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
-DISPLACEMENT = "Displacement of the material, mm"
+DISPLACEMENT = "Displacement, mm"
 # Maximum displacement of a mode in its figure, as a fraction of the radius.
 AMPLITUDE = 0.3
 
@@ -194,7 +194,8 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
     lowest = -depth - 0.12 * radius
     axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
     elapsed = 1e3 * (snapshots.time[i] - impact.touch_time)
-    axes.set_title(f"{elapsed:.1f} ms")
+    # Below the floor: above the ball it would be nearer to the floor of the panel above.
+    axes.set_title(f"{elapsed:.1f} ms", y=0, pad=-2, verticalalignment="top")
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
     axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
     axes.set_aspect("equal")

@@ -80,7 +80,7 @@ function draw(host) {
   for (const curve of lines) {
     const points = curve.y.map((y, i) => [toX(position(curve, i)), toY(up(y))]).filter((point) => point.every(Number.isFinite));
     const path = points.map((point) => point.map((value) => value.toFixed(1)).join(" ")).join("L");
-    image.append(svg("path", { d: `M${path}`, fill: "none", stroke: color(curve), "stroke-width": 2, "stroke-dasharray": DASHES[curve.line.dash] }));
+    image.append(svg("path", { d: `M${path}`, fill: "none", stroke: color(curve), "stroke-width": curve.line.width ?? 2, "stroke-dasharray": DASHES[curve.line.dash] }));
     if (curve.mode.includes("markers"))
       for (const [x, y] of points) image.append(svg("path", { d: MARKS[curve.marker.symbol], transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`, fill: color(curve) }));
   }

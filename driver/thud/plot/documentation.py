@@ -165,9 +165,9 @@ def _draw_floors() -> Figure:
 def _draw_impedances() -> Figure:
     resistance = [560.0, 1e3, 2e3, 5e3, 1e5]
     sources = {
-        "shell": ball_impedance(solve(), resistance),
-        "modes": ball_impedance(solve(model="modal_ball"), resistance),
-        "elements": ball_impedance(_solve_published(), resistance[1:]),
+        "ball, shell": ball_impedance(solve(), resistance),
+        "ball, modes": ball_impedance(solve(model="modal_ball"), resistance),
+        "ball, elements": ball_impedance(_solve_published(), resistance[1:]),
     }
     floors: dict[str, FloorOptions] = {
         "chipboard on joists": JoistFloor(),

@@ -190,7 +190,7 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     x, y = (
         np.array(intervals[fit.names[i]]) / scale for i, scale in zip(pair, factor, strict=True)
     )
-    style: dict[str, Any] = {"color": GRAY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
+    style: dict[str, Any] = {"color": GRAY, "linewidth": 0, "zorder": 0}
     axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **style)
     axes.axhspan(*y, **style)
     half = 1.25 * np.sqrt(square * np.diag(block))

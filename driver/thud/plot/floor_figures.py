@@ -22,7 +22,6 @@ from thud.plot.style import (
     COLORS,
     LINES,
     WIDTH,
-    add_curves,
     band_axis,
     empty_axes,
     escape_label,
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
 
 THIRDS = BANDWIDTHS[1]
 # Length of the drawn piece of a section and of its scale bar, m; of the piece on paper, inch.
-_PIECE, _BAR, _DRAWN = 0.8, 0.2, 1.6
+_PIECE, _BAR, _DRAWN = 0.8, 0.2, 1.2
 # Height of a label beside a section, inch, and the maximum number of characters in one line.
 _LINE, _LABEL = 0.23, 30
 # Drawn time, as a multiple of the contact time.
@@ -145,7 +144,7 @@ def draw_floor(impact: FloorImpact) -> Figure:
     band_axis(energy, injected.frequency, THIRDS)
     _draw_mobility(mobility, impact)
     figure.align_ylabels()
-    legend_above(history, motion, mobility)
+    legend_above(history, motion, mobility, title="Forces are low-passed at 1.25 kHz")
     return figure
 
 
@@ -156,7 +155,7 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     for i, (name, force) in enumerate(forces.items()):
         recorded = 1e-3 * low_pass(force, impact.sample_rate)
         history.plot(time[shown], recorded[shown], label=name, **line_style(i))
-    history.set_ylabel("Force on the floor,\nlow-passed, kN")
+    history.set_ylabel("Force on the\nfloor, kN")
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)
     motion.set_ylabel("Velocity of\nthe floor, mm/s")
     motion.set_xlabel(TIME_LABEL)
@@ -170,9 +169,12 @@ def _draw_mobility(axes: Axes, impact: FloorImpact) -> None:
     low, high = bands.lower[0], bands.upper[-1]
     frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
     mobility = impact.mobility(frequency)
-    axes.loglog(frequency, abs(mobility), label="|Y|", color="0.6", linewidth=0.8)
-    axes.loglog(frequency, mobility.real, label="Re Y", color=COLORS[3], linewidth=0.8)
-    axes.set_ylabel("Mobility Y,\nm/(N s)")
+    # A thin line on a thick one: the mobility of an infinite plate is real.
+    axes.loglog(frequency, abs(mobility), label="$|Y|$", color="0.7", linewidth=2.4)
+    axes.loglog(
+        frequency, mobility.real, label=r"$\mathrm{Re}\,Y$", color="black", linewidth=0.8,
+    )  # fmt: skip
+    axes.set_ylabel("Mobility $Y$,\nm/(N s)")
     axes.set_xlabel("Frequency, Hz")
     axes.set_xlim(low, high)
     octaves = get_bands(BANDWIDTHS[0]).nominal
@@ -233,14 +235,15 @@ def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
         refuse_value("floors", floors, "a mapping of names to floors")
     for name, floor in floors.items():
         require_kind(name, floor, FloorOptions)
-    figure, axes = empty_axes(3.0)
+    figure, axes = empty_axes(2.8)
     frequency = np.geomspace(11.0, 1400.0, 1500)
-    add_curves(
-        axes,
-        {name: (frequency, np.abs(mobility(floor, frequency))) for name, floor in floors.items()},
-    )
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    for i, (name, floor) in enumerate(floors.items()):
+        # Resonances are as narrow as dashes: markers distinguish the curves instead.
+        axes.loglog(
+            frequency, np.abs(mobility(floor, frequency)), label=escape_label(name),
+            color=COLORS[i % len(COLORS)], linewidth=0.8, markevery=(30 * i, 225),
+            **marker_style(i, 4.5),
+        )  # fmt: skip
     marks = [16, 31.5, 63, 125, 250, 500, 1000]
     axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
     axes.minorticks_off()
@@ -288,21 +291,21 @@ def ball_impedances(
 
     Floors below the open markers change the level of the force by more than 1 dB.
     """
-    figure, axes = empty_axes(3.0)
+    figure, axes = empty_axes(2.8)
     for i, (name, floor) in enumerate(floors.items()):
         axes.loglog(
-            _FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES)), label=name, linewidth=0.8,
-            color=COLORS[i % len(COLORS)], linestyle=styled(i, LINES),
+            _FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES)), label=escape_label(name),
+            linewidth=0.8, color=COLORS[i % len(COLORS)], linestyle=styled(i, LINES),
         )  # fmt: skip
     frequency = np.array([])
     for i, (name, source) in enumerate(sources.items()):
         frequency = source.frequency
         # Markers side by side: equal impedances stay visible.
-        x = frequency * 1.05 ** (i - (len(sources) - 1) / 2)
+        x = frequency * 1.08 ** (i - (len(sources) - 1) / 2)
         style = {"color": "black", "linestyle": "none", **marker_style(i)}
-        suffix = f", {name}" if name else ""
-        axes.loglog(x, np.abs(source.impedance), label=f"source{suffix}", **style)
-        axes.loglog(x, source.limit(), fillstyle="none", label=f"limit of 1 dB{suffix}", **style)
+        axes.loglog(x, np.abs(source.impedance), label=escape_label(name) or "source", **style)
+        label = "open: limit of 1 dB" if i == len(sources) - 1 else None
+        axes.loglog(x, source.limit(), fillstyle="none", label=label, **style)
     axes.xaxis.set_major_locator(FixedLocator(frequency.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels([f"{f:g}" for f in frequency])

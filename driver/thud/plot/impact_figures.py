@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 # Drawn time before and after the contact, as a fraction of the contact time.
 MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
+# Sizes of the markers of the first and of the last of several curves.
+LARGEST, SMALLEST = 6.0, 2.5
 
 
 @own_style()
@@ -147,13 +149,13 @@ def draw_levels(
 ) -> None:
     """Draw levels in the axes of their bands; octaves also show the tolerances."""
     draw_tolerance(panels["octave"], *octave_limits(source), source.replace("_", " "))
-    # Markers side by side: equal levels stay distinguishable.
-    step = min(0.1, 0.6 / len(impacts))
     for bands, axes in panels.items():
         for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
             values = impact.levels(bands, method, kind)
-            x = np.arange(len(values)) + step * (i - (len(impacts) - 1) / 2)
-            axes.plot(x, values, label=escape_label(name), **line_style(i), **marker_style(i))
+            # Smaller markers on larger ones: equal levels stay distinguishable.
+            markers = marker_style(i, LARGEST - (LARGEST - SMALLEST) * i / max(3, len(impacts) - 1))
+            x = np.arange(len(values))
+            axes.plot(x, values, label=escape_label(name), **line_style(i), **markers)
         octave_axis(axes, bands)
 
 

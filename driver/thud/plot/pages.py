@@ -9,11 +9,9 @@ from string import Template
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.transforms import Bbox
 
+from thud.base.display import html_text
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
@@ -23,11 +21,12 @@ from thud.plot.impact_figures import (
     draw_levels,
     force_label,
 )
+from thud.plot.room_figures import FAST_LEVEL
 from thud.plot.style import (
     BAND_NAMES,
     COLORS,
     LEVEL,
-    WIDTH,
+    RATING_SYMBOL,
     band_axis,
     escape_label,
     iterate_curves,
@@ -45,7 +44,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.gridspec import GridSpec
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LimitsSource
@@ -76,7 +74,7 @@ def html_page(
     items = "".join(f"<li>{html.escape(warning)}</li>" for warning in warnings)
     return _PAGE.substitute(
         title=html.escape(title),
-        text=html.escape(text),
+        text=html_text(text),
         head=_row(head, "th"),
         rows="\n".join(_row(row, "td") for row in body),
         warnings=f"<h2>Warnings</h2><ul>{items}</ul>" if items else "",
@@ -108,7 +106,9 @@ def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> 
 
 
 def _row(cells: Sequence[str], tag: str) -> str:
-    return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+    # Names of cases may break behind an underscore.
+    shown = (html_text(cell).replace("_", "_<wbr>") for cell in cells)
+    return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in shown) + "</tr>"
 
 
 _PAGE = Template("""<!DOCTYPE html>
@@ -135,7 +135,16 @@ th { vertical-align: bottom; max-width: 12em; overflow-wrap: break-word; }
 td { white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
   background: var(--page); padding-left: 0; }
+@media (max-width: 40em) {
+  body { margin-top: 0.8em; }
+  table { font-size: 0.85em; }
+  th, td { padding: 0.35em 0 0.35em 0.9em; }
+  th { max-width: 7em; }
+  td { white-space: normal; min-width: 4.5em; max-width: 7em; }
+  th:first-child, td:first-child { max-width: 7.5em; overflow-wrap: break-word; }
+}
 .legend { display: flex; flex-wrap: wrap; gap: 0.4em 1.2em; margin-top: 1.5em; }
+.legend > * { overflow-wrap: anywhere; }
 .legend button { font: inherit; color: inherit; background: none; border: 0; padding: 0;
   text-align: left; cursor: pointer; }
 .legend button[aria-pressed="false"] { opacity: 0.4; }
@@ -147,6 +156,7 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 .plots svg { display: block; }
 .plots .readout svg { display: inline; }
 .plots text { fill: var(--text); font-size: 13px; }
+sub { line-height: 0; }
 .grid { stroke: var(--line); }
 .band { fill: var(--band); }
 .cursor { stroke: var(--text); }
@@ -158,7 +168,7 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 <body>
 <h1>$title</h1>
 <p>$text</p>
-<div class="table"><table>
+<div class="table" role="region" aria-label="Table" tabindex="0"><table>
 <thead>$head</thead>
 <tbody>
 $rows
@@ -178,64 +188,23 @@ $plots
 """)
 
 
-# Maximum number of characters of a name in one line of a table.
-_MAX_NAME_LENGTH = 20
-# Maximum number of characters in a line below the table.
-_MAX_LINE_LENGTH = 120
-# Space around the text of a cell, and to the left of all axes, inch.
-_CELL_MARGIN = (0.12, 0.08)
-_LEFT_MARGIN = 0.8
-
-
 @own_style()
-def comparison_page(
-    impacts: Mapping[str, ImpactResult],
-    force: LevelsForce | None,
-    source: LimitsSource,
-    table: Sequence[Sequence[str]],
-    reasons: Sequence[str] = (),
+def comparison_figure(
+    impacts: Mapping[str, ImpactResult], force: LevelsForce | None, source: LimitsSource
 ) -> Figure:
-    """Draw forces, octave and one-third-octave levels of impacts, and a table, on one page.
+    """Draw forces, octave and one-third-octave levels of impacts.
 
-    The table is rows of text, header row first; the tolerance band is that of the source. The
-    reasons are verdicts over what is not known, one sentence each. Other
-    arguments are those of `thud.compare`.
+    The tolerance band is that of the source; arguments are those of `thud.compare`.
     """
-    figure = new_figure(5.8, 2 * WIDTH)
-    grid = figure.add_gridspec(3, 2)
-    draw_forces(figure.add_subplot(grid[0, :]), impacts, force)
-    octaves = figure.add_subplot(grid[1, 0])
-    third_octaves = figure.add_subplot(grid[1, 1], sharey=octaves)
+    figure = new_figure(6.3)
+    history, octaves, third_octaves = figure.subplots(3, 1, height_ratios=[1.4, 1, 1])
+    draw_forces(history, impacts, force)
     draw_levels({"octave": octaves, "third": third_octaves}, impacts, force, source)
-    octaves.set_ylabel(level_label(impacts, force))
+    for axes in (octaves, third_octaves):
+        axes.set_ylabel(level_label(impacts, force, LEVEL.replace(" level", "\nlevel")))
+    figure.align_ylabels()
     legend_above(octaves)
-    head, *body = table
-    _add_table(figure, grid, [[fill(name, _MAX_NAME_LENGTH) for name in head], *body])
-    if reasons:
-        text = "\n".join(escape_label(fill(f"{r}.", _MAX_LINE_LENGTH)) for r in reasons)
-        figure.supxlabel(text, x=0.01, ha="left", fontsize=mpl.rcParams["legend.fontsize"])
     return figure
-
-
-def _add_table(figure: Figure, grid: GridSpec, rows: Sequence[Sequence[str]]) -> None:
-    """Add a table in the last row of a figure; enlarge the figure for it."""
-    axes = figure.add_subplot(grid[-1, :])
-    axes.set_axis_off()
-    cells = [[escape_label(cell) for cell in row] for row in rows]
-    table = axes.table(cells, bbox=Bbox.unit(), edges="horizontal")
-    table.auto_set_font_size(value=False)
-    table.set_fontsize(mpl.rcParams["legend.fontsize"])
-    widths, heights = np.zeros(len(cells[0])), np.zeros(len(cells))
-    for (row, column), cell in table.get_celld().items():
-        size = np.array(cell.get_text().get_window_extent().size) / figure.dpi + _CELL_MARGIN
-        widths[column], heights[row] = np.maximum((widths[column], heights[row]), size)
-    for (row, column), cell in table.get_celld().items():
-        cell.set(width=widths[column], height=heights[row], linewidth=0.5)
-        cell.set_text_props(ha="right" if column else "left")
-    upper_height, upper_rows = figure.get_figheight(), grid.nrows - 1
-    grid.set_height_ratios([*([upper_height / upper_rows] * upper_rows), heights.sum()])
-    width = widths.sum() + _LEFT_MARGIN
-    figure.set_size_inches(max(figure.get_figwidth(), width), upper_height + heights.sum())
 
 
 def comparison_html(
@@ -245,7 +214,11 @@ def comparison_html(
     table: Sequence[Sequence[str]],
     reasons: Sequence[str] = (),
 ) -> str:
-    """Return the page of `comparison_page` with interactive plots, readable on any screen."""
+    """Return a page of interactive plots and the table, readable on any screen.
+
+    The table is rows of text, header row first; the reasons are verdicts over what is not known,
+    one sentence each.
+    """
     forces: list[dict[str, Any]] = []
     levels: dict[BandSet, list[dict[str, Any]]] = {"octave": [], "third": []}
     for i, (label, impact, kind) in enumerate(iterate_curves(impacts, force)):
@@ -293,46 +266,57 @@ def _tolerance(source: LimitsSource) -> dict[str, Any]:
 
 # Labels of the steps from force to room, and whether their axes are logarithmic.
 _STEPS = {
-    LEVEL: False,
-    "Energy into the floor, J": True,
-    "Radiated share of the losses, %": False,
-    "Maximum Fast level, dB re 20 µPa": False,
+    LEVEL.replace(" level", "\nlevel"): False,
+    "Energy into\nthe floor, J": True,
+    "Radiated share\nof the losses, %": False,
+    FAST_LEVEL: False,
 }
+# Maximum number of characters of the name of a floor in one line.
+_NAME = 18
+# Difference below which forces are drawn as one, dB.
+_SAME = 0.05
 
 
 @own_style()
 def draw_floors(comparison: FloorComparison) -> Figure:
-    """Draw spectra of the steps from force to room, ratings with intervals, and the table.
+    """Draw ratings with intervals, levels in the room, and the steps that lead to them.
 
-    The last spectrum is that of both predictions; that by modes is thin.
+    Levels have two predictions; that by modes is thin.
     """
-    figure = new_figure(7.2, 2 * WIDTH)
-    grid = figure.add_gridspec(4, 2)
-    panels = [figure.add_subplot(grid[i, j]) for i in range(2) for j in range(2)]
-    for i, (name, prediction) in enumerate(comparison.predictions.items()):
-        for axes, values in zip(panels, _step_values(prediction), strict=True):
-            axes.plot(
-                np.arange(len(values)), values, label=escape_label(name), **line_style(i),
-                **marker_style(i, 3.5),
-            )  # fmt: skip
-        panels[-1].plot(
-            np.arange(prediction.n_modal), prediction.modal_level[: prediction.n_modal],
-            **line_style(i) | {"linewidth": 0.8},
-        )  # fmt: skip
-    nominal = next(iter(comparison.predictions.values())).frequency
-    for axes, (label, logarithmic) in zip(panels, _STEPS.items(), strict=True):
+    predictions = comparison.predictions.values()
+    rows = 0.3 + 0.35 * len(predictions)
+    figure = new_figure(5.2 + rows)
+    ratings, *panels = figure.subplots(5, 1, height_ratios=[rows, 1.4, *[1] * 3])
+    steps = zip(*map(_step_values, predictions), strict=True)
+    nominal = next(iter(predictions)).frequency
+    for axes, (label, logarithmic), curves in zip(panels[::-1], _STEPS.items(), steps, strict=True):
         band_axis(axes, nominal, "third")
         axes.set_ylabel(label)
         if logarithmic:
             axes.set_yscale("log")
-    _draw_ratings(figure.add_subplot(grid[2, :]), comparison)
-    legend_above(panels[0])
-    _add_table(figure, grid, comparison.rows())
+        if axes is panels[-1] and len(curves) > 1 and np.ptp(curves, axis=0).max() < _SAME:
+            axes.plot(curves[0], color="black", marker=".", linewidth=1)
+            axes.text(
+                0.97, 0.9, "equal for all floors", transform=axes.transAxes, ha="right", va="top"
+            )
+            continue
+        for i, (name, values) in enumerate(zip(comparison.predictions, curves, strict=True)):
+            axes.plot(values, label=escape_label(name), **line_style(i), **marker_style(i, 3.5))
+    for i, prediction in enumerate(predictions):
+        panels[0].plot(
+            prediction.modal_level[: prediction.n_modal], **line_style(i) | {"linewidth": 0.7}
+        )
+    for axes in panels[:-1]:
+        axes.tick_params(axis="x", labelbottom=False)
+        axes.set_xlabel("")
+    _draw_ratings(ratings, comparison)
+    figure.align_ylabels(panels)
+    legend_above(panels[0], ratings)
     return figure
 
 
 def floors_html(comparison: FloorComparison) -> str:
-    """Return the page of `draw_floors` with interactive plots."""
+    """Return a page of interactive plots and the table."""
     traces: list[list[dict[str, Any]]] = [[] for _ in _STEPS]
     for i, (name, prediction) in enumerate(comparison.predictions.items()):
         style = curve_style(i, name)
@@ -345,9 +329,9 @@ def floors_html(comparison: FloorComparison) -> str:
         modal = curve_points(
             names[: prediction.n_modal], prediction.modal_level[: prediction.n_modal]
         )
-        traces[-1].append(
-            {**curve_style(i, f"{name}, by modes"), "mode": "lines", **modal, "showlegend": False}
-        )
+        thin = curve_style(i, f"{name}, by modes")
+        thin["line"]["width"] = 1
+        traces[-1].append({**thin, "mode": "lines", **modal, "showlegend": False})
     plots = [
         {
             "data": data,
@@ -376,25 +360,23 @@ def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
 def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:
     """Draw the rating of each floor with its interval, and the ratings of both predictions."""
     predictions = list(comparison.predictions.values())
-    x = np.arange(len(predictions))
+    y = np.arange(len(predictions))
     rated = np.array([prediction.rated for prediction in predictions])
     ends = np.array([prediction.interval for prediction in predictions]).T
     axes.errorbar(
-        x, rated, abs(ends - rated), fmt="o", color="black", capsize=4, markersize=5,
-        label="mean of both predictions, with interval",
+        rated, y, xerr=abs(ends - rated), fmt="o", color="black", capsize=3, markersize=4,
+        label="mean, with interval",
     )  # fmt: skip
-    for i, (title, ratings) in enumerate(
-        {
-            "statistical": [prediction.rating for prediction in predictions],
-            "by modes": [prediction.modal_rating for prediction in predictions],
-        }.items()
-    ):
-        levels = [rating.a_weighted for rating in ratings]
+    titles = {
+        "statistical (lines with markers)": [p.rating for p in predictions],
+        "by modes (thin lines)": [p.modal_rating for p in predictions if p.n_modal],
+    }
+    for i, (title, ratings) in enumerate(titles.items()):
+        known = y if i == 0 else [n for n, p in enumerate(predictions) if p.n_modal]
         axes.plot(
-            x + 0.1 * (2 * i - 1), levels, "s^"[i], markersize=5, markerfacecolor="white",
-            color=COLORS[i], label=title,
+            [rating.a_weighted for rating in ratings], np.add(known, 0.3 * (2 * i - 1)), "s^"[i],
+            markersize=4, markerfacecolor="white", color="black", label=title,
         )  # fmt: skip
-    axes.set_xticks(x, [escape_label(name) for name in comparison.predictions], rotation=20)
-    axes.set_xlim(-0.5, len(x) - 0.5)
-    axes.set_ylabel(r"$L_\mathrm{iA,Fmax}$ (ISO 717-2), dB")
-    axes.legend(ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    axes.set_yticks(y, [escape_label(fill(name, _NAME)) for name in comparison.predictions])
+    axes.set_ylim(len(y) - 0.4, -0.6)
+    axes.set_xlabel(f"{RATING_SYMBOL} (ISO 717-2), dB")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 # Height without the legend, inch: a report has two figures side by side.
-HEIGHT = 2.15
+HEIGHT = 2.05
 # Maximum number of drops, and of outliers, drawn as lines; the range of more drops is filled.
 MAX_LINES = 40
 # Margin of the filtered force around the drawn times, s: longer than the filter's response.
@@ -52,7 +52,7 @@ def recording_forces(recording: Recording) -> Figure:
     longest = max(longest, recording.contact_time, limits.upper if limits.upper < 1 else 0)
     time = longest * np.linspace(-MARGIN, 1 + MARGIN, POINTS)
     forces = 1e-3 * np.array([_recorded(drop, time) for drop in recording.drops])
-    allowed = f"permitted contact time, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
+    allowed = f"permitted, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
     axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GRAY, linewidth=0, label=allowed)
     _draw_drops(axes, 1e3 * time, forces, recording)
     if len(forces) > 1:
@@ -67,7 +67,7 @@ def recording_forces(recording: Recording) -> Figure:
     )  # fmt: skip
     axes.set_xlim(1e3 * time[0], 1e3 * time[-1])
     axes.set_xlabel(TIME_LABEL)
-    axes.set_ylabel("Force on the floor,\nlow-passed at 1.25 kHz, kN")
+    axes.set_ylabel("Force on the floor,\nbelow 1.25 kHz, kN")
     legend_above(axes)
     return figure
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.plot.style import (
     COLORS,
     GRAY,
-    WIDTH,
+    RATING_SYMBOL,
     band_axis,
     empty_axes,
     legend_above,
@@ -19,12 +19,16 @@ from thud.plot.style import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from thud.floors.modal_room import ModalRoom
     from thud.floors.prediction import RoomPrediction
     from thud.floors.survey import RoomLevels
 
+FAST_LEVEL = "Maximum Fast level,\ndB re 20 µPa"
+RATING = f"Bands and their A-weighted sum {RATING_SYMBOL}"
 # Drawn range of a decay below the lowest maximum, dB.
 DECAY = 30
 
@@ -32,7 +36,7 @@ DECAY = 30
 @own_style()
 def room_levels(room: RoomLevels) -> Figure:
     """Draw levels in a room against their bands."""
-    figure, axes = empty_axes(2.6)
+    figure, axes = empty_axes(2.4)
     x = np.arange(len(room.frequency))
     if len(room.positions) > 1:
         for i, levels in enumerate(room.positions):
@@ -41,7 +45,7 @@ def room_levels(room: RoomLevels) -> Figure:
     number = room.rating.rounded
     axes.plot(
         x, room.level, color=COLORS[0], marker="o", markersize=3.5,
-        label=f"in the room: L_iA,Fmax {number} dB",
+        label=f"in the room: {number} dB",
     )  # fmt: skip
     standardized, rating = room.standardized, room.standardized_rating
     if standardized is not None and rating is not None:
@@ -55,63 +59,68 @@ def room_levels(room: RoomLevels) -> Figure:
             label="background",
         )  # fmt: skip
     band_axis(axes, room.frequency, room.bands)
-    axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
-    legend_above(axes)
+    axes.set_ylabel(FAST_LEVEL)
+    legend_above(axes, title=RATING)
     return figure
 
 
 @own_style()
 def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
-    """Draw the components of the level in the room below, and measured levels beside it.
+    """Draw the level in the room below, with measured levels if stated, and what it follows from.
 
     Hollow markers are bands with few modes, for which the statistical level may be wrong.
     """
-    figure = new_figure(4.2, WIDTH)
-    above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 1.6))
+    figure = new_figure(4.6)
+    below, energy, radiation, loss = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 1, 1))
     x = np.arange(len(prediction.frequency))
-    few = prediction.has_few_modes
-    above.semilogy(x, 1e3 * prediction.energy, color="black", marker=".", linewidth=1)
-    above.set_ylabel("Energy into\nthe floor, mJ")
-    middle.plot(
-        x, prediction.radiation_factor, color=COLORS[2], marker="^", markersize=3, linewidth=1,
-        label="radiation factor",
-    )  # fmt: skip
-    middle.plot(
-        x, 10 * prediction.loss_factor, color=COLORS[3], marker="v", markersize=3, linewidth=1,
-        linestyle="-.", label="loss factor times 10",
-    )  # fmt: skip
-    middle.set_ylim(bottom=0)
-    middle.set_ylabel("Floor")
     modal = slice(0, prediction.n_modal)
     if prediction.has_edges:
         edges = np.array([prediction.simple_level, prediction.clamped_level])[:, modal]
         below.fill_between(
-            x[modal], edges.min(axis=0), edges.max(axis=0), color=GRAY, linewidth=0,
-            label="modal, simply supported to clamped",
+            x[modal], edges.min(axis=0), edges.max(axis=0), color="0.8", linewidth=0,
+            label="by modes, simply supported to clamped",
         )  # fmt: skip
     if prediction.n_modal:
         below.plot(
             x[modal], prediction.modal_level[modal], color=COLORS[1], marker="s", markersize=3.5,
-            linewidth=1, linestyle="--",
-            label=f"by modes: L_iA,Fmax {prediction.modal_rating.rounded} dB",
+            linewidth=1, linestyle="--", label=f"by modes: {prediction.modal_rating.rounded} dB",
         )  # fmt: skip
-    below.plot(x, prediction.level, color=COLORS[0])
-    for marks, face in ((few, "white"), (~few, COLORS[0])):
-        below.plot(
-            x[marks], prediction.level[marks], color=COLORS[0], marker="o", markersize=4,
-            markerfacecolor=face, linestyle="none",
-        )  # fmt: skip
-    label = f"statistical: {prediction.rating.rounded} dB"
-    below.plot([], [], color=COLORS[0], marker="o", markersize=4, label=label)
+    _draw_statistical(below, x, prediction)
     if measured is not None:
         level = prediction.level + prediction.difference(measured)
         label = f"measured: {measured.rating.rounded} dB"
         below.plot(x, level, color="black", marker="x", linewidth=1, linestyle=":", label=label)
-    below.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
-    band_axis(below, prediction.frequency, "third")
+    below.set_ylabel(FAST_LEVEL)
+    style = {"color": "black", "linewidth": 1, "marker": ".", "markersize": 4}
+    energy.semilogy(x, 1e3 * prediction.energy, **style)
+    energy.set_ylabel("Energy into\nfloor, mJ")
+    radiation.plot(x, prediction.radiation_factor, **style)
+    radiation.set_ylabel("Radiation\nfactor $\\sigma$")
+    loss.plot(x, prediction.loss_factor, **style)
+    loss.set_ylabel("Loss\nfactor $\\eta$")
+    for axes in (radiation, loss):
+        axes.set_ylim(bottom=0)
+    band_axis(loss, prediction.frequency, "third")
+    for axes in (below, energy, radiation):
+        axes.tick_params(axis="x", labelbottom=False)
     figure.align_ylabels()
-    legend_above(below, middle)
+    legend_above(below, title=RATING)
     return figure
+
+
+def _draw_statistical(axes: Axes, x: NDArray[np.int_], prediction: RoomPrediction) -> None:
+    """Draw the statistical levels, with hollow markers at bands with few modes."""
+    few = prediction.has_few_modes
+    axes.plot(x, prediction.level, color=COLORS[0])
+    style: dict[str, Any] = {
+        "color": COLORS[0], "marker": "o", "markersize": 4, "linestyle": "none",
+    }  # fmt: skip
+    name = f"statistical: {prediction.rating.rounded} dB"
+    if not few.all():
+        axes.plot(x[~few], prediction.level[~few], label=name, **style)
+        name = "statistical, few modes"
+    if few.any():
+        axes.plot(x[few], prediction.level[few], label=name, markerfacecolor="white", **style)
 
 
 @own_style()
@@ -141,8 +150,8 @@ def draw_ranges(prediction: RoomPrediction) -> Figure:
             linestyle="--", label=f"by modes: {prediction.modal_rating.rounded} dB",
         )  # fmt: skip
     band_axis(axes, prediction.frequency, "third")
-    axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
-    legend_above(axes)
+    axes.set_ylabel(FAST_LEVEL)
+    legend_above(axes, title=RATING)
     return figure
 
 
@@ -150,21 +159,21 @@ def draw_ranges(prediction: RoomPrediction) -> Figure:
 def draw_decay(prediction: RoomPrediction) -> Figure:
     """Draw the reading of the Fast detector against time, in the middle band of each octave."""
     figure, axes = empty_axes(2.6)
-    for i, band in enumerate(range(1, len(prediction.frequency), 3)):
-        label = f"{prediction.frequency[band]:g} Hz"
-        axes.plot(
-            1e3 * prediction.history_time, prediction.history[:, band], label=label, **line_style(i)
-        )
-        axes.plot(
-            1e3 * prediction.time_of_maximum[band], prediction.level[band], color=COLORS[i],
-            marker="o", linestyle="none",
-        )  # fmt: skip
+    middle = slice(1, None, 3)
+    for i, (frequency, history) in enumerate(
+        zip(prediction.frequency[middle], prediction.history.T[middle], strict=True)
+    ):
+        label = f"{frequency:g} Hz"
+        axes.plot(1e3 * prediction.history_time, history, label=label, **line_style(i))
+    axes.plot(
+        1e3 * prediction.time_of_maximum[middle], prediction.level[middle], color="black",
+        marker="o", markersize=4, linestyle="none", label="maximum",
+    )  # fmt: skip
     top = prediction.level[1::3].max()
     axes.set_ylim(prediction.level[1::3].min() - DECAY, top + 3)
     axes.set_xlim(left=0)
     axes.set_xlabel("Time after the impact, ms")
     axes.set_ylabel("Fast level, dB re 20 µPa")
-    axes.plot([], [], color="black", marker="o", markersize=4, linestyle="none", label="maximum")
     legend_above(axes)
     return figure
 
@@ -175,21 +184,26 @@ def draw_modal_room(room: ModalRoom) -> Figure:
     figure, axes = empty_axes(2.6)
     x = np.arange(len(room.frequency))
     levels = room.level.reshape(-1, len(x))
-    low, first, third, high = np.percentile(levels, (5, 25, 75, 95), axis=0)
-    axes.vlines(x, low, high, color="0.6", linewidth=1, label="90 % of the positions")
-    axes.vlines(x, first, third, color="0.6", linewidth=6, label="50 % of the positions")
-    axes.plot(
-        x, room.mean, color=COLORS[0], marker="o", markersize=3.5,
-        label="energy mean of the positions",
-    )  # fmt: skip
     mean, spread = room.statistical
-    axes.fill_between(x, mean - spread, mean + spread, color=GRAY, linewidth=0, zorder=0)
+    axes.fill_between(
+        x, mean - spread, mean + spread, facecolor="#fbe3d2", edgecolor=COLORS[1], linewidth=0.6,
+        linestyle=":", zorder=0, label="± expected spread",
+    )  # fmt: skip
     axes.plot(
-        x, mean, color=COLORS[1], marker="s", markersize=3.5, linestyle="--",
-        label="statistical, ± expected spread",
+        x, mean, color=COLORS[1], marker="s", markersize=3.5, linestyle="--", label="statistical",
+    )  # fmt: skip
+    low, first, third, high = np.percentile(levels, (5, 25, 75, 95), axis=0)
+    axes.vlines(x, low, high, color="black", linewidth=0.8, label="90 % of positions")
+    axes.bar(
+        x, third - first, 0.4, first, facecolor="white", edgecolor="black", linewidth=0.8,
+        zorder=2.5, label="50 % of positions",
+    )  # fmt: skip
+    axes.plot(
+        x, room.mean, color=COLORS[0], marker="o", markersize=3.5, zorder=3,
+        label="mean of positions",
     )  # fmt: skip
     band_axis(axes, room.frequency, "third")
-    axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa")
+    axes.set_ylabel(FAST_LEVEL)
     legend_above(axes)
     return figure
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -11,7 +12,6 @@ from matplotlib.ticker import (
     LogLocator,
     MaxNLocator,
     NullFormatter,
-    StrMethodFormatter,
 )
 
 from thud.base._schema import CLASS_LIMITS, RATINGS
@@ -24,6 +24,7 @@ from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
     LINES,
+    RATING_SYMBOL,
     empty_axes,
     legend_above,
     line_style,
@@ -54,8 +55,8 @@ if TYPE_CHECKING:
 
 
 AxisName = Literal["x", "y"]
-# Hatches of bars, which distinguish colors in print.
-HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
+# Maximum number of panels side by side.
+_MAX_COLUMNS = 3
 # Range of numbers that are shown in the unit of the key; others have a display unit.
 _PLAIN_RANGE = (1e-2, 1e4)
 # Ratios of maximum to minimum from which logarithmic ticks are 1, 2, 5, or powers of ten only.
@@ -73,7 +74,7 @@ def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> floa
     if unit == parameter.attrs["units"] and not _PLAIN_RANGE[0] <= maximum < _PLAIN_RANGE[1]:
         unit, size = display_unit(unit, maximum)
         factor = 1 / size
-    shown = unit.replace("degC", "°C")
+    shown = re.sub(r"(?<=[a-z])\d", _raise_digit, unit.replace("degC", "°C"))
     label = parameter_label(parameter) if unit == "1" else f"{parameter_label(parameter)}, {shown}"
     axes.set(**{f"{which}label": label})
     axis: Axis = getattr(axes, f"{which}axis")
@@ -83,6 +84,11 @@ def show_parameter(axes: Axes, which: AxisName, parameter: xr.DataArray) -> floa
     else:
         axes.ticklabel_format(axis=which, useOffset=False)
     return factor
+
+
+def _raise_digit(match: re.Match[str]) -> str:
+    """Return a digit as an exponent: "MN/m3" has a power."""
+    return match[0].translate(str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
@@ -110,6 +116,8 @@ _GROUP_COUNT = 16
 _MAX_MARKERS = 16
 # Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6
+# Maximum number of marks of samples along an axis.
+_MAX_MARKS = 21
 # Smallest range of levels that is drawn, dB.
 _MIN_RANGE = 0.05
 
@@ -159,11 +167,14 @@ def draw_sweep(result: Sweep) -> Figure:
     panels = figure.subplots(
         row_count, column_count, sharex=True, sharey=True, squeeze=False
     ).ravel()
+    has_shades = False
     for i, (axes, (title, mask)) in enumerate(zip(panels, masks.items(), strict=False)):
         if drawn.tolerance:
             _draw_tolerance(axes, drawn.tolerance)
         curves = drawn._replace(level=np.where(mask[:, np.newaxis], drawn.level, np.nan))
-        _draw_curves(axes, dataset[name], columns[name], curves, _MAX_MARKERS // column_count)
+        has_shades |= _draw_curves(
+            axes, dataset[name], columns[name], curves, _MAX_MARKERS // column_count
+        )
         axes.set_title(title.replace("_", " "))
         lowest = i + column_count >= len(masks)
         axes.tick_params(axis="x", labelbottom=lowest)
@@ -172,7 +183,8 @@ def draw_sweep(result: Sweep) -> Figure:
         axes.remove()
     figure.supylabel(drawn.label)
     others = [n for n in varied if n not in {name, panel_parameter}]
-    legend_above(panels[0], title=_get_explanation(drawn, panel_parameter, others))
+    explanation = _get_explanation(drawn, panel_parameter, others, has_shades=has_shades)
+    legend_above(panels[0], title=explanation)
     return figure
 
 
@@ -208,7 +220,7 @@ def _get_ratings(dataset: xr.Dataset) -> _Curves:
     """Return the ratings of the levels in the room, as predicted and standardized."""
     names = {"in the room": "room_rating", "standardized (ISO 16283-2)": "standardized_rating"}
     level = np.column_stack([dataset[rating].values.ravel() for rating in names.values()])
-    return _Curves(level, list(names), "L_iA,Fmax in the room below,\ndB re 20 µPa")
+    return _Curves(level, list(names), f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa")
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
@@ -224,8 +236,8 @@ def _draw_curves(
     values: NDArray[Any],
     curves: _Curves,
     max_markers: int,
-) -> None:
-    """Draw the levels of samples against a parameter, without levels that are NaN."""
+) -> bool:
+    """Draw the levels of samples, without NaN, against a parameter; return whether they range."""
     positions, members, names = _group_values(values)
     if names is None:
         positions = positions * show_parameter(axes, "x", parameter)
@@ -233,6 +245,7 @@ def _draw_curves(
         axes.set_xticks(positions, names)
         axes.tick_params(axis="x", labelrotation=20)
         axes.set_xlabel(parameter_label(parameter))
+    has_shades = False
     for i, title in enumerate(curves.names):
         groups = [curves.level[chosen, i] for chosen in members]
         middle, lower, upper = (
@@ -243,6 +256,8 @@ def _draw_curves(
         axes.plot(positions, middle, label=title, **line_style(i), **marks)
         if np.nanmax(upper - lower, initial=0) > _MIN_RANGE:
             axes.fill_between(positions, lower, upper, color=COLORS[i], alpha=0.15, linewidth=0)
+            has_shades = True
+    return has_shades
 
 
 def _group_values(
@@ -267,17 +282,21 @@ def _of_finite(values: NDArray[np.float64], function: Any) -> float:  # noqa: AN
     return float(function(finite)) if finite.size else np.nan
 
 
-def _get_explanation(drawn: _Curves, panel_parameter: str | None, others: list[str]) -> str:
+def _get_explanation(
+    drawn: _Curves, panel_parameter: str | None, others: list[str], *, has_shades: bool
+) -> str:
     """Return the explanation of panels, lines, shades and gray areas."""
     lines = []
+    if panel_parameter:
+        lines.append(f"Panels: {humanize(panel_parameter)}")
+    if others:
+        names = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
+        lines.append(
+            f"Lines: median over {names}; shades: range" if has_shades else f"Also varied: {names}"
+        )
     if drawn.tolerance:
         minimum, maximum = drawn.tolerance
-        lines = [f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
-    if others:
-        over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
-        lines.insert(0, f"Lines: median over {over}; shades: range")
-    if panel_parameter:
-        lines.insert(0, f"Panels: {humanize(panel_parameter)}")
+        lines.append(f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB")
     return "\n".join(lines)
 
 
@@ -319,12 +338,14 @@ def draw_design(result: Design) -> Figure:
         "All criteria met": (conforms & ~undecided, "."),
         "Undecided by surrogate": (undecided, "x"),
     }
+    # Not every sample of a fine map has a mark.
+    row_step, column_step = (-(-count // _MAX_MARKS) for count in conforms.shape)
     for label, (chosen, marker) in marks.items():
-        row, column = np.nonzero(chosen)
+        row, column = np.nonzero(chosen[::row_step, ::column_step])
         if row.size:
             axes.plot(
-                x[column], y[row], marker, markersize=2, markeredgewidth=0.5, color="black",
-                label=label,
+                x[::column_step][column], y[::row_step][row], marker, markersize=2.5,
+                markeredgewidth=0.5, color="black", label=label,
             )  # fmt: skip
     if result.mark:
         position = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
@@ -351,10 +372,12 @@ def _draw_rating(
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
     filled = axes.contourf(*position, rating, levels=fine, cmap="cividis_r")
     inside = steps[(steps > rating.min()) & (steps < rating.max())]
+    bar = figure.colorbar(
+        filled, ax=axes, ticks=steps, label=f"{title},\nstatistical, dB re 20 µPa"
+    )
     if inside.size:
         lines = axes.contour(*position, rating, inside, colors="black", linewidths=0.5)
-        axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
-    figure.colorbar(filled, ax=axes, ticks=steps, label=f"{title},\nstatistical, dB re 20 µPa")
+        bar.add_lines(lines)
 
 
 def _rating_limits(result: Design) -> list[tuple[str, float]]:
@@ -377,7 +400,9 @@ def _draw_limits(
 ) -> None:
     """Draw limits of a rating that are within it as lines, with a legend if there is one."""
     for i, (name, limit) in enumerate(limits):
-        if rating.count() and rating.min() < limit < rating.max():
+        # Closer to an end of the ratings the line would be a point in a corner.
+        low, high = limit - _MIN_RANGE, limit + _MIN_RANGE
+        if rating.count() and rating.min() < low and high < rating.max():
             style: dict[str, Any] = {"color": COLORS[1], "linewidth": 1.4, "linestyle": LINES[i]}
             axes.contour(
                 *position, rating, [limit], colors=COLORS[1], linewidths=1.4, linestyles=[LINES[i]]
@@ -423,51 +448,62 @@ def _draw_margin(
     # Five colors from one line to the next.
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
     filled = axes.contourf(*position, margin, levels=fine, cmap="PuOr", norm=norm)
+    bar = figure.colorbar(filled, ax=axes, ticks=steps)
     inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
     if inside.size:
+        # Their values are those of the lines in the bar: numbers would lie on the marks.
         lines = axes.contour(
             *position, margin, inside, colors="0.25", linewidths=0.4, linestyles="-"
         )
-        axes.clabel(lines, fontsize="x-small", fmt=StrMethodFormatter("{x:g}"))
+        bar.add_lines(lines)
     if margin.min() < 0 < margin.max():
         axes.contour(*position, margin, levels=[0.0], colors="black", linewidths=1.2)
         axes.plot([], [], color="black", label="Octave limits")
-    return figure.colorbar(filled, ax=axes, ticks=steps)
+    return bar
 
 
 @own_style()
 def draw_sensitivity(result: Sensitivity) -> Figure:
-    """Draw total Sobol indices of each output as bars, first orders as marks, with intervals."""
+    """Draw total Sobol indices of each output as bars, first orders as marks, with intervals.
+
+    Each parameter has a panel.
+    """
     indices = result.indices
     parameters = [str(name) for name in indices["parameter"].values]
     outputs = [str(name) for name in indices["output"].values]
-    thickness = 0.84 / len(parameters)
-    figure, axes = empty_axes(0.8 + 0.075 * len(outputs) * (len(parameters) + 1))
-    position = np.arange(len(outputs), dtype=float)
-    for i, name in enumerate(parameters):
+    column_count = min(len(parameters), _MAX_COLUMNS)
+    row_count = -(-len(parameters) // column_count)
+    figure = new_figure(0.4 + row_count * (0.3 + 0.18 * len(outputs)))
+    panels = figure.subplots(
+        row_count, column_count, sharex=True, sharey=True, squeeze=False
+    ).ravel()
+    y = np.arange(len(outputs), dtype=float)
+    bar: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.7}
+    for i, (axes, name) in enumerate(zip(panels, parameters, strict=False)):
         row = indices.sel(parameter=name)
-        y = position + (i - (len(parameters) - 1) / 2) * thickness
-        axes.barh(
-            y, row["total"], 0.9 * thickness, color=COLORS[i % len(COLORS)],
-            hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
-            label=humanize(name),
-        )  # fmt: skip
-        style: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
+        axes.barh(y, row["total"], 0.8, color=COLORS[5], label="total index")
         axes.errorbar(
-            row["total"], y - thickness / 5, xerr=row["total_interval"], marker="|", markersize=3,
-            label="total index" if i == len(parameters) - 1 else None, **style,
-        )  # fmt: skip
+            row["total"], y - 0.2, xerr=row["total_interval"], label="95 % interval", **bar
+        )
         axes.errorbar(
-            row["first_order"], y + thickness / 5, xerr=row["first_order_interval"], marker="D",
-            markersize=2, markerfacecolor="white", markeredgewidth=0.5,
-            label="first order" if i == len(parameters) - 1 else None, **style,
+            row["first_order"], y + 0.2, xerr=row["first_order_interval"], marker="D",
+            markersize=2.5, markerfacecolor="white", markeredgewidth=0.6, label="first order",
+            **bar,
         )  # fmt: skip
-    axes.set_yticks(position, outputs)
-    axes.set_ylim(len(outputs) - 0.5, -0.5)
-    axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
+        axes.set_title(humanize(name))
+        lowest = i + column_count >= len(parameters)
+        axes.tick_params(axis="x", labelbottom=lowest)
+    for axes in panels[len(parameters) :]:
+        axes.remove()
+    first = panels[0]
+    first.set_yticks(y, outputs)
+    first.set_ylim(len(outputs) - 0.5, -0.5)
+    low, high = first.get_xlim()
+    first.set_xlim(min(0.0, low), max(1.0, high))
+    first.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     force = FORCE_NAMES[result.dataset.attrs["assessed_force"]]
-    axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({force})")
-    legend_above(axes)
+    figure.supxlabel(f"Sobol index ({force})")
+    legend_above(first)
     return figure
 
 

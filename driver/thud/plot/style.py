@@ -36,11 +36,12 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Color of areas behind curves.
 GRAY = "0.85"
-# Width of a column, inch.
-WIDTH = 3.5
+# Width of a column of a journal page, 8 cm, inch.
+WIDTH = 8 / 2.54
 FORCE_NAMES = {"elastic": "elastic force", "floor": "force on the floor"}
 BAND_NAMES = {"octave": "Octave band", "third": "One-third-octave band"}
 LEVEL = "Force exposure level, dB re 1 N"
+RATING_SYMBOL = r"$L_\mathrm{iA,Fmax}$"
 # Maximum number of characters in a line of a legend.
 _LINE = 44
 # Without the backend: figures have no window.
@@ -87,7 +88,10 @@ def empty_axes(height: float) -> tuple[Figure, Axes]:
 
 @own_style()
 def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
-    """Put one legend of all axes above their figure, which grows, in as few rows as possible."""
+    """Put one legend of all axes above their figure, which grows, in as few rows as possible.
+
+    Text without formulas is small.
+    """
     figure = axes.get_figure(root=True)
     if figure is None:
         message = "the axes are removed from their figure; allowed: axes of a figure"
@@ -98,19 +102,24 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
         for handle, name in zip(*panel.get_legend_handles_labels(), strict=True)
     ]
     handles, names = zip(*entries, strict=True)
+    size = "medium" if any(map(_has_formula, (*names, title))) else "small"
     rows = 0
     while True:
         rows += 1
         legend = figure.legend(
             handles, names, loc="outside upper left", ncols=-(-len(names) // rows), title=title,
-            alignment="left",
+            alignment="left", fontsize=size, title_fontsize=size,
         )  # fmt: skip
-        size = legend.get_window_extent()
-        if rows >= len(names) or size.width < 0.97 * figure.bbox.width:
+        box = legend.get_window_extent()
+        if rows >= len(names) or box.width < 0.97 * figure.bbox.width:
             width, height = figure.get_size_inches()
-            figure.set_size_inches(width, height + size.height / figure.dpi)
+            figure.set_size_inches(width, height + box.height / figure.dpi)
             return legend
         legend.remove()
+
+
+def _has_formula(label: str) -> bool:
+    return "$" in label.replace(r"\$", "")
 
 
 def escape_label(label: str) -> str:

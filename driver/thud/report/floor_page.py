@@ -10,7 +10,7 @@ import numpy as np
 from thud.base.bridge import version
 from thud.case.keys import humanize
 from thud.report.fonts import FAMILY
-from thud.report.markup import css_string, escaped, inline_svg, labeled, notes, pair_rows
+from thud.report.markup import css_string, escaped, inline_svg, labeled, notes, pair_rows, symbols
 from thud.report.predicted_floor import (
     band_rows,
     contribution_title,
@@ -64,7 +64,6 @@ $warnings
 STYLE = """
 .verdict b { text-transform: none; }
 .whole { white-space: nowrap; }
-sub { line-height: 0; font-size: 0.8em; vertical-align: -0.2em; }
 .sheet { break-after: page; }
 .figure { height: auto; }
 .named td:last-child, .named th:last-child { text-align: left; white-space: normal;
@@ -89,13 +88,11 @@ sub { line-height: 0; font-size: 0.8em; vertical-align: -0.2em; }
   .verdict { width: 52%; }
   .values td:nth-child(2) { min-width: 8em; }
 }
-@media screen { .figure { max-width: 40em; } }
 @media screen and (max-width: 60em) {
   .named tr { grid-template-columns: 7em 1fr; }
   .narrow tr { grid-template-columns: 1fr auto; }
   .narrow td:first-child { grid-column: auto; font-weight: normal; }
   .cards.narrow td:last-child::before { display: none; }
-  .bands td:first-child::after { content: " Hz"; }
 }
 """
 ABOUT_COLUMNS = (
@@ -132,7 +129,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
     low, high = prediction.interval
     body = BODY.substitute(
         rating=escaped(floor.prediction.rated_text),
-        box="<br>".join(map(_with_index, _box(floor))),
+        box="<br>".join(map(symbols, _box(floor))),
         name=escaped(floor.name),
         section=_figure(section, "s"),
         about=pair_rows(_about(floor)),
@@ -165,7 +162,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
             ],
             "narrow",
         ),
-        bands=_table(band_rows(floor), "bands"),
+        bands=_table(band_rows(floor), "bands scroll"),
         columns=escaped(_about_columns(floor)),
         computation=escaped(_about_computation(floor)),
         model=escaped(_about_model(floor)),
@@ -294,11 +291,6 @@ def _about_model(floor: PredictedFloor) -> str:
     )
 
 
-def _with_index(text: str) -> str:
-    """Return a text as HTML with the index of the rating below its line."""
-    return escaped(text).replace("L_iA,Fmax", "L<sub>iA,Fmax</sub>")
-
-
 def _figure(svg: str, prefix: str) -> str:
     """Return a figure as inline SVG; a note if it could not be drawn."""
     return inline_svg(svg, prefix) if svg else "<p>not drawn</p>"
@@ -308,8 +300,10 @@ def _table(rows: Iterable[Sequence[str]], kind: str) -> str:
     """Return rows of text, the header first, as a table."""
     head, *body = rows
     titles = "".join(f"<th>{escaped(title)}</th>" for title in head)
-    lines = "\n".join(f"<tr>{labeled([_with_index(c) for c in row], head)}</tr>" for row in body)
+    # What scrolls can be reached by keys.
+    focus = ' tabindex="0"' if "scroll" in kind else ""
+    lines = "\n".join(f"<tr>{labeled([symbols(c) for c in row], head)}</tr>" for row in body)
     return (
-        f'<table class="cards {kind}"><thead><tr>{titles}</tr></thead>\n'
+        f'<table class="cards {kind}"{focus}><thead><tr>{titles}</tr></thead>\n'
         f"<tbody>{lines}</tbody></table>"
     )

@@ -6,6 +6,7 @@ import html
 import re
 from typing import TYPE_CHECKING
 
+from thud.base.display import html_text
 from thud.report.fonts import FAMILY
 from thud.report.notes import shorten
 from thud.report.rows import NOT_KNOWN
@@ -26,6 +27,11 @@ def plain(text: str) -> str:
 def escaped(text: str) -> str:
     """Return a text in one line as HTML."""
     return html.escape(plain(text))
+
+
+def symbols(text: str) -> str:
+    """Return a text in one line as HTML, with the indices of symbols below the line."""
+    return html_text(plain(text))
 
 
 def css_string(text: str) -> str:

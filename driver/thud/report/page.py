@@ -20,6 +20,7 @@ from thud.report.markup import (
     notes,
     pair_rows,
     plain,
+    symbols,
 )
 from thud.report.notes import group_by_kind, shorten
 from thud.report.rows import (
@@ -96,7 +97,7 @@ def report_page(
         about=pair_rows(_about(data)),
         measured=pair_rows(_measured(data)),
         head="".join(f"<th>{escaped(name)}</th>" for name in _with_picture(HEAD, "")),
-        level=escaped(LEVEL),
+        level=symbols(LEVEL),
         rows="\n".join(map(_row, data["criteria"])),
         rule="<br>".join(map(escaped, _rules(data))),
         figures="\n".join(f"<td>{inline_svg(svg, f'f{i}')}</td>" for i, svg in enumerate(figures)),
@@ -287,7 +288,7 @@ def _budget(criterion: dict[str, Any]) -> str:
             f"k = {number(criterion['coverage_factor'], 2)}",
         ]
     )
-    rows = [f'<tr><th colspan="{len(BUDGET_HEAD)}">{escaped(summary)}</th></tr>']
+    rows = [f'<tr><th colspan="{len(BUDGET_HEAD)}"><span>{escaped(summary)}</span></th></tr>']
     for part in parts:
         share = f"{100 * (part['uncertainty'] / combined) ** 2:.1f} %"
         size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] / style.unit, unit), "1"

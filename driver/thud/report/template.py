@@ -26,7 +26,7 @@ $rows
 $figures
 </tr></table>
 <h2>Uncertainty budgets</h2>
-<table class="cards budget">
+<table class="cards budget scroll" tabindex="0">
 <thead><tr>$budget_head</tr></thead>
 $budgets
 </table>
@@ -45,7 +45,7 @@ $budgets
 """)
 
 # The page around the body of any report, which may have further styles. On screens narrower than a
-# table, each of its rows becomes a card.
+# table, each of its rows becomes a card; long tables of numbers scroll inside the page.
 PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -61,6 +61,7 @@ PAGE = Template("""<!DOCTYPE html>
 :root { color-scheme: light; }
 html { font: 13px/1.4 '$family', Verdana, sans-serif; color: #000; background: #fff; }
 body { margin: 0 auto; font-variant-ligatures: none; overflow-wrap: anywhere; }
+sub { line-height: 0; font-size: 0.8em; vertical-align: -0.2em; }
 h1 { font-size: 2em; line-height: 1.2; margin: 0 0 0.2em; }
 h2 { font-size: 1em; margin: 0.8em 0 0.2em; break-after: avoid; }
 header { border-bottom: 2px solid #000; padding-bottom: 0.6em; margin-bottom: 0.8em;
@@ -91,7 +92,7 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 .budget td:first-child { padding-left: 1em; }
 .range { width: 11em; height: 1.2em; display: block; margin: 0 auto; }
 .rule { margin: 0.3em 0 0.6em; }
-.figure { display: block; width: 100%; }
+.figure { display: block; width: 100%; margin: 0 auto; }
 li, tr { break-inside: avoid; }
 .columns > tbody > tr { break-inside: auto; }
 ul { margin: 0; padding: 0 0 0 1em; list-style: '–  '; }
@@ -124,24 +125,32 @@ footer { margin-top: 0.8em; color: #444; font-size: 0.85em; }
   .budget th:nth-child(7), .budget th:last-child { width: 27mm; }
   .files td:last-child { width: 104mm; }
   .figures { height: 64mm; }
-  .figure { width: 91mm; height: 64mm; }
+  .figure { width: 80mm; height: 64mm; }
   .signature { margin-top: 9mm; }
 }
-@media screen { body { max-width: 74em; padding: 1.5em 1em; } }
+@media screen {
+  body { max-width: 74em; padding: 1.5em 1em; }
+  .figure { max-width: 32em; }
+}
 @media screen and (max-width: 60em) {
   html { font-size: 14px; }
   .verdict { float: none; width: auto; margin: 0 0 0.8em; }
   .mark { float: none; display: block; margin-bottom: 0.8em; }
   .columns > tbody > tr > td { display: block; padding: 0 !important; }
   .figure { margin-bottom: 1em; }
-  .cards thead { display: none; }
-  .cards tr { display: grid; grid-template-columns: repeat(auto-fill, minmax(6.5em, 1fr));
-    padding: 0.4em 0; border-top: 1px solid #bbb; }
-  .cards td, .cards th { padding: 0 !important; border: 0 !important; text-align: left;
-    white-space: normal; }
-  .cards td:first-child, .cards th { grid-column: 1 / -1; font-weight: bold; }
-  .cards td:not(:first-child)::before { content: attr(data-label); display: block; color: #444;
-    font-weight: normal; font-size: 0.85em; }
+  .scroll { display: block; overflow-x: auto; }
+  .scroll :is(th, td) { overflow-wrap: normal; }
+  .scroll :is(th, td):first-child { position: sticky; left: 0; background: #fff; }
+  .scroll th[colspan] span { display: inline-block; max-width: calc(100vw - 3em); position: sticky;
+    left: 0; }
+  .cards:where(:not(.scroll)) thead { display: none; }
+  .cards:where(:not(.scroll)) tr { display: grid; padding: 0.4em 0;
+    grid-template-columns: repeat(auto-fill, minmax(6.5em, 1fr)); border-top: 1px solid #bbb; }
+  .cards:where(:not(.scroll)) :is(td, th) { padding: 0 !important; border: 0 !important;
+    text-align: left; white-space: normal; }
+  .cards:where(:not(.scroll)) :is(td:first-child, th) { grid-column: 1 / -1; font-weight: bold; }
+  .cards:where(:not(.scroll)) td:not(:first-child)::before { content: attr(data-label);
+    display: block; color: #444; font-weight: normal; font-size: 0.85em; }
   .range { width: 95%; margin: 1em 0 0; }
   .files td, .signature td { display: block; text-align: left !important; }
   .signature td { padding: 1.5em 0 0; }

@@ -1,0 +1,107 @@
+"""Figures of the inputs of the repository: studies, fits, floors, rooms, validation."""
+
+from __future__ import annotations
+
+import json
+import runpy
+from functools import cache, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import thud
+from thud.plot import draw_decay, plate_modes
+from thud.plot.fit_figures import confidence
+from thud.studies.kinds import get_kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
+
+REPOSITORY = Path(__file__).parents[2]
+INPUTS = REPOSITORY / "inputs"
+STUDIES = INPUTS / "studies"
+EXAMPLE = REPOSITORY / "docs/examples/plate_scikit_fem.py"
+
+
+@cache
+def study(kind: str, name: str) -> Any:  # noqa: ANN401 - of any kind
+    """Return the result of a study."""
+    chosen = get_kind(kind)
+    return chosen.compute(chosen.read_study(STUDIES / f"{name}.toml"), None)
+
+
+@cache
+def surrogate() -> thud.Surrogate:
+    """Return the surrogate of the standard ball; its training takes minutes and is kept."""
+    return thud.surrogate(STUDIES / "flagship.toml", REPOSITORY / "outputs/flagship")
+
+
+def flagship_design() -> Figure:
+    """Draw the map of wall and modulus by the surrogate, whose file the study reads."""
+    surrogate()
+    figure: Figure = study("design", "flagship_design").plot()
+    return figure
+
+
+@cache
+def prediction() -> thud.RoomPrediction:
+    """Return the prediction of the page on rooms."""
+    return thud.predict_level(floor=thud.Plate(thickness=0.18), room=thud.Room(volume=50.0))
+
+
+def floors() -> Figure:
+    """Draw three slabs."""
+    paths = [INPUTS / f"floors/concrete_{thickness}.nml" for thickness in (140, 180, 220)]
+    return thud.compare_floors({path.stem: thud.read_case(path) for path in paths}).figure()
+
+
+def comparison() -> Figure:
+    """Draw four models."""
+    paths = sorted((INPUTS / "comparison").glob("*.nml"))
+    return thud.compare({path.stem: thud.read_case(path) for path in paths}).figure()
+
+
+def plate_velocity() -> Figure:
+    """Draw the velocity of the plate of the example for scikit-fem."""
+    impact = thud.solve(thud.read_case(INPUTS / "rubber_ball_fe.nml"))
+    draw = runpy.run_path(str(EXAMPLE))["draw"]
+    figure: Figure = draw(impact.floor_force, 1 / impact.sample_rate)
+    return figure
+
+
+def validation_figures() -> dict[str, Callable[[], Figure]]:
+    """Return the figures of the page on validation by name."""
+    page = runpy.run_path(str(REPOSITORY / "docs/site/validation.py"))
+    curves = json.loads(page["RECORD"].read_text(encoding="utf-8"))["curves"]
+    return {name: partial(draw, curves[key]) for name, (draw, key) in page["FIGURES"].items()}
+
+
+RESULTS: dict[str, Callable[[], Figure]] = {
+    "comparison": comparison,
+    "construction": lambda: thud.construction(
+        "CLT 160, gravel, screed on 10 MN/m3, ceiling"
+    ).plot(),
+    "fit_confidence": lambda: confidence(study("fit", "fit_force")),
+    "fit_force": lambda: study("fit", "fit_force").plot(),
+    "fit_recording": lambda: study("fit", "fit_recording").plot(),
+    "fit_recording_constant_loss": lambda: study("fit", "fit_recording_constant_loss").plot(),
+    "floor_modes": lambda: plate_modes(prediction().floor),
+    "floors": floors,
+    "law_of_loss": lambda: study("sweep", "law_of_loss").plot(),
+    "modal_room": lambda: thud.modal_room(prediction().source).plot(),
+    "plate_velocity": plate_velocity,
+    "room_decay": lambda: draw_decay(prediction()),
+    "room_levels": lambda: thud.read_room_levels(
+        INPUTS / "floors/field_levels.csv", volume=41.4
+    ).plot(),
+    "room_prediction": lambda: prediction().plot(),
+    "study_design": lambda: study("design", "design").plot(),
+    "study_flagship_design": flagship_design,
+    "study_floor_design": lambda: study("design", "floor_design").plot(),
+    "study_sensitivity": lambda: study("sensitivity", "sensitivity").plot(),
+    "study_surrogate": lambda: surrogate().plot(),
+    "study_sweep": lambda: study("sweep", "sweep").plot(),
+    "study_uncertainty": lambda: study("uncertainty", "uncertainty").plot(),
+    **validation_figures(),
+}
