@@ -8,13 +8,16 @@ writes plain files to DIRECTORY (default: build/site/html). A warning is an erro
 from __future__ import annotations
 
 import json
-import re
+import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import thud
+from PIL import Image
+
+from fortran import write_pages
 
 REPOSITORY = Path(__file__).parents[2]
 WORK = REPOSITORY / "build/site"
@@ -22,28 +25,6 @@ COPIED = (
     *("docs", "inputs", "README.md", "CHANGELOG.md"),
     *("CONTRIBUTING.md", "CITATION.cff", "LICENSE"),
 )
-# FORD does not read lengths of characters that are calls, nor the include file of FFTW.
-FORD = """---
-project: thud
-summary: The Fortran library
-src_dir: {sources}
-output_dir: {output}/fortran
-css: {css}
-preprocess: false
-display: public
-source: false
-graph: false
-search: false
-warn: false
-predocmark: >
-exclude: **/text.f90
-    **/table.f90
-    **/set_report.f90
-    **/transform.f90
----
-Modules, types and procedures of the library. Programs use the façade `thud`; see the
-[page on it](../docs/fortran.html).
-"""
 
 
 def python_page() -> str:
@@ -65,48 +46,6 @@ def python_page() -> str:
     return text
 
 
-def fortran_page(reference: Path) -> str:
-    """Return the page of all Fortran modules, made from FORD's list of them."""
-    listed = json.loads((reference / "modules.json").read_text(encoding="utf-8"))["modules"]
-    # One of two files of a module is compiled.
-    modules = {module["name"]: module for module in listed}
-    rows = [
-        f"| <a href=\"fortran/{module['external_url'].removeprefix('./')}\">{module['name']}</a> "
-        f"| {', '.join(f'`{name}`' for name in sorted([*module['pub_types'], *module['pub_procs']]))} |"
-        for _, module in sorted(modules.items())
-    ]
-    return "\n".join(
-        [
-            "# Fortran reference",
-            "",
-            "The modules of the library and their public types and procedures. Programs use the façade `thud`",
-            "([page on it](docs/fortran.md)).",
-            "",
-            "| module | types and procedures |",
-            "|---|---|",
-            *rows,
-            "",
-        ]
-    )
-
-
-def strip_network(reference: Path) -> None:
-    """Take from FORD's pages what they load from other hosts; `fortran.css` replaces it."""
-    for path in reference.rglob("*.html"):
-        text = path.read_text(encoding="utf-8")
-        text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
-        text = re.sub(r"<link\b(?![^>]*(?:user|pygments)\.css)[^>]*stylesheet[^>]*>", "", text)
-        # A way back to the other pages.
-        text = re.sub(
-            r'(<a class="navbar-brand" href="([^"]*)index\.html">)',
-            r'<a href="\2../index.html">Documentation</a> \1Fortran reference of ',
-            text,
-        )
-        path.write_text(text, encoding="utf-8")
-    for name in ("js", "webfonts"):
-        shutil.rmtree(reference / name)
-
-
 def copy_sources() -> Path:
     """Return the directory of the sources of the site, made anew."""
     source = WORK / "source"
@@ -118,37 +57,44 @@ def copy_sources() -> Path:
             shutil.copytree(path, source / name)
         else:
             shutil.copy(path, source)
-    for name in ("conf.py", "index.md"):
+    for name in ("conf.py", "index.md", "gallery.md"):
         shutil.copy(Path(__file__).parent / name, source)
     # Tutorials find the inputs beside them, as `thud-driver examples` puts them.
     (source / "docs/tutorials/inputs").symlink_to(source / "inputs")
     return source
 
 
+def reduce_colors(path: Path) -> None:
+    """Write a figure with 256 colors, which makes the file a third as large."""
+    image = Image.open(path).convert("RGB")
+    image.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def remove_outputs(path: Path) -> None:
+    """Write a notebook as it is before it runs; its page shows what it prints and draws."""
+    notebook = json.loads(path.read_text(encoding="utf-8"))
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            cell |= {"outputs": [], "execution_count": None}
+    path.write_text(json.dumps(notebook, indent=1, ensure_ascii=False), encoding="utf-8")
+
+
 def build(target: Path) -> None:
     """Build the site into a directory."""
     source = copy_sources()
     shutil.rmtree(target, ignore_errors=True)
-    settings = WORK / "ford.md"
-    settings.write_text(
-        FORD.format(
-            sources=REPOSITORY / "src",
-            output=WORK / "ford",
-            css=Path(__file__).parent / "fortran.css",
-        ),
-        encoding="utf-8",
-    )
-    python = [sys.executable, "-m"]
-    subprocess.run([*python, "ford", str(settings)], check=True)
-    reference = WORK / "ford/fortran"
-    strip_network(reference)
-    pages = {"python_reference.md": python_page(), "fortran_reference.md": fortran_page(reference)}
-    for name, text in pages.items():
-        (source / name).write_text(text, encoding="utf-8")
-    subprocess.run(
-        [*python, "sphinx", "-W", "--keep-going", "-q", "-j", "auto", str(source), str(target)],
-        check=True,
-    )
+    write_pages(REPOSITORY / "src", WORK / "fortran", source / "fortran")
+    (source / "python_reference.md").write_text(python_page(), encoding="utf-8")
+    sphinx = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto"]
+    shutil.rmtree(WORK / "doctrees", ignore_errors=True)
+    # One process for each core reads pages; threads of BLAS would only wait for each other.
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    command = [*sphinx, "-d", WORK / "doctrees", source, target]
+    subprocess.run(command, check=True, env=environment)
+    for path in target.glob("_images/*.png"):
+        reduce_colors(path)
+    for path in target.glob("_downloads/*/*.ipynb"):
+        remove_outputs(path)
 
 
 if __name__ == "__main__":

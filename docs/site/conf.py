@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from docutils import nodes
 from latex2mathml.converter import convert
 from matplotlib.image import imread
+from sphinx.util.inspect import stringify_signature
 
 import thud
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
+    from sphinx.environment import BuildEnvironment
     from sphinx.writers.html5 import HTML5Translator
 
 project = "thud"
@@ -26,12 +29,12 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.viewcode",
     "sphinx_copybutton",
 ]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
-source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
+# The first is that of pages made by autosummary.
+source_suffix = {".rst": "restructuredtext", ".md": "myst-nb"}
 templates_path = ["docs/site/templates"]
 suppress_warnings = ["misc.highlighting_failure"]  # lines of a CMake list
 exclude_patterns = [
@@ -57,13 +60,14 @@ highlight_language = "none"  # blocks without a language are what programs print
 
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_copy_source = False
 html_title = f"thud {release}"
-html_extra_path = ["../ford"]  # made by FORD
 html_static_path = ["docs/site/static"]
 html_css_files = ["site.css", "tutorials.css"]
 html_theme_options = {
     f"{scheme}_css_variables": {"code-font-size": "76%"} for scheme in ("light", "dark")
 }
+TUTORIALS = "docs/tutorials/"
 # Width of a column of a journal, inch, and pixels of the screen for an inch of a figure.
 COLUMN, DENSITY = 3.5, 150
 
@@ -77,11 +81,19 @@ def inches(path: Path) -> float:
 
 
 def scale_figures(app: Sphinx, document: nodes.document) -> None:
-    """Show all figures with text of one size, and mark those of more than a column."""
+    """Show all figures with text of one size, as far as the screen is wide enough."""
     for image in document.findall(nodes.image):
         width = inches(Path(app.srcdir) / image["uri"])
         image["width"] = f"{width * DENSITY:.0f}px"
-        image["classes"] += ["wide"] * (width > 1.1 * COLUMN)
+
+
+def show_signature(
+    _: Sphinx, what: str, _name: str, item: object, *_rest: object
+) -> tuple[str, str] | None:
+    """Return the signature of a class with its own arguments: they are checked by a wrapper."""
+    if what == "class":
+        return stringify_signature(signature(item), show_annotation=False), ""
+    return None
 
 
 def keep_punctuation(_: Sphinx, document: nodes.document) -> None:
@@ -109,8 +121,62 @@ def write_mathml(translator: HTML5Translator, node: nodes.math | nodes.math_bloc
     raise nodes.SkipNode
 
 
+def spread_tutorials(_: Sphinx, _environment: BuildEnvironment, pages: list[str]) -> None:
+    """Let each process that reads pages read some of the tutorials, which take longest."""
+    tutorials = [page for page in pages if page.startswith(TUTORIALS)]
+    others = [page for page in pages if page not in tutorials]
+    for i, tutorial in enumerate(tutorials):
+        others.insert(i * len(pages) // len(tutorials), tutorial)
+    pages[:] = others
+
+
+def fill_gallery(app: Sphinx, document: nodes.document, page: str) -> None:
+    """Show on its page the figures of all tutorials, as links to the sections that draw them."""
+    if page != "gallery":
+        return
+    for name in app.env.toctree_includes["index"]:
+        if not name.startswith(TUTORIALS):
+            continue
+        address = app.builder.get_relative_uri(page, name)
+        tutorial = app.env.get_doctree(name)
+        title = nodes.title("", app.env.titles[name].astext())
+        section = nodes.section("", title, ids=[Path(name).name])
+        summary = tutorial.next_node(nodes.emphasis)
+        section += nodes.paragraph("", "", *(summary.children if summary else []))
+        grid = nodes.container(classes=["gallery"])
+        for image in tutorial.findall(nodes.image):
+            drawn = image.parent
+            while not isinstance(drawn, nodes.section):
+                drawn = drawn.parent
+            caption = drawn.next_node(nodes.title).astext()
+            picture = nodes.image(
+                uri=image["uri"], candidates={"*": image["uri"]}, alt=caption, loading="lazy"
+            )
+            link = nodes.reference(
+                "", "", picture, internal=True, refuri=f"{address}#{drawn['ids'][0]}"
+            )
+            link += nodes.inline("", caption)
+            grid += nodes.paragraph("", "", link)
+        section += grid
+        document.next_node(nodes.section).append(section)
+
+
+def shorten_navigation(
+    _: Sphinx, _page: str, _template: str, context: dict[str, Any], _document: nodes.document
+) -> None:
+    """List the same pages in the navigation of all: not those of single names and modules."""
+    if toctree := context.get("toctree"):
+        context["toctree"] = lambda **options: toctree(
+            **options | {"collapse": True, "maxdepth": 1}
+        )
+
+
 def setup(app: Sphinx) -> None:
     """Write formulas as MathML; scale figures and join punctuation when a page was read."""
+    app.connect("html-page-context", shorten_navigation, priority=400)  # before the theme
     app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))
+    app.connect("autodoc-process-signature", show_signature)
+    app.connect("env-before-read-docs", spread_tutorials)
     app.connect("doctree-read", scale_figures)
     app.connect("doctree-read", keep_punctuation)
+    app.connect("doctree-resolved", fill_gallery)

@@ -112,7 +112,7 @@ def test_levels_by_another_instrument_are_those_predicted(
     assert above.max() < 1.0
     fast = fast_history(pyoctaveband.WeightingFilter(RATE, "A").filter(pressure))
     oracle(
-        "L_AFmax of the sound below a floor, by PyOctaveBand",
+        "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand",
         "independent code",
         level(fast) - level(a_weighting(CENTER) @ bands),
         0.5,

@@ -3,46 +3,96 @@
 from __future__ import annotations
 
 import re
-import runpy
+import shutil
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, python
 
 import thud
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
+
+    from playwright.sync_api import Browser
 
 pytestmark = pytest.mark.slow
 
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 THEORY = (
     *("hollow_sphere", "lumped_models", "modal_ball", "finite_elements", "compression"),
     *("ball_impedance", "floors", "rooms", "levels", "recordings_theory"),
 )
+TUTORIALS = [path.stem for path in (REPOSITORY / "docs/tutorials").glob("*.md")]
+SIZE = 15e6  # bytes
+# Pages of all kinds, and the widths of a phone, a tablet and a laptop, px.
+LOOKED_AT = (
+    *("index", "gallery", "python_reference", "docs/keys", "docs/rooms", "docs/tutorials/paper"),
+    *("generated/thud.Plate", "fortran/index", "fortran/impact"),
+)
+WIDTHS = (400, 1024, 1400)
+# What is wider than the page, and in no frame that moves sideways.
+CLIPPED = """() => [...document.querySelectorAll("article *")].filter(item => {
+    if (item.getBoundingClientRect().right <= innerWidth + 1) return false
+    for (let frame = item; frame.localName !== "article"; frame = frame.parentElement)
+        if (["auto", "scroll"].includes(getComputedStyle(frame).overflowX)) return false
+    return true
+}).map(item => item.outerHTML.slice(0, 100))"""
+# Whether the font of formulas is there, and how far below its letter a subscript ends, px.
+FORMULAS = """async () => {
+    await document.fonts.ready
+    const [letter, subscript] = document.querySelector("msub").children
+    const end = item => item.getBoundingClientRect().bottom
+    return [document.fonts.check("16px 'Noto Sans Math'"), end(subscript) - end(letter)]
+}"""
 
 
 class Page(HTMLParser):
-    """Links and anchors of a page, and what it loads."""
+    """Links and anchors of a page, what it loads, and its words and the letters of its formulas."""
 
-    def __init__(self) -> None:
-        """Begin with none."""
+    def __init__(self, text: str) -> None:
+        """Read a page."""
         super().__init__()
         self.links: list[str] = []
         self.anchors: set[str] = set()
         self.loaded: list[str] = []
+        self.words: list[str] = []
+        self.letters: set[str] = set()
+        self.formulas = 0
+        self.open: list[str] = []
+        self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Take links and anchors of a tag."""
         found = dict(attrs)
+        # Outputs of tutorials are what programs print; they hold further `div`.
+        output = tag == "div" and (
+            "div" in self.open or "cell_output" in (found.get("class") or "")
+        )
+        if output or tag in {"script", "style", "pre", "code", "math"}:
+            self.open.append(tag)
+        self.formulas += tag == "math"
         self.anchors |= {value for key in ("id", "name") if (value := found.get(key))}
         link = found.get("href" if tag in {"a", "link"} else "src")
         if link:
             self.links.append(link)
         if link and tag != "a":
             self.loaded.append(link)
+
+    def handle_endtag(self, tag: str) -> None:
+        """End what is no prose."""
+        if self.open and self.open[-1] == tag:
+            self.open.pop()
+
+    def handle_data(self, data: str) -> None:
+        """Take words of prose and letters of formulas."""
+        if not self.open:
+            self.words.append(data)
+        elif "math" in self.open:
+            self.letters |= set(data)
 
 
 @pytest.fixture(scope="module")
@@ -51,39 +101,56 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pytest.importorskip("sphinx")
     pytest.importorskip("myst_nb")
     target = tmp_path_factory.mktemp("site") / "html"
-    runpy.run_path(str(REPOSITORY / "docs/site/build.py"))["build"](target)
+    built = python(REPOSITORY / "docs/site/build.py", target)
+    assert built.returncode == 0, built.stderr
     return target
 
 
-def test_no_link_is_broken(site: Path) -> None:
-    pages = {}
-    for path in site.rglob("*.html"):
-        page = Page()
-        page.feed(path.read_text(encoding="utf-8"))
-        pages[path] = page
+@pytest.fixture(scope="module")
+def pages(site: Path) -> dict[str, Page]:
+    """Return all pages of the site by their addresses."""
+    return {
+        path.relative_to(site).as_posix(): Page(path.read_text(encoding="utf-8"))
+        for path in site.rglob("*.html")
+    }
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Return a browser."""
+    if CHROMIUM is None:
+        pytest.skip("needs Debian's chromium")
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+def test_no_link_is_broken(site: Path, pages: dict[str, Page]) -> None:
     broken = []
-    for path, page in pages.items():
+    for name, page in pages.items():
         for link in page.links:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
                 continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
-            target = target / "index.html" if target.is_dir() else target
-            # FORD links to anchors that it does not make.
-            made_here = target in pages and "fortran" not in target.relative_to(site).parts
-            known = pages[target].anchors if made_here else {parts.fragment}
-            if not target.exists() or (parts.fragment and unquote(parts.fragment) not in known):
-                broken.append((path.relative_to(site).as_posix(), link))
+            folder = (site / name).parent
+            target = (folder / unquote(parts.path)).resolve() if parts.path else site / name
+            known = pages.get(target.relative_to(site).as_posix())
+            anchor = unquote(parts.fragment)
+            if not target.exists() or (anchor and (known is None or anchor not in known.anchors)):
+                broken.append((name, link))
     assert len(pages) > len(thud.__all__)
     assert not broken
 
 
-def test_site_needs_no_network(site: Path) -> None:
-    foreign = []
-    for path in site.rglob("*.html"):
-        page = Page()
-        page.feed(path.read_text(encoding="utf-8"))
-        foreign += [(path.name, link) for link in page.loaded if urlsplit(link).netloc]
+def test_site_needs_no_network(site: Path, pages: dict[str, Page]) -> None:
+    foreign = [
+        (name, link)
+        for name, page in pages.items()
+        for link in page.loaded
+        if urlsplit(link).netloc
+    ]
     for path in site.rglob("*.css"):
         style = path.read_text(encoding="utf-8")
         foreign += [
@@ -93,20 +160,117 @@ def test_site_needs_no_network(site: Path) -> None:
     assert not foreign
 
 
-def test_every_page_of_the_documentation_is_in_the_site(site: Path) -> None:
-    menu = (site / "index.html").read_text(encoding="utf-8")
+def test_every_page_of_the_documentation_is_in_the_site(pages: dict[str, Page]) -> None:
     docs = REPOSITORY / "docs"
     for page in [*docs.glob("*.md"), *docs.glob("tutorials/*.md")]:
         place = page.relative_to(REPOSITORY).with_suffix(".html").as_posix()
-        assert f'href="{place}"' in menu, page
+        assert place in pages["index.html"].links, page
 
 
-def test_formulas_are_set(site: Path) -> None:
-    raw, formulas = {}, {}
-    for path in site.glob("docs/*.html"):
-        text = path.read_text(encoding="utf-8")
-        formulas[path.stem] = text.count("<math")
-        words = re.sub(r"<(script|pre|code)\b.*?</\1>", "", text, flags=re.DOTALL)
-        raw[path.stem] = re.findall(r"\\[a-z]+|\$", words)
-    assert not any(raw.values()), raw
-    assert all(formulas[page] for page in THEORY), formulas
+def test_each_page_states_the_version(pages: dict[str, Page]) -> None:
+    assert not [
+        name for name, page in pages.items() if f"thud {thud.__version__}" not in page.words
+    ]
+
+
+def test_site_is_small(site: Path) -> None:
+    assert sum(path.stat().st_size for path in site.rglob("*") if path.is_file()) < SIZE
+
+
+def test_formulas_are_set(pages: dict[str, Page]) -> None:
+    documents = {name: page for name, page in pages.items() if name.startswith("docs/")}
+    raw = {
+        name: found
+        for name, page in documents.items()
+        # Commands of TeX, and subscripts that are typed: L_FE, T₀.
+        if (found := re.findall(r"\\[a-z]+|\$|\b[A-Za-z]_\w+|[₀-₉]", " ".join(page.words)))
+    }
+    assert not raw
+    assert all(documents[f"docs/{page}.html"].formulas for page in THEORY)
+
+
+def test_font_has_all_letters_of_formulas(pages: dict[str, Page]) -> None:
+    ttf = pytest.importorskip("fontTools.ttLib")
+    pytest.importorskip("brotli")
+    known = ttf.TTFont(REPOSITORY / "docs/site/static/noto-sans-math.woff2").getBestCmap()
+    letters = {letter for page in pages.values() for letter in page.letters if letter.isprintable()}
+    assert not [letter for letter in letters if ord(letter) not in known]
+    # Single letters are set in italics, other characters: Latin and Greek.
+    assert set(range(0x1D434, 0x1D468)) - {0x1D455} <= known.keys()
+    assert set(range(0x1D6FC, 0x1D716)) <= known.keys()
+
+
+def test_python_reference_has_the_signature_of_each_name(
+    site: Path, pages: dict[str, Page]
+) -> None:
+    names = [name for name in thud.__all__ if callable(getattr(thud, name))]
+    for name in names:
+        place = f"generated/thud.{name}.html"
+        assert f"{place}#thud.{name}" in pages["python_reference.html"].links
+        text = (site / place).read_text(encoding="utf-8")
+        assert re.search(rf'<dt class="sig sig-object[^>]*id="thud.{name}">', text), name
+        assert ".. auto" not in text
+    assert 'class="n"><span class="pre">outer_radius' in (
+        site / "generated/thud.Ball.html"
+    ).read_text(encoding="utf-8")
+
+
+def test_fortran_reference_has_all_modules(pages: dict[str, Page]) -> None:
+    declared = {
+        name
+        for path in (REPOSITORY / "src").rglob("*.f90")
+        for name in re.findall(r"^module (\w+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    anchors = {
+        anchor
+        for name, page in pages.items()
+        if name.startswith("fortran/")
+        for anchor in page.anchors
+    }
+    assert "thud-ball" in anchors
+    assert not [name for name in declared if name.replace("_", "-") not in anchors]
+
+
+@pytest.mark.parametrize("tutorial", TUTORIALS)
+def test_gallery_shows_the_figures_of_a_tutorial(pages: dict[str, Page], tutorial: str) -> None:
+    place = f"docs/tutorials/{tutorial}.html"
+    drawn = {link.rpartition("/")[2] for link in pages[place].loaded if "_images/" in link}
+    shown = {link.rpartition("/")[2] for link in pages["gallery.html"].loaded}
+    assert drawn
+    assert drawn <= shown
+    assert any(link.startswith(f"{place}#") for link in pages["gallery.html"].links)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_is_clipped(site: Path, browser: Browser, width: int) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    for name in LOOKED_AT:
+        page.goto(f"file://{site}/{name}.html")
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, name
+        assert not page.evaluate(CLIPPED), name
+    page.close()
+
+
+def test_subscripts_stand_below_their_letters(site: Path, browser: Browser) -> None:
+    page = browser.new_page()
+    page.goto(f"file://{site}/docs/levels.html")
+    loaded, below = page.evaluate(FORMULAS)
+    page.close()
+    assert loaded
+    assert below > 1
+
+
+@pytest.mark.parametrize(
+    ("words", "target"),
+    [
+        ("holds_impulse", "fortran/impact.html#thud-force-history-holds-impulse"),
+        ("read_recording", "generated/thud.read_recording.html"),
+    ],
+)
+def test_search_finds_names_of_both_languages(
+    site: Path, browser: Browser, words: str, target: str
+) -> None:
+    page = browser.new_page()
+    page.goto(f"file://{site}/search.html?q={words}")
+    page.locator(f'#search-results a[href^="{target}"]').first.wait_for()
+    page.close()
