@@ -706,10 +706,7 @@ def test_rooms_of_variants_are_played_at_one_scale(browser: Browser, server: Ser
         sync_api.expect(player).to_have_attribute("src", re.compile("blob:"))
         volume.append(player.evaluate("(player) => player.volume"))
         address.append(player.evaluate("(player) => player.src"))
-    scale = [
-        thud.listen(predict(name)).full_scale
-        for name in ("CLT 200", "concrete 180")
-    ]
+    scale = [thud.listen(predict(name)).full_scale for name in ("CLT 200", "concrete 180")]
     assert volume == pytest.approx([1.0, scale[1] / scale[0]])
     # A removed variant has no sound, and the others are as loud as they were.
     page.locator("#variants .remove").click()

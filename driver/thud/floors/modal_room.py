@@ -127,7 +127,8 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     """Compute modal levels below a floor for pairs of positions, up to the crossover of the room.
 
     Walls and ceilings of `room` and a stated improvement by a covering are left out, in the
-    prediction beside it, too. The energy of floor modes decays at the rate omega eta, the energy of room modes at 6 ln 10/T.
+    prediction beside it, too. The energy of floor modes decays at the rate omega eta, the energy of
+    room modes at 6 ln 10/T.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         name=escaped(floor.name),
         section=_figure(section, "s"),
         about=pair_rows(_about(floor)),
-        quantity=_with_index(prediction.rated_name),
+        quantity=symbols(prediction.rated_name),
         ratings=_table(
             [
                 ("Rating", "Standard", "Value"),
