@@ -50,8 +50,8 @@ contains
    end subroutine answer_effective_case
 
    !> Runs the namelist file `path` like the executable, with results in the directory `output`. Numbers other than 0 ask to
-   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), to show numbers
-   !> of the solver in the table (`verbose`), and to show progress on a terminal (`progress`).
+   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), to show
+   !> numbers of the solver in the table (`verbose`), and to show progress on a terminal (`progress`).
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle

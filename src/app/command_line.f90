@@ -148,8 +148,8 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --verbose, --keys, --schema, --help, ' &
-                  //'--version')
+                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --verbose, --keys, --schema, ' &
+                  //'--help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else

@@ -254,7 +254,8 @@ contains
       logical :: usable
       integer :: i
 
-      usable = name(1:1) /= ' ' .and. scan(name, '/\:*?"<>|') == 0 .and. scan(trim(name), '.', back=.true.) < len_trim(name) &
+      usable = name(1:1) /= ' ' .and. scan(name, '/\:*?"<>|') == 0 &
+         .and. scan(trim(name), '.', back=.true.) < len_trim(name) &
          .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name) .and. .not. is_device(name)
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &

@@ -132,7 +132,8 @@ contains
       text = text//get_verification_rows(contact)
       deviation = fixed(1.0e2_wp*(floor_result%total_energy/max(contact%floor_work, tiny(1.0_wp)) - 1), 2)
       if (deviation == '0.00') deviation = 'less than 0.01'
-      text = text//newline//'  The energy by the mobility of the floor, in all frequencies, differs by '//deviation//' %.'//newline
+      text = text//newline//'  The energy by the mobility of the floor, in all frequencies, differs by '//deviation//' %.' &
+         //newline
 
    contains
 
