@@ -273,6 +273,8 @@ def test_results_of_other_values_are_dimmed(browser: Browser, server: Served) ->
     # While a number is empty, and while it is typed.
     field(page, "drop.height").fill("")
     sync_api.expect(page.locator("body")).to_have_class(outdated)
+    # The headline stays in front of what scrolls below it.
+    assert page.locator("#verdict").evaluate("box => getComputedStyle(box).opacity") == "1"
     page.keyboard.press("Tab")
     sync_api.expect(page.locator("#message")).to_have_text("Height: enter a number, in m")
     fill(page, "drop.height", "1")
@@ -330,6 +332,8 @@ def test_missing_token_is_said_at_once(browser: Browser, server: Served) -> None
     page.goto(server[0].partition("#")[0])
     sync_api.expect(page.locator("#message")).to_contain_text("Open the full address")
     assert "Loading" not in page.locator("#verdict").inner_text()
+    for part in ("#keep", "#tools"):
+        sync_api.expect(page.locator(part)).to_be_hidden()
 
 
 def test_arrow_keys_move_by_round_steps(browser: Browser, server: Served) -> None:

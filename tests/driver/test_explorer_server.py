@@ -209,3 +209,14 @@ def test_version_6_of_this_machine_is_served() -> None:
             # As a page that has found the address by another name.
             connection.request("GET", "/", headers={"Host": "rebound.example"})
             assert connection.getresponse().status == 400
+
+
+def test_body_of_an_answer_does_not_wait_for_an_acknowledgment(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    connections = pytest.importorskip("thud.explorer.connections")
+    monkeypatch.setattr("thud.explorer.connections._Server.run", lambda _self, sockets: sockets)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        connections.run_server(None, listener, tmp_path)
+        with socket.create_connection(listener.getsockname()), listener.accept()[0] as connection:
+            assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)

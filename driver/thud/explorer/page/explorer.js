@@ -474,10 +474,12 @@ async function main() {
     Object.assign(about, await getAbout());
   } catch (error) {
     byId("verdict").replaceChildren();
+    setOutdated(true, false);
     showMessage(error.message);
     if (error instanceof ConnectionError) retryTimer = setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);
     return;
   }
+  byId("tools").hidden = false;
   addPlotMenus();
   listen();
   const link = fragment.get("case");
