@@ -52,9 +52,9 @@ def draw_plot(name: str, folder: Path) -> None:
     save(PLOTS[name](), path)
     with Image.open(path) as picture:
         content = io.BytesIO()
-        # The method with the smallest error of single colors, however few their pixels.
+        # Colors of few pixels are kept too; means of similar colors keep those of large areas.
         small = picture.convert("RGB").quantize(
-            256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE
+            256, Image.Quantize.MAXCOVERAGE, kmeans=1, dither=Image.Dither.NONE
         )
         text = PngInfo()
         text.add_text("Title", picture.info["Title"])
