@@ -1,4 +1,4 @@
-"""The path of a checkout: bootstrap and CMake build in it, whatever its characters are."""
+"""Bootstrap: its first run on one screen, and builds in a checkout with any path."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import os
 import shutil
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from conftest import REPOSITORY, names_in, python
 
-if TYPE_CHECKING:
-    from pathlib import Path
+from thud.base.tables import WIDTH
 
+# Lines of the first run.
+LINES = 40
 # Paths that CMake takes as they are, and one with all that it, ninja, shells or scripts do not.
 PLAIN = "a b ü +1"
 ODD = "a b ü 'q'\"x $HOME `&` #1 (y) [z] ] ; \\n <|>*?"
@@ -44,6 +45,45 @@ def in_checkout(checkout: Path, script: str, **env: str) -> subprocess.Completed
         text=True,
         check=False,
     )
+
+
+@pytest.fixture
+def built_checkout(tmp_path: Path, executable: str) -> Path:
+    """Return a checkout whose commands are installed."""
+    (tmp_path / "inputs").symlink_to(REPOSITORY / "inputs")
+    (tmp_path / ".venv").mkdir()
+    (tmp_path / ".venv/bin").symlink_to(Path(executable).parent)
+    return tmp_path
+
+
+def test_run_prints_one_screen(built_checkout: Path) -> None:
+    done = in_checkout(built_checkout, "set_up() { :; }; run_first")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == "Simulating 3 drops ...\nComparing them ...\n"
+    lines = [*done.stderr.splitlines(), *done.stdout.splitlines()]
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= WIDTH
+    assert "probability of conformity 14 to 39 %" in " ".join(done.stdout.split())
+    assert lines[-1] == "Page: outputs/comparison/comparison.html"
+    assert "minimum step" not in done.stdout
+    assert (built_checkout / "outputs/rubber_ball_fe/summary.nml").exists()
+
+
+@pytest.mark.slow
+def test_run_prints_the_numbers_of_the_solver_if_asked_for(built_checkout: Path) -> None:
+    done = in_checkout(built_checkout, "set_up() { :; }; run_first --verbose")
+    assert "minimum step" in done.stdout
+
+
+def test_run_refuses_other_options(built_checkout: Path) -> None:
+    done = in_checkout(built_checkout, "run_first --loud")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "bootstrap: run: unknown option --loud; allowed: --verbose\n"
+
+
+def test_help_fits_a_terminal(tmp_path: Path) -> None:
+    assert in_checkout(tmp_path, "").returncode == 0
+    assert max(map(len, (tmp_path / "help").read_text().splitlines())) <= WIDTH
 
 
 @pytest.mark.skipif(not shutil.which("cmake"), reason="there is no CMake")

@@ -78,27 +78,27 @@ def test_table_gives_every_criterion_beside_its_limits() -> None:
     assert shell == {
         "": "shell",
         "assessed force": "elastic",
-        "method of the levels": "exact",
+        "method of levels": "exact",
         "31.5 Hz, dB": "38.53",
         "63 Hz, dB": "31.07",
         "125 Hz, dB": "16.99 low",
         "250 Hz, dB": "7.91 low",
         "500 Hz, dB": "-1.82 low",
-        "contact time, ms": "20.426",
-        "restitution": "0.8894",
-        "number of force peaks": "1",
+        "contact time, ms": "20.43",
+        "restitution": "0.889",
+        "force peaks": "1",
         "mass, kg": "2.500",
         "drop height, m": "1.000",
-        "peak force, N": "1574.3",
-        "peak deflection, mm": "29.020",
-        "impulse, N s": "20.923",
+        "peak force, N": "1574",
+        "peak deflection, mm": "29.02",
+        "impulse, N s": "20.92",
         "verdict": "does not conform",
     }
     limits = column(comparison, 2)
     assert limits[""] == "limits, rubber ball"
     assert limits["63 Hz, dB"] == "29.5 to 32.5"
     assert limits["contact time, ms"] == "18 to 22"
-    assert limits["number of force peaks"] == "1"
+    assert limits["force peaks"] == "1"
 
 
 def test_page_and_table_have_the_levels_of_the_case() -> None:
@@ -243,7 +243,7 @@ def test_cell_tells_how_a_criterion_is_missed(
 def test_small_values_have_three_digits() -> None:
     peak = QUANTITIES["peak_force"]
     values = (0.012345, 0.9999, 1574.26, float("nan"))
-    assert [peak.show(value) for value in values] == ["0.0123", "1.0", "1574.3", ""]
+    assert [peak.show(value) for value in values] == ["0.0123", "1", "1574", ""]
 
 
 def test_drops_of_different_speeds_are_refused_and_others_named(shell: thud.Impact) -> None:
@@ -259,7 +259,7 @@ def test_drops_of_different_speeds_are_refused_and_others_named(shell: thud.Impa
     assert found.impacts[shell.case.name] is shell
     rows = {row[0]: row[1:] for row in found.rows()}
     assert rows["computing time, ms"][0] == ""
-    expected = f"{1e3 * found.run_times['heavy']:.1f}"
+    expected = f"{1e3 * found.run_times['heavy']:.3g}"
     assert rows["computing time, ms"][1] == expected
     assert rows["peak force, N"][0] == QUANTITIES["peak_force"].show(shell.peak())
 

@@ -12,7 +12,7 @@ from conftest import recorded
 
 import thud
 from thud.base.display import html_table
-from thud.base.tables import MAX_WIDTH, format_rows
+from thud.base.tables import WIDTH, format_rows
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -169,16 +169,17 @@ def test_table_of_an_impact_has_the_columns_of_its_files(flagship: thud.Impact) 
 def test_wide_tables_are_broken_without_losing_words() -> None:
     rows = [
         ("", *("rubber_ball_fe_viscous",) * 3, "limits, rubber ball", "range (95 %)"),
-        ("number of force peaks", "1", "2", "3", "1", "18.18 to 20.38"),
-        ("verdict", *("undecided by the model",) * 3, "", "14 to 39 % conforms"),
+        ("peak deflection, mm", "1", "2 ± 0.1", "3", "1", "18.18 to 20.38"),
+        ("verdict", *("undecided by the model",) * 3, "", "conformity 14 to 39 %"),
     ]
     lines = format_rows(rows).splitlines()
-    assert max(map(len, lines)) <= MAX_WIDTH
+    assert max(map(len, lines)) <= WIDTH
     assert sorted("".join("".join(lines).split())) == sorted(
         "".join(cell for row in rows for cell in row).replace(" ", "")
     )
     # Labels and numbers with their signs stay whole.
-    (peaks,) = (line for line in lines if line.startswith("number"))
-    assert peaks.split("  ")[0] == "number of force peaks"
-    assert peaks.endswith("18.18 to 20.38")
+    (peak,) = (line for line in lines if line.startswith("peak"))
+    assert peak.split("  ")[0] == "peak deflection, mm"
+    assert "  2 ± 0.1  " in peak
+    assert peak.endswith("18.18 to 20.38")
     assert any("14 to 39 %" in line for line in lines)

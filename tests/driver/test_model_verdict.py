@@ -15,7 +15,7 @@ from conftest import naming
 from scipy.stats import truncnorm
 
 import thud
-from thud.base.tables import format_rows
+from thud.base.tables import format_rows, wrap
 from thud.cli import main
 from thud.comparison import comparison
 from thud.studies import bundled_surrogate, model_assessment
@@ -488,12 +488,12 @@ def test_run_prints_the_verdict(
     assert main(["run", "--no-figures", str(FLAGSHIP)]) == 0
     printed = capsys.readouterr().out
     verdict = thud.assess(thud.read_case(FLAGSHIP))
-    assert f"  {verdict.message}\n" in printed
+    assert f"{wrap(f'  {verdict.message}')}\n" in printed
     # The values of the case do not conform; whether the source does is undecided.
     assert "  With these values the source does not conform to the limits" in printed
     assert "  The source" not in printed
     assert main(["assess", str(FLAGSHIP)]) == 0
-    assert capsys.readouterr().out.startswith(f"{verdict}\nResults: ")
+    assert capsys.readouterr().out.startswith(f"{wrap(str(verdict))}\nResults: ")
     undecided = [c.criterion.quantity.title for c in verdict.criteria if c.result != "conforms"]
     assert undecided == ["63 Hz", "500 Hz"]
     assert all(title in verdict.message for title in undecided)
@@ -525,4 +525,5 @@ def test_case_that_the_surrogate_covers_keeps_its_drop() -> None:
 def test_page_shows_the_verdict() -> None:
     page = (ROOT / "docs/verdict.md").read_text()
     verdict = thud.assess(thud.read_case(FLAGSHIP))
-    assert f"\n{format_rows(verdict.rows())}\nby {verdict.method}\n{verdict.message}\n" in page
+    shown = f"{format_rows(verdict.rows())}\nby {verdict.method}\n{verdict.message}"
+    assert f"\n{wrap(shown)}\n" in page

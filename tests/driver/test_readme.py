@@ -11,7 +11,7 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
-from thud.base.tables import format_rows
+from thud.base.tables import WIDTH, format_rows, wrap
 from thud.comparison.comparison import read_all
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
@@ -24,16 +24,27 @@ def shown_after(marker: str) -> str:
     return BLOCKS[places[0]][1]
 
 
+def without_times(text: str) -> list[str]:
+    """Return the lines of a text, without computing times."""
+    return [line for line in text.splitlines() if not line.startswith("computing time")]
+
+
 @pytest.mark.slow
 def test_first_result_is_that_of_the_commands() -> None:
     cases = re.search(r"^first=\((.*)\)$", (REPOSITORY / "bootstrap").read_text(), re.MULTILINE)
     assert cases is not None
     paths = [str(REPOSITORY / path) for path in cases[1].split()]
     page = thud.compare(read_all(paths))
-    shown = [line.split() for line in shown_after("assessed force").splitlines()]
-    expected = [line.split() for line in format_rows(page.rows()).splitlines()]
-    timed = [line for line in shown if line[:2] != ["computing", "time,"]][: len(expected) - 1]
-    assert timed == [line for line in expected if line[:2] != ["computing", "time,"]]
+    expected = wrap("\n".join([format_rows(page.rows()), *page.reasons]))
+    shown = shown_after("assessed force")
+    assert without_times(shown) == [
+        *without_times(expected), "Page: outputs/comparison/comparison.html"
+    ]  # fmt: skip
+
+
+def test_outputs_fit_a_terminal() -> None:
+    for _, text in BLOCKS:
+        assert max(map(len, text.splitlines())) <= WIDTH
 
 
 @pytest.mark.slow

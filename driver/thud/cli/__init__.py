@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 from thud.base.bridge import version
 from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
+from thud.base.tables import wrap
 from thud.cli.case_commands import (
     ASSESS,
     EXAMPLES,
@@ -34,7 +35,7 @@ from thud.cli.command import (
 from thud.cli.explore_command import EXPLORE
 from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
 from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
-from thud.cli.screen import print_error
+from thud.cli.screen import is_terminal, print_error
 from thud.cli.study_commands import study_commands
 from thud.level.levels import FORCES, SOURCES
 
@@ -195,7 +196,8 @@ class _Parser(argparse.ArgumentParser):
         super().error(message + (suggestion(match[1], _words()) if match else ""))
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        print(message, end="", file=file or sys.stderr)
+        file = file or sys.stderr
+        print(wrap(message) if is_terminal(file) else message, end="", file=file)
 
 
 def _words() -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+from io import IOBase
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
@@ -13,7 +14,6 @@ from thud.base.tables import WIDTH, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from typing import TextIO
 
 RED, GREEN, YELLOW = 31, 32, 33
 # Words of verdicts in sentences, and alone in a line of a cell.
@@ -57,29 +57,34 @@ def print_error(message: str) -> None:
 
 def print_status(text: str) -> None:
     """Print what is computed beside the results, above any progress bar."""
-    tqdm.write(wrap(text) if sys.stderr.isatty() else text, file=sys.stderr)
+    tqdm.write(wrap(text) if is_terminal(sys.stderr) else text, file=sys.stderr)
+
+
+def is_terminal(stream: object) -> bool:
+    """Whether a stream is a terminal; one that is closed is none."""
+    return isinstance(stream, IOBase) and not stream.closed and stream.isatty()
 
 
 def shows_progress(*, quiet: bool) -> bool:
     """Whether progress is shown: on terminals, but not in logs."""
-    return not quiet and sys.stderr.isatty()
+    return not quiet and is_terminal(sys.stderr)
 
 
 def _print_message(message: str, color: int) -> None:
     """Print a message; in a log it stays one line."""
     name = "thud-driver:"
     text = f"{name} {message}"
-    if sys.stderr.isatty():
+    if is_terminal(sys.stderr):
         text = wrap(text)
     if _has_colors(sys.stderr):
         text = text.replace(name, _colored(name, color), 1)
     tqdm.write(text, file=sys.stderr)
 
 
-def _has_colors(stream: TextIO) -> bool:
+def _has_colors(stream: object) -> bool:
     """Whether a stream is a terminal with colors, and the user wants them (no-color.org)."""
     wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") not in {"", "dumb"}
-    return wanted and stream.isatty()
+    return wanted and is_terminal(stream)
 
 
 def _color_verdict(match: re.Match[str]) -> str:

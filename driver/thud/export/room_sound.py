@@ -91,7 +91,7 @@ class RoomSound(Displayed):
             pairs = zip(summary(sound.level), summary(sound.reference), strict=True)
             cells = [f"{level:.1f} ({level - reference:+z.1f})" for level, reference in pairs]
             place = "-" if sound.position is None else "{}, {}".format(*sound.position)
-            rows.append((f"{start:.3f}", name, place, *cells))
+            rows.append((f"{start:.2f}", name, place, *cells))
         return [("start, s", "floor", "ball, microphone", *octaves, "L_AFmax, dB"), *rows]
 
     def wav(self) -> bytes:
