@@ -67,7 +67,7 @@ def copy_sources() -> Path:
 def reduce_colors(path: Path) -> None:
     """Write a figure with 256 colors, which makes the file a third as large."""
     image = Image.open(path).convert("RGB")
-    image.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path, optimize=True)
+    image.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE).save(path)
 
 
 def remove_outputs(path: Path) -> None:

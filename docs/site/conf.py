@@ -68,6 +68,7 @@ html_theme_options = {
     f"{scheme}_css_variables": {"code-font-size": "76%"} for scheme in ("light", "dark")
 }
 TUTORIALS = "docs/tutorials/"
+NAVIGATION: dict[str, str] = {}
 # Width of a column of a journal, inch, and pixels of the screen for an inch of a figure.
 COLUMN, DENSITY = 3.5, 150
 
@@ -162,13 +163,20 @@ def fill_gallery(app: Sphinx, document: nodes.document, page: str) -> None:
 
 
 def shorten_navigation(
-    _: Sphinx, _page: str, _template: str, context: dict[str, Any], _document: nodes.document
+    app: Sphinx, page: str, _template: str, context: dict[str, Any], _document: nodes.document
 ) -> None:
-    """List the same pages in the navigation of all: not those of single names and modules."""
+    """List the same pages in the navigation of all: not those of single names and folders."""
     if toctree := context.get("toctree"):
-        context["toctree"] = lambda **options: toctree(
-            **options | {"collapse": True, "maxdepth": 1}
-        )
+        # It is the same for all pages of a folder that it does not list.
+        listed = page in app.env.toctree_includes["index"]
+        key = page if listed else page.rpartition("/")[0]
+
+        def navigation(**options: bool) -> str:
+            if key not in NAVIGATION:
+                NAVIGATION[key] = toctree(**options | {"collapse": True, "maxdepth": 1})
+            return NAVIGATION[key]
+
+        context["toctree"] = navigation
 
 
 def setup(app: Sphinx) -> None:

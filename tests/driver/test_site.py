@@ -34,9 +34,10 @@ LOOKED_AT = (
     *("generated/thud.Plate", "fortran/index", "fortran/impact"),
 )
 WIDTHS = (400, 1024, 1400)
-# What is wider than the page, and in no frame that moves sideways.
+# Figures that are wider than the page, and what else is wider and in no frame that moves sideways.
 CLIPPED = """() => [...document.querySelectorAll("article *")].filter(item => {
     if (item.getBoundingClientRect().right <= innerWidth + 1) return false
+    if (item.localName === "img") return true
     for (let frame = item; frame.localName !== "article"; frame = frame.parentElement)
         if (["auto", "scroll"].includes(getComputedStyle(frame).overflowX)) return false
     return true
