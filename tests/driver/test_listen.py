@@ -172,7 +172,7 @@ def test_floors_follow_each_other_at_one_scale(
     peak = abs(found.pressure).max()
     assert peak < found.full_scale <= 2.5 * peak
     assert thud.listen(predictions["concrete"]).full_scale < found.full_scale
-    assert found.rows()[1][:2] == ("0.000", "concrete")
+    assert found.rows()[1][:2] == ("0.00", "concrete")
     assert all(name in repr(found) for name in FLOORS)
     assert "concrete" in repr(first)
     assert f"{first.level.a_weighted:.1f} dB" in repr(first.level)
@@ -282,7 +282,7 @@ def test_command_writes_a_file_and_says_what_it_is(
     target = str(tmp_path / "ab.wav")
     assert main(["listen", *paths, "-o", target, "--pause", "0.5", "--position", "1", "2"]) == 0
     shown = capsys.readouterr().out
-    for words in ("slab", "joists", "0.000", "1, 2", "full scale", "not recorded"):
+    for words in ("slab", "joists", "0.00", "1, 2", "full scale", "not recorded"):
         assert words in shown
     assert shown.count("not recorded") == 1
     assert soundfile.info(target).samplerate == RATE

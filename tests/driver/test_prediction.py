@@ -198,7 +198,8 @@ def test_walls_ceiling_octaves_and_history_are_written(
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert "Room of 40.0 m3, reverberation time 0.80 s." in done.stdout
-    assert re.search(r"\(KS F 2863-2\) +\d\d dB \(\d\d\.\d\d\), (no )?class", done.stdout)
+    # The shell does not conform.
+    assert re.search(r"\(KS F 2863-2\) +\d\d dB \(\d\d\.\d\d\)\s+class not stated", done.stdout)
     folder = case_file(ROOM_CASE).parent / "out"
     octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
     history = np.genfromtxt(folder / "room_history.csv", delimiter=",", skip_header=1)

@@ -551,7 +551,7 @@ def test_command_prints_the_lines_of_the_plate(
     assert abs(plate.Q - 30) < 0.6
     assert plate.f0_uncertainty is not None
     assert 1e-6 < plate.f0_uncertainty < 1e-3
-    assert "# 2 taps in " in shown.out
+    assert "# 2 taps in" in shown.out
     assert not shown.err
     assert re.search(
         naming("--mass", "--tap"), errors_of("calibrate", "--tap", str(path), "--mass", "5")

@@ -196,8 +196,8 @@ class _Parser(argparse.ArgumentParser):
         super().error(message + (suggestion(match[1], _words()) if match else ""))
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        file = file or sys.stderr
-        print(wrap(message) if is_terminal(file) else message, end="", file=file)
+        shown = wrap(message) if file is None and is_terminal(sys.stderr) else message
+        print(shown, end="", file=file or sys.stderr)
 
 
 def _words() -> list[str]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from io import IOBase
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
@@ -60,9 +59,9 @@ def print_status(text: str) -> None:
     tqdm.write(wrap(text) if is_terminal(sys.stderr) else text, file=sys.stderr)
 
 
-def is_terminal(stream: object) -> bool:
+def is_terminal(stream: TextIO) -> bool:
     """Whether a stream is a terminal; one that is closed is none."""
-    return isinstance(stream, IOBase) and not stream.closed and stream.isatty()
+    return not stream.closed and stream.isatty()
 
 
 def shows_progress(*, quiet: bool) -> bool:
@@ -81,7 +80,7 @@ def _print_message(message: str, color: int) -> None:
     tqdm.write(text, file=sys.stderr)
 
 
-def _has_colors(stream: object) -> bool:
+def _has_colors(stream: TextIO) -> bool:
     """Whether a stream is a terminal with colors, and the user wants them (no-color.org)."""
     wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") not in {"", "dumb"}
     return wanted and is_terminal(stream)
