@@ -243,7 +243,7 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
         drawn = np.asarray(line.get_xdata())
         assert drawn[[0, -1]] == pytest.approx([bands.lower[0], bands.upper[-1]])
     assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
-        "Force on the floor,", "Velocity of", "Contact −", "Energy into", "Mobility $Y$,",
+        "Force on the", "Velocity of", "Contact −", "Energy into", "Mobility $Y$,",
     ]  # fmt: skip
     thud.plot.save(figure, tmp_path / "floor.png")
     dataset = moved.to_xarray()

@@ -139,7 +139,7 @@ def test_command_line_selects_and_calibrates_channels(
         assert cli.main([*command, *options]) == 0
         out = capsys.readouterr().out
         assert "forces of 4 load cells were added" in out
-        assert re.search(r" (1499|150\d) ", out)
+        assert re.search(r" (1499|150\d)\n", out)
     assert cli.main([*command, "--channels", "sum", *3 * ["--calibration", "2500"]]) == 1
     assert "3 calibrations for 4 channels" in capsys.readouterr().err
 

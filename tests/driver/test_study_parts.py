@@ -350,7 +350,8 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
     assert int(rows["all criteria conform"]) == found.dataset["conforms"].sum()
     # Of a room, the lowest rating.
     rating = xr.zeros_like(found.dataset["margin"]) + np.arange(6.0).reshape(3, 2)[::-1]
-    dataset = found.dataset.assign(standardized_rating=rating, room_level=rating)
+    bands = rating.expand_dims(room_third=12, axis=-1)
+    dataset = found.dataset.assign(standardized_rating=rating, room_level=bands)
     rows = dict(Design(dataset, found.axes, None, "case", rating_name="standardized").rows())
     assert (rows["  at height, cm"], rows["  at mass, kg"]) == ("110", "2.4")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullLocator
@@ -141,6 +141,8 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
 
 # Maximum number of parameters with confidence regions; more have a table of correlations.
 MAX_PARAMETERS = 5
+# Ratio of the half axis of a region to its center below which ticks have an offset.
+MIN_RATIO = 1e-3
 # Maximum number of characters of a label as wide as all panels.
 MAX_CHARACTERS = 44
 
@@ -199,7 +201,11 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     ticks = 4 if len(fit.names) == len(pair) else 2
     axes.xaxis.set_major_locator(MaxNLocator(ticks))
     axes.yaxis.set_major_locator(MaxNLocator(ticks + 1))
-    axes.ticklabel_format(useOffset=False)
+    names: tuple[Literal["x", "y"], ...] = ("x", "y")
+    for name, middle, length in zip(names, center, half, strict=True):
+        # Numbers of many digits would leave no room for the panels.
+        is_narrow = bool(length < MIN_RATIO * abs(middle))
+        axes.ticklabel_format(axis=name, useOffset=is_narrow)
     correlation = fit.correlation[pair]
     digits = 2 if abs(correlation) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
     axes.set_title(f"Correlation {correlation:z.{digits}f}".replace("-", "−"))
