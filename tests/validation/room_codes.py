@@ -50,7 +50,7 @@ def fast_maximum(  # noqa: PLR0913 - a floor and a room
 
     end = 3 * max(reverberation_time / 6, 0.125, 1 / (omega * loss_factor))
     solved = solve_ivp(
-        rates, (0.0, end), [energy, 0.0, 0.0], "DOP853", rtol=1e-10, atol=1e-30, max_step=end / 3000
+        rates, (0.0, end), [energy, 0.0, 0.0], "DOP853", rtol=1e-10, atol=1e-30, max_step=end / 800
     )
     return float(10 * np.log10(solved.y[2].max() / 2e-5**2))
 
