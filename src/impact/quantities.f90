@@ -7,8 +7,8 @@ module thud_quantities
    implicit none (type, external)
    private
 
-   public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
-   public :: show
+   public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
+      sample_quantity_count, show
 
    !> A number that a result can have.
    type :: quantity_type

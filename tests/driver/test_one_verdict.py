@@ -43,12 +43,13 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     capsys.readouterr()
     assert cli.main(["compare", str(path)]) == 0
     shown = {line[:20].strip(): line[20:].strip() for line in capsys.readouterr().out.splitlines()}
-    assert shown["peak force, N"] == f"{impact.peak():.1f}"
+    assert shown["peak force, N"] == f"{impact.peak():.0f}"
     assert [shown[f"{f:g} Hz, dB"].split()[0] for f in thud.get_bands().nominal] == [
         f"{level:.2f}" for level in levels
     ]
     verdict = assess_impact(impact)
-    assert shown["verdict"].startswith((verdict or conformity).result)
+    # The cell of a long verdict has several lines.
+    assert (verdict or conformity).result.startswith(shown["verdict"].split("  ")[0])
 
     swept = thud.sweep(
         {"case": str(path), "parameters": {"height": {"values": [case.drop.height]}}}

@@ -196,8 +196,8 @@ class _Parser(argparse.ArgumentParser):
         super().error(message + (suggestion(match[1], _words()) if match else ""))
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
-        shown = wrap(message) if file is None and is_terminal(sys.stderr) else message
-        print(shown, end="", file=file or sys.stderr)
+        to_screen = file in {None, sys.stderr} and is_terminal(sys.stderr)
+        print(wrap(message) if to_screen else message, end="", file=file or sys.stderr)
 
 
 def _words() -> list[str]:
