@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import re
 import shutil
 from html.parser import HTMLParser
@@ -101,9 +103,17 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the built site; a warning of its builder fails."""
     pytest.importorskip("sphinx")
     pytest.importorskip("myst_nb")
-    target = tmp_path_factory.mktemp("site") / "html"
-    built = python(REPOSITORY / "docs/site/build.py", target)
-    assert built.returncode == 0, built.stderr
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    target = folder / "site" / "html"
+    # Processes of tests share one site, as kernels of two builds may take the same ports.
+    with (folder / "site.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not target.exists():
+            target.parent.mkdir()
+            built = python(REPOSITORY / "docs/site/build.py", target)
+            assert built.returncode == 0, built.stderr
     return target
 
 
