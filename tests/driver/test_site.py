@@ -283,5 +283,7 @@ def test_search_finds_names_of_both_languages(
 ) -> None:
     page = browser.new_page()
     page.goto(f"file://{site}/search.html?q={words}")
-    page.locator(f'#search-results a[href^="{target}"]').first.wait_for()
+    found = page.locator(f'#search-results a[href^="{target}"]')
+    found.first.wait_for()
+    assert found.count() > 0
     page.close()

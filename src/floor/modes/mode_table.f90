@@ -8,7 +8,7 @@ module thud_mode_table
    use thud_error, only: error_type, input_error
    use thud_function_set, only: min_nodes
    use thud_kinds, only: wp
-   use thud_text, only: byte_order_mark, fixed, is_number, lower_case, newline, quoted, tab, to_text
+   use thud_text, only: fixed, is_number, lower_case, newline, quoted, tab, to_text
    implicit none (type, external)
    private
 
