@@ -72,7 +72,7 @@ contains
       wanted = mode_limit*resolution
       if (is_uncoupled(stack) .and. .not. has_shear(stack)) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
-      key = [wanted, get_key(stack, bearing)]
+      allocate (key, source=[wanted, get_key(stack, bearing)])
       do i = 1, size(cached)
          if (.not. allocated(cached(i)%key)) exit
          if (size(key) /= size(cached(i)%key)) cycle

@@ -416,7 +416,7 @@ contains
       ! A quadrant is enough: squares of the four parities add up. Products of two transforms are resolved.
       n = min(6 + int(wavenumber*max(along%length, across%length)/2), max_directions)
       call get_quadrature(n, 0.0_wp, pi/2, angle, weight)
-      transforms%along = get_waves(along, wavenumber*sin(angle))
+      allocate (transforms%along, source=get_waves(along, wavenumber*sin(angle)))
       transforms%has_along = along%is_present
       transforms%has_across = across%is_present
       associate (n_y => size(across%is_present, 1))

@@ -100,7 +100,7 @@ contains
       integer :: i
 
       octaves = get_octaves()
-      blocked_level = get_blocked_levels(impact)
+      allocate (blocked_level, source=get_blocked_levels(impact))
       name = 'on '//trim(case%floor)
       text = '  '//name//'   blocked       contact    difference       energy'//newline
       do i = 1, size(floor_result%bands)

@@ -319,18 +319,18 @@ contains
       resolution = get_resolution(history, finer_prefix)
       if (resolution /= '') rows = rows//'  ('//resolution//')'//newline
       values = get_quantities(history)
-      do i = 1, size(finer_quantities)
+      do i = 1, octave_count
          finer = history%model_quantity(first - 1 + i)
-         if (i <= octave_count) then
-            rows = rows//compared('level, '//get_band_name(octaves(i))//' Hz octave', finer, level(i), &
-               history%numerical_error%octave(i), get_quantity('octave_500_error'), get_quantity('octave_500_error'))
-         else
-            associate (name => finer_quantities(i) (len(finer_prefix) + 1:))
-               rows = rows//compared(name, finer, values(findloc(quantities%name, name, dim=1)), &
-                  values(findloc(quantities%name, trim(name)//'_error', dim=1)), get_quantity(name), &
-                  get_quantity(trim(name)//'_error'))
-            end associate
-         end if
+         rows = rows//compared('level, '//get_band_name(octaves(i))//' Hz octave', finer, level(i), &
+            history%numerical_error%octave(i), get_quantity('octave_500_error'), get_quantity('octave_500_error'))
+      end do
+      do i = octave_count + 1, size(finer_quantities)
+         finer = history%model_quantity(first - 1 + i)
+         associate (name => finer_quantities(i) (len(finer_prefix) + 1:))
+            rows = rows//compared(name, finer, values(findloc(quantities%name, name, dim=1)), &
+               values(findloc(quantities%name, trim(name)//'_error', dim=1)), get_quantity(name), &
+               get_quantity(trim(name)//'_error'))
+         end associate
       end do
 
    contains

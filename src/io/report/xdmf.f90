@@ -76,7 +76,7 @@ contains
 
       call buffer%append(get_head(to_text(size(vector, 2))//' 3'))
       do i = 1, size(vector, 2)
-         call buffer%append(digits(vector(1, i))//' '//digits(vector(2, i))//' 0'//newline)
+         call buffer%append(all_digits(vector(1, i))//' '//all_digits(vector(2, i))//' 0'//newline)
       end do
       call buffer%append('</DataItem>'//newline)
    end subroutine add_vectors
@@ -90,13 +90,13 @@ contains
 
       call buffer%append(get_head(to_text(size(scalar))))
       do i = 1, size(scalar)
-         call buffer%append(digits(scalar(i))//newline)
+         call buffer%append(all_digits(scalar(i))//newline)
       end do
       call buffer%append('</DataItem>'//newline)
    end subroutine add_scalars
 
    !> A number with 17 digits, which keep all its bits and are written faster than its shortest text.
-   pure function digits(value) result(text)
+   pure function all_digits(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text
       character(len=24) :: form
@@ -105,7 +105,7 @@ contains
       if (.not. abs(value) > 0.0_wp) return
       write (form, '(es24.16e3)') value
       text = trim(adjustl(form))
-   end function digits
+   end function all_digits
 
    !> The tag before the numbers of an array.
    pure function get_head(dimensions) result(head)
