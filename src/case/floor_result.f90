@@ -95,7 +95,7 @@ contains
       step = new_receiver_step(transfer, 1/sample_rate)
       velocity(1) = get_receiver_velocity(transfer, force(1), motion)
       do i = 2, size(force)
-         call advance_receiver(transfer, step, (force(i - 1) + force(i))/2, motion)
+         call advance_receiver(step, (force(i - 1) + force(i))/2, motion)
          velocity(i) = get_receiver_velocity(transfer, force(i), motion)
       end do
    end subroutine get_point_velocity

@@ -101,7 +101,7 @@ contains
       step = new_receiver_step(receiver, 1/sample_rate)
       do i = 1, size(force)
          before = motion%displacement
-         call advance_receiver(receiver, step, force(i), motion)
+         call advance_receiver(step, force(i), motion)
          energy = energy + force(i)*(motion%displacement - before)
       end do
    end function get_total_energy

@@ -10,7 +10,7 @@ module thud_receiver
    implicit none (type, external)
    private
 
-   public :: advance_receiver, can_strike, get_conductance, get_force_response, get_mobility, get_pole_count
+   public :: advance_receiver, can_strike, get_conductance, get_mobility, get_pole_count, get_real_sum
    public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
    public :: receiver_step_type, receiver_type
 
@@ -33,6 +33,10 @@ module thud_receiver
       real(wp) :: interval = 0.0_wp
       !> exp(p h), its integral over the step h (s), and the integral of this integral (s2): [n_pole].
       complex(wp), allocatable :: decay(:), gain(:), travel(:)
+      !> Residues times this integral: displacement by an amplitude, m/(N s): [n_pole].
+      complex(wp), allocatable :: displacement(:)
+      !> Displacement at the end by a unit force, constant in the step, m/N.
+      real(wp) :: compliance = 0.0_wp
    end type receiver_step_type
 
    !> Motion of a receiver.
@@ -131,33 +135,37 @@ contains
             step%travel(k) = interval**2*(step%decay(k) - 1 - z)/z**2
          end if
       end do
+      allocate (step%displacement(n))
+      step%compliance = interval*receiver%direct
+      if (n == 0) return
+      step%displacement = receiver%residue*step%gain
+      step%compliance = step%compliance + sum(real(receiver%residue*step%travel, wp))
    end function new_receiver_step
 
    !> Advances the motion by a step with a constant force.
-   pure subroutine advance_receiver(receiver, step, force, motion)
-      type(receiver_type), intent(in) :: receiver
+   pure subroutine advance_receiver(step, force, motion)
       type(receiver_step_type), intent(in) :: step
       !> The force downwards, N.
       real(wp), intent(in) :: force
       type(receiver_motion_type), intent(inout) :: motion
 
-      motion%displacement = motion%displacement + step%interval*receiver%direct*force
-      if (size(step%decay) == 0) return
-      motion%displacement = motion%displacement &
-         + sum(real(receiver%residue*(step%gain*motion%amplitude + step%travel*force), wp))
+      motion%displacement = motion%displacement + step%compliance*force + get_real_sum(step%displacement, motion%amplitude)
       motion%amplitude = step%decay*motion%amplitude + step%gain*force
    end subroutine advance_receiver
 
-   !> Displacement at the end of a step due to a unit force, constant in the step.
-   pure function get_force_response(receiver, step) result(response)
-      type(receiver_type), intent(in) :: receiver
-      type(receiver_step_type), intent(in) :: step
-      !> The displacement downwards, m/N.
-      real(wp) :: response
+   !> Real part of a sum of products.
+   pure function get_real_sum(a, b) result(total)
+      !> The factors: [n].
+      complex(wp), intent(in), contiguous :: a(:), b(:)
+      real(wp) :: total
+      integer :: k
 
-      response = step%interval*receiver%direct
-      if (size(step%travel) > 0) response = response + sum(real(receiver%residue*step%travel, wp))
-   end function get_force_response
+      total = 0.0_wp
+      !$omp simd reduction(+:total)
+      do k = 1, size(a)
+         total = total + real(a(k), wp)*real(b(k), wp) - aimag(a(k))*aimag(b(k))
+      end do
+   end function get_real_sum
 
    !> Velocity under the source.
    pure function get_receiver_velocity(receiver, force, motion) result(velocity)
@@ -169,7 +177,7 @@ contains
       real(wp) :: velocity
 
       velocity = receiver%direct*force
-      if (size(motion%amplitude) > 0) velocity = velocity + sum(real(receiver%residue*motion%amplitude, wp))
+      if (size(motion%amplitude) > 0) velocity = velocity + get_real_sum(receiver%residue, motion%amplitude)
    end function get_receiver_velocity
 
    !> Whether the receiver, in free motion, can reach a line that moves away from it: each pole moves the receiver by at

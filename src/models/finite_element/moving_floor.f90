@@ -7,8 +7,8 @@
 module thud_moving_floor
    use thud_floor_contact, only: floor_contact_type, get_contact_forces
    use thud_kinds, only: wp
-   use thud_receiver, only: advance_receiver, get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, &
-      receiver_motion_type, receiver_step_type, receiver_type
+   use thud_receiver, only: advance_receiver, get_real_sum, get_receiver_velocity, is_rigid, new_receiver_motion, &
+      new_receiver_step, receiver_motion_type, receiver_step_type, receiver_type
    implicit none (type, external)
    private
 
@@ -42,14 +42,12 @@ module thud_moving_floor
       real(wp) :: velocity = 0.0_wp
       !> Energy given to the floor up to the instant, and up to the midpoint after it, J.
       real(wp) :: work = 0.0_wp, work_after = 0.0_wp
-      !> Lengths of the previous and the present step for which the factors below hold, s; negative: none.
+      !> Lengths of the previous and the present step for which the steps below hold, s; negative: none.
       real(wp) :: last_interval = -1.0_wp, interval = -1.0_wp
-      !> Displacements at the instants without force, m; compliances, m/N: [3].
-      real(wp) :: free(3) = 0.0_wp, compliance(3) = 0.0_wp
-      !> Displacement from the midpoint before up to each instant, per unit amplitude of each pole, m/(N s): [n_pole, 3].
-      complex(wp), allocatable :: displacement_factor(:, :)
-      !> The step from midpoint to midpoint.
-      type(receiver_step_type) :: step
+      !> Displacements at the instants without force, m: [3].
+      real(wp) :: free(3) = 0.0_wp
+      !> Steps from the midpoint before to each instant: [3].
+      type(receiver_step_type) :: step(3)
    end type moving_floor_type
 
 contains
@@ -75,50 +73,27 @@ contains
       integer :: i
 
       same = .not. (abs(last_interval - floor%last_interval) > 0.0_wp .or. abs(interval - floor%interval) > 0.0_wp)
-      if (.not. same) call set_factors(floor, last_interval, interval)
+      if (.not. same) call set_steps(floor, last_interval, interval)
       do i = 1, 3
-         floor%free(i) = floor%motion%displacement + get_real_sum(floor%displacement_factor(:, i), floor%motion%amplitude)
+         floor%free(i) = floor%motion%displacement + get_real_sum(floor%step(i)%displacement, floor%motion%amplitude)
       end do
    end subroutine predict
 
-   !> Real part of a sum of products.
-   pure function get_real_sum(a, b) result(total)
-      !> The factors: [n].
-      complex(wp), intent(in), contiguous :: a(:), b(:)
-      real(wp) :: total
-      integer :: k
-
-      total = 0.0_wp
-      !$omp simd reduction(+:total)
-      do k = 1, size(a)
-         total = total + real(a(k), wp)*real(b(k), wp) - aimag(a(k))*aimag(b(k))
-      end do
-   end function get_real_sum
-
-   !> Factors of steps of given lengths.
-   pure subroutine set_factors(floor, last_interval, interval)
+   !> Steps of given lengths.
+   pure subroutine set_steps(floor, last_interval, interval)
       type(moving_floor_type), intent(inout) :: floor
       !> Lengths of the previous and the present step, s.
       real(wp), intent(in) :: last_interval, interval
-      type(receiver_step_type) :: step
       real(wp) :: length(3)
       integer :: i
 
       floor%last_interval = last_interval
       floor%interval = interval
       length([here, after, next]) = last_interval/2 + [0.0_wp, interval/2, interval]
-      if (allocated(floor%displacement_factor)) deallocate (floor%displacement_factor)
-      allocate (floor%displacement_factor(size(floor%motion%amplitude), 3))
       do i = 1, 3
-         step = new_receiver_step(floor%receiver, length(i))
-         floor%compliance(i) = length(i)*floor%receiver%direct
-         if (size(floor%displacement_factor, 1) > 0) then
-            floor%displacement_factor(:, i) = floor%receiver%residue*step%gain
-            floor%compliance(i) = floor%compliance(i) + sum(real(floor%receiver%residue*step%travel, wp))
-         end if
-         if (i == after) floor%step = step
+         floor%step(i) = new_receiver_step(floor%receiver, length(i))
       end do
-   end subroutine set_factors
+   end subroutine set_steps
 
    !> Solves for the displacements of a floor at an instant and at the next, by Newton's method within bounds.
    pure subroutine find_floor(floor, contact, mass, position, velocity, guess)
@@ -140,8 +115,8 @@ contains
       upper = huge(upper)
       force = guess
       do iteration = 1, max_iterations
-         floor%displacement = floor%free(here) + floor%compliance(here)*force
-         floor%stop = floor%free(next) + floor%compliance(next)*force
+         floor%displacement = floor%free(here) + floor%step(here)%compliance*force
+         floor%stop = floor%free(next) + floor%step(next)%compliance*force
          call get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
          ! The reaction falls as the force rises: the solution lies between the two.
          lower = max(lower, min(force, reaction))
@@ -176,10 +151,10 @@ contains
          needed = -((position(j, 2) + floor%stop)/floor%interval + velocity(j))*mass(j)/span
          if (needed > force(j, 2) .and. .not. contact%layer_stiffness > 0.0_wp) then
             reaction = reaction + needed
-            slope = slope + floor%compliance(next)*mass(j)/(floor%interval*span)
+            slope = slope + floor%step(next)%compliance*mass(j)/(floor%interval*span)
          else
             reaction = reaction + force(j, 2)
-            slope = slope + floor%compliance(here)*stiffness(j)
+            slope = slope + floor%step(here)%compliance*stiffness(j)
          end if
       end do
    end subroutine get_contact_reaction
@@ -193,9 +168,9 @@ contains
       real(wp) :: before
 
       before = floor%motion%displacement
-      floor%motion%displacement = floor%free(after) + floor%compliance(after)*force
-      floor%motion%amplitude = floor%step%decay*floor%motion%amplitude + floor%step%gain*force
-      associate (span => floor%step%interval, displacement => floor%displacement)
+      floor%motion%displacement = floor%free(after) + floor%step(after)%compliance*force
+      floor%motion%amplitude = floor%step(after)%decay*floor%motion%amplitude + floor%step(after)%gain*force
+      associate (span => floor%step(after)%interval, displacement => floor%displacement)
          floor%velocity_before = 2*(displacement - before)/span
          floor%velocity_after = 2*(floor%motion%displacement - displacement)/span
          floor%velocity = (floor%velocity_before + floor%velocity_after)/2 - floor%receiver%direct*force
@@ -220,7 +195,7 @@ contains
       motion = floor%motion
       step = new_receiver_step(floor%receiver, (first - 1)/sample_rate - time)
       do i = first, size(displacement)
-         call advance_receiver(floor%receiver, step, 0.0_wp, motion)
+         call advance_receiver(step, 0.0_wp, motion)
          displacement(i) = motion%displacement
          velocity(i) = get_receiver_velocity(floor%receiver, 0.0_wp, motion)
          if (i == first) step = new_receiver_step(floor%receiver, 1/sample_rate)

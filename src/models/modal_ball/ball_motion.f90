@@ -134,7 +134,7 @@ contains
          state%height = state%height + interval*(state%velocity - interval*state%gravity/2)
          state%velocity = state%velocity - interval*state%gravity
          floor_start = state%floor_motion
-         if (state%floor_moves) call advance_receiver(state%floor, state%floor_step, 0.0_wp, state%floor_motion)
+         if (state%floor_moves) call advance_receiver(state%floor_step, 0.0_wp, state%floor_motion)
          creep = state%static(:, 1)
          if (size(static%gain) == 1) then
             state%static = static%factor(1, 1)*state%static
@@ -174,7 +174,7 @@ contains
             end associate
             if (state%floor_moves) then
                state%floor_motion = floor_start
-               call advance_receiver(state%floor, state%floor_step, state%force, state%floor_motion)
+               call advance_receiver(state%floor_step, state%force, state%floor_motion)
                state%floor_work = state%floor_work &
                   + state%force*(state%floor_motion%displacement - floor_start%displacement)
             end if

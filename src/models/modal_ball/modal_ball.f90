@@ -19,7 +19,7 @@ module thud_modal_ball
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, set_factors
-   use thud_receiver, only: can_strike, get_force_response, get_pole_count, new_receiver_step, receiver_type
+   use thud_receiver, only: can_strike, get_pole_count, new_receiver_step, receiver_step_type, receiver_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type
    use thud_sampling, only: check_contact_samples, get_sample_count, get_step_count, sampling_type
    use thud_source_model, only: typical_contact
@@ -182,6 +182,7 @@ contains
       !> Set if the modes cannot be computed, or if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       type(family_type), allocatable :: families(:)
+      type(receiver_step_type) :: floor_step
       real(wp), allocatable :: response(:, :), flexibility(:, :)
       real(wp), allocatable :: zeta(:)
       real(wp) :: highest_omega, own_response
@@ -202,7 +203,8 @@ contains
       if (allocated(error)) return
       static = new_static_step(modes, interval, flexibility)
       ! Response of the rigid ball and of the floor.
-      own_response = interval**2/(2*ball%mass) + get_force_response(floor, new_receiver_step(floor, interval))
+      floor_step = new_receiver_step(floor, interval)
+      own_response = interval**2/(2*ball%mass) + floor_step%compliance
       response = static%gain(1)*flexibility + response
       response(::rings%n_dof, ::rings%n_dof) = response(::rings%n_dof, ::rings%n_dof) + own_response
       call new_ring_contact(response, rings%n_dof, contact, failed)
