@@ -24,6 +24,7 @@ from thud.level.rating import (
     Requirement,
     class_range,
     rating,
+    rounded,
     standardized_level,
 )
 
@@ -87,8 +88,8 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def rated_text(self) -> str:
         """Mean rating of both predictions with its interval, such as ``"57 dB (55 to 60)"``."""
-        low, high = self.interval
-        return f"{self.rated:.0f} dB ({low:.0f} to {high:.0f})"
+        low, high = map(rounded, self.interval)
+        return f"{rounded(self.rated)} dB ({low} to {high})"
 
     @property
     def is_ball(self) -> bool:
@@ -108,8 +109,8 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def octave_text(self) -> str:
         """Statistical rating of octaves with its interval, such as ``"59 dB (56 to 61)"``."""
-        low, high = self.interval_of("octaves")
-        return f"{self.octave_rating.rounded} dB ({low:.0f} to {high:.0f})"
+        low, high = map(rounded, self.interval_of("octaves"))
+        return f"{self.octave_rating.rounded} dB ({low} to {high})"
 
     @property
     def class_text(self) -> str:

@@ -109,25 +109,43 @@ class Requirement:
         """Whether all levels of the interval, rounded, are at most the required one."""
         if not self.conforms:
             return "undecided: the source does not conform"
-        low, high = map(_rounded, self.interval)
-        if high <= self.required:
+        low, high = meets(self.interval, self.required)
+        if high:
             return "met"
-        return "not met" if low > self.required else "undecided"
+        return "undecided" if low else "not met"
 
     def __str__(self) -> str:
         """Return rating, requirement and verdict in words."""
-        low, high = map(_rounded, self.interval)
+        low, high = map(rounded, self.interval)
         is_ball = self.source == SOURCES[0]
         title = RATINGS[self.rating] if is_ball else f"A-weighted level ({self.rating})"
         return (
-            f"{title}: {_rounded(self.level)} dB ({low} to {high}), "
+            f"{title}: {rounded(self.level)} dB ({low} to {high}), "
             f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.verdict}"
         )
 
 
-def _rounded(level: float) -> int:
-    """Return a level rounded half up."""
+def rounded(level: float) -> int:
+    """Return a level as it is stated and compared with limits: rounded, halves upwards."""
     return math.floor(level + 0.5)
+
+
+def meets(level: ArrayLike, limit: float) -> NDArray[np.bool_]:
+    """Return whether levels, rounded, are at most a limit; NaN is not.
+
+    >>> meets([49.49, 49.5], 49.0).tolist()
+    [True, False]
+    """
+    return np.asarray(level) < excess_level(limit)
+
+
+def excess_level(limit: float) -> float:
+    """Return the lowest level that, rounded, exceeds a limit.
+
+    >>> excess_level(49.0)
+    49.5
+    """
+    return math.floor(limit) + 0.5
 
 
 def class_name(korean_class: int) -> str:
@@ -142,7 +160,7 @@ def class_range(korean_class: int, interval: tuple[float, float]) -> str:
     ('class 4 (at most 49 dB)', 'no class; interval: class 4 to no class')
     """
     ends = [
-        next((i for i, limit in enumerate(CLASS_LIMITS, 1) if _rounded(end) <= limit), 0)
+        next((i for i, limit in enumerate(CLASS_LIMITS, 1) if meets(end, limit)), 0)
         for end in interval
     ]
     if {*ends} == {korean_class}:

@@ -19,7 +19,7 @@ from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.level.assessment import octave_limits
 from thud.level.levels import FORCES, get_bands
-from thud.level.rating import CLASSES
+from thud.level.rating import CLASSES, excess_level
 from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
@@ -381,7 +381,10 @@ def _draw_rating(
 
 
 def _rating_limits(result: Design) -> list[tuple[str, float]]:
-    """Return name and value, dB, of the requirement, and of the classes if these apply."""
+    """Return names of the requirement and, if they apply, of the classes.
+
+    Beside each is the lowest level, dB, that exceeds it when it is rounded.
+    """
     limits = [(f"required, {result.required:g} dB", result.required)] if result.required else []
     if result.rating_name == "octaves":
         limits += [
@@ -389,7 +392,7 @@ def _rating_limits(result: Design) -> list[tuple[str, float]]:
             for number, limit in zip(CLASSES[1:], CLASS_LIMITS, strict=True)
             if limit != result.required
         ]
-    return limits
+    return [(name, excess_level(limit)) for name, limit in limits]
 
 
 def _draw_limits(

@@ -14,7 +14,7 @@ from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import DENSITY, value_in
 from thud.impact.quantities import RATING, ROOM_BAND, ROOM_LEVEL
-from thud.level.rating import rated_bands, rating
+from thud.level.rating import meets, rated_bands, rating
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study import wall_volume
 from thud.studies.study_result import SampleResult
@@ -56,7 +56,7 @@ class Design(SampleResult):
         Rating of the room that `required` refers to: ``"octaves"``, ``"thirds"`` or
         ``"standardized"``.
     required : float
-        Highest rating that is allowed, dB; 0 if none is stated.
+        Highest rating, rounded, that is allowed, dB; 0 if none is stated.
     """
 
     dataset: xr.Dataset
@@ -127,9 +127,9 @@ class Design(SampleResult):
         ]
         octave_rating = self.octave_rating
         if octave_rating is not None and self.rating_name == "octaves":
-            count = int((octave_rating <= CLASS_LIMITS[-1]).sum())
+            count = int(meets(octave_rating, CLASS_LIMITS[-1]).sum())
             rows.append((f"class {len(CLASS_LIMITS)} or better (KS F 2863-2)", str(count)))
-        met = room_rating <= self.required
+        met = room_rating.copy(data=meets(room_rating, self.required))
         if self.required:
             rows.append((f"meets {self.required:g} dB", f"{int(met.sum())} of {size}"))
             if met.any():
