@@ -271,6 +271,24 @@ def test_titles_that_do_not_fit_are_refused(
         thud.fit_mobility(write_table(tmp_path / "point.csv", titles, *columns))
 
 
+@pytest.mark.parametrize(
+    ("titles", "encoding"),
+    [
+        ("Frequenz (Hz),Realteil,Imaginärteil", "latin-1"),
+        ("주파수(Hz),실수부,허수부", "cp949"),
+        ("周波数（Hz）,実部,虚部", "cp932"),  # noqa: RUF001 - as printed
+    ],
+)
+def test_titles_in_other_languages_are_read(
+    tmp_path: Path, titles: str, encoding: str, exact: thud.MobilityFit
+) -> None:
+    path = write_table(tmp_path / "point.csv", "frequency,real,imaginary", FREQUENCY,
+                       MOBILITY.real, MOBILITY.imag)  # fmt: skip
+    _, _, rows = path.read_text().partition("\n")
+    path.write_bytes(f"{titles}\n{rows}".encode(encoding))
+    assert thud.fit_mobility(path, order=8).measured == pytest.approx(exact.measured)
+
+
 def test_quantity_in_the_titles_counts(tmp_path: Path, exact: thud.MobilityFit) -> None:
     columns = FREQUENCY, (S * MOBILITY).real, (S * MOBILITY).imag
     titles = "frequency,real accelerance,imaginary accelerance"

@@ -30,6 +30,7 @@ from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.config import PlateConfig, read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
+from thud.recordings.formats.text import read_channels
 from thud.recordings.polarity import Extremes, check_peak, scan
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
@@ -1240,6 +1241,26 @@ def test_date_times_are_an_axis(title: str, shown: str, tmp_path: Path) -> None:
     assert signal.sample_rate == pytest.approx(8000, rel=1e-7)
     assert any("date-times" in step for step in signal.steps)
     np.testing.assert_allclose(found, 1e3 * force, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rate", "titles", "encoding"),
+    [
+        ("サンプリング周波数: 8000 Hz", "力（N）", "cp932"),  # noqa: RUF001 - as printed
+        ("샘플링 주파수: 8000 Hz", "충격력 (N)", "cp949"),
+        ("Prüfer: Müller\nAbtastrate: 8000 Hz", "Stoßkraft (N)", "latin-1"),
+    ],
+)
+def test_headers_are_read_in_encodings_of_spreadsheets(
+    rate: str, titles: str, encoding: str, tmp_path: Path
+) -> None:
+    force = half_sine(8000.0)
+    path = tmp_path / "drop.csv"
+    rows = "\n".join(f"{value:.6f}" for value in force)
+    path.write_bytes(f"{rate}\n{titles}\n{rows}".encode(encoding))
+    (channel,) = read_channels(path)
+    assert (channel.sample_rate, channel.unit) == (8000.0, "N")
+    assert channel.name == re.split("[ （]", titles)[0]  # noqa: RUF001 - as printed
 
 
 def test_days_of_a_spreadsheet_are_an_axis(tmp_path: Path) -> None:

@@ -374,9 +374,34 @@ def test_titles_are_read_in_four_languages(titles: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("titles", "encoding"),
+    [
+        ("Frequenz;Küche 1;Küche 2;Störpegel;Nachhallzeit", "latin-1"),
+        ("주파수(Hz);거실 1;거실 2;배경소음 (dB);잔향시간(s)", "cp949"),
+        ("周波数（Hz）;居間1;居間2;暗騒音レベル（dB）;残響時間（s）", "cp932"),  # noqa: RUF001 - as printed
+        ("周波数;居間1;居間2;暗騒音;残響時間", "utf-16"),
+        ("Frequenz;Küche 1;Küche 2;Hintergrund;Nachhallzeit", "latin-1"),
+    ],
+)
+def test_titles_are_read_in_encodings_of_spreadsheets(
+    titles: str, encoding: str, tmp_path: Path
+) -> None:
+    """Titles that were not UTF-8 were refused."""
+    path = tmp_path / "levels.csv"
+    bands = zip((63, 125, 250, 500), (70, 60, 55, 50), strict=True)
+    rows = [f"{f};{level};{level + 2};{level - 30};0,6" for f, level in bands]
+    path.write_bytes("\r\n".join([titles, *rows]).encode(encoding))
+    found = thud.read_room_levels(path, volume=50.0)
+    assert len(found.positions) == 2
+    assert found.background is not None
+    assert found.background.tolist() == [40, 30, 25, 20]
+    assert found.reverberation_time is not None
+
+
+@pytest.mark.parametrize(
     ("titles", "encoding", "words"),
     [
-        ("Frequenz;Pegel 1;Störpegel", "latin-1", naming("UTF-8")),
+        ("频率;声压级 1;背景噪声", "gb18030", naming("UTF-8")),
         ("주파수;위치 1;평균레벨", "utf-8", naming("평균레벨", "position")),
         ("周波数(Hz);L1;残響時間(ms)", "utf-8", naming("残響時間(ms)", "s")),
     ],

@@ -17,7 +17,7 @@ from thud.base.workbooks import read_workbook
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -30,6 +30,15 @@ QUOTED = re.compile(r'"[^"]*"')
 # Begin of a comment. Programs by Microsoft's compilers write 1.#IND, 1.#QNAN and 1.#INF for NaN and
 # infinity, which are no numbers here.
 COMMENT = re.compile(r"#(?!(?<=\d[.,]#)(?:IND|QNAN|SNAN|INF))")
+# Encodings of tables that are not Unicode: Korean and Japanese spreadsheets, and Western European
+# ones, by precedence if their words are known equally well.
+ENCODINGS = ("cp949", "cp932", "latin-1")
+# Characters other than ASCII of German titles and of units.
+_GERMAN = set("ÄÖÜäöüß°²³µ")
+# Separators of words in a header; none is a byte of a character in any of the encodings.
+_WORD_SEPARATOR = re.compile(r"[\t;,:=]")
+# Maximum size of the header from which the encoding is determined, bytes.
+_MAX_HEADER_SIZE = 2**20
 # Maximum length of a line.
 MAX_LINE = 2**16
 ALLOWED = (
@@ -75,8 +84,45 @@ def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     return read_titled(path, ALLOWED)[1]
 
 
+def find_encoding(
+    path: str | os.PathLike[str], is_known: Callable[[str], bool] | None = None
+) -> str:
+    """Return the encoding of a text.
+
+    UTF-16 has a byte order mark. A header that is not UTF-8 has that of `ENCODINGS` in which
+    `is_known` is true of the most words that are not ASCII, or Latin-1 if its only such characters
+    are those of German and of units; else the result is UTF-8.
+    """
+    with Path(path).open("rb") as file:
+        content = file.read(_MAX_HEADER_SIZE)
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    lines = [line for line in content.split(b"\n") if not line.isascii()]
+    header = b"\n".join(lines[:-1] if len(content) == _MAX_HEADER_SIZE else lines)
+    counts = {name: _count_known(header, name, is_known) for name in ("utf-8", *ENCODINGS)}
+    if counts["utf-8"] is not None:
+        return "utf-8-sig"
+    best = max(ENCODINGS, key=lambda name: counts[name] or 0)
+    if counts[best]:
+        return best
+    others = {c for c in header.decode("latin-1") if not c.isascii()}
+    return "latin-1" if others <= _GERMAN else "utf-8-sig"
+
+
+def _count_known(
+    header: bytes, encoding: str, is_known: Callable[[str], bool] | None
+) -> int | None:
+    """Return the number of known words that are not ASCII; None in another encoding."""
+    try:
+        text = header.decode(encoding)
+    except UnicodeDecodeError:
+        return None
+    cells = (cell.strip(" \r\n\"'#") for cell in _WORD_SEPARATOR.split(text.replace("\n", "\t")))
+    return sum(not cell.isascii() and is_known(cell) for cell in cells) if is_known else 0
+
+
 def read_titled(
-    path: str | os.PathLike[str], allowed: str
+    path: str | os.PathLike[str], allowed: str, is_known: Callable[[str], bool] | None = None
 ) -> tuple[list[str], NDArray[np.float64]]:
     """Return the titles of a file of columns and its numbers, shape (n_row, n_column).
 
@@ -84,20 +130,22 @@ def read_titled(
     semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells may
     be quoted. One decimal mark holds for the whole table, see `find_decimal`. Empty lines, comments
     after ``#`` and lines above the first number are skipped. A workbook (.xlsx) is read in the same
-    way. Raise InputError, naming file and line, if a line is not numeric or has a different number
-    of columns.
+    way. Words of which `is_known` is true show the encoding, see `find_encoding`. Raise InputError,
+    naming file and line, if a line is not numeric or has a different number of columns.
     """
     is_workbook = Path(path).suffix.lower() == ".xlsx"
-    return read_workbook(path, allowed) if is_workbook else _read_text(path, allowed)
+    return read_workbook(path, allowed) if is_workbook else _read_text(path, allowed, is_known)
 
 
-def _read_text(path: str | os.PathLike[str], allowed: str) -> tuple[list[str], NDArray[np.float64]]:
+def _read_text(
+    path: str | os.PathLike[str], allowed: str, is_known: Callable[[str], bool] | None
+) -> tuple[list[str], NDArray[np.float64]]:
     """Return the titles and the numbers of a text."""
     try:
         if not Path(path).is_file():  # opening a pipe could block
             raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
-        # A header may be in another encoding than UTF-8.
-        with Path(path).open(encoding="utf-8-sig", errors="replace") as text:
+        # A comment may be in an encoding that is not known.
+        with Path(path).open(encoding=find_encoding(path, is_known), errors="replace") as text:
             lines = [strip_comment(line) for line in read_lines(text, str(path), allowed)]
     except InputError:  # is a ValueError
         raise

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -54,6 +55,11 @@ _TITLES = {
     "frequency": "frequency", "f": "frequency", "freq": "frequency",
     "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
     "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
+    "frequenz": "frequency", "realteil": "real", "imaginärteil": "imaginary", "betrag": "magnitude",
+    "주파수": "frequency", "실수부": "real", "실수": "real", "허수부": "imaginary", "허수": "imaginary",
+    "크기": "magnitude", "진폭": "magnitude", "위상": "phase",
+    "周波数": "frequency", "実部": "real", "実数部": "real", "虚部": "imaginary",
+    "虚数部": "imaginary", "振幅": "magnitude", "絶対値": "magnitude", "位相": "phase",
 }  # fmt: skip
 # Words in a title that state a unit other than SI units and degrees.
 _OTHER_UNITS = {
@@ -320,8 +326,8 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     """Return frequencies, values and quantity, which is None if the file does not state it."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
-    titles, table = read_titled(path, _ALLOWED)
-    words = [re.findall("[a-z]+", title.lower()) or [""] for title in titles]
+    titles, table = read_titled(path, _ALLOWED, lambda title: _words(title)[0] in _TITLES)
+    words = list(map(_words, titles))
     for title, (_, *others) in zip(titles, words, strict=True):
         if _OTHER_UNITS & {*others}:
             refuse(f"{path}: {shown(title.strip())} is not in SI units and degrees", _ALLOWED)
@@ -331,7 +337,7 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     if titles and len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", _ALLOWED)
     columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind}
-    quantities = {word for title in words for word in title if word in _POWERS}
+    quantities = [name for name in get_args(Quantity) if any(name in title for title in words)]
     if {"frequency", "real", "imaginary"} <= columns.keys():
         values = columns["real"] + 1j * columns["imaginary"]
     elif {"frequency", "magnitude", "phase"} <= columns.keys():
@@ -341,8 +347,14 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
             f"{path}: the columns are {shown(', '.join(titles)) if titles else 'without titles'}",
             _ALLOWED,
         )
-    quantity = min(quantities) if len(quantities) == 1 else None
+    quantity = quantities[0] if len(quantities) == 1 else None
     return columns["frequency"], values, quantity
+
+
+def _words(title: str) -> list[str]:
+    """Return the words of a title in lower case."""
+    # NFKC replaces full-width brackets by those of ASCII.
+    return re.findall(r"[^\W\d_]+", unicodedata.normalize("NFKC", title).lower()) or [""]
 
 
 def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:

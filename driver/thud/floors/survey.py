@@ -249,7 +249,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
         Columns with a header row, as text or in the first sheet of a workbook (.xlsx) that has
         numbers: ``frequency``, Hz; ``background``, dB, and ``reverberation_time``, s, if known;
         every other column holds the levels of a position, dB. Titles may be German, Korean or
-        Japanese. There is a row for each rated band, and optionally for other bands.
+        Japanese, in UTF-8, or in the encodings of spreadsheets in these languages. There is a row for each rated band, and optionally for other bands.
     volume
         Volume of the room, m3.
 
@@ -258,11 +258,13 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     InputError
         If a column or band is missing, duplicate or not plausible; the message names it.
     """
-    titles, table = read_titled(path, ALLOWED)
+    titles, table = read_titled(path, ALLOWED, _is_known)
     if len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", ALLOWED)
     if broken := [title for title in titles if "\N{REPLACEMENT CHARACTER}" in title]:
-        refuse(f"{path}: the title {broken[0].strip()!r} is not UTF-8", "a table in UTF-8")
+        refuse(
+            f"{path}: the title {broken[0].strip()!r} is in an unknown encoding", "a table in UTF-8"
+        )
     kinds = [_kind(title, path) for title in titles]
     positions = [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"]
     other = next((title for title in positions if NO_POSITION & {*_plain(title).split()}), "")
@@ -327,6 +329,12 @@ def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
         # The classes apply to levels in the room only.
         rows[2:3] = [(*row[:2], "") for row in rows[2:3]]
     return rows
+
+
+def _is_known(title: str) -> bool:
+    """Whether a title has a known word."""
+    word = _plain(title)
+    return word.replace(" ", "") in TITLES or bool(NO_POSITION & {*word.split()})
 
 
 def _kind(title: str, path: object) -> str:

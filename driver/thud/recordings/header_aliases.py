@@ -23,19 +23,25 @@ def _words(text: str) -> frozenset[str]:
 RATE = _words(
     "samplerate samplingrate samplefrequency samplingfrequency fs sr sfreq fsample srate "
     "samplerateperchannel samplespersecond samplespersec scanrate matsamplerate abtastrate "
-    "abtastfrequenz messrate frequenceechantillonnage"
+    "abtastfrequenz messrate frequenceechantillonnage "
+    "샘플링주파수 샘플링레이트 표본화주파수 サンプリング周波数 サンプリングレート 標本化周波数"
 )
 STEP = _words(
     "dt deltat deltax timestep samplinginterval sampleinterval sampletime samplingtime "
     "sampleperiod samplingperiod timeincrement xincrement wfincrement increment interval ts "
-    "tsample abtastintervall abtastzeit"
+    "tsample abtastintervall abtastzeit 샘플링간격 시간간격 サンプリング間隔 サンプリング周期 時間間隔"
 )
 DATE = _words(
     "date datum datetime recorded recordingdate measurementdate measured starttime timestamp "
-    "wfstarttime startdate datestarted created"
+    "wfstarttime startdate datestarted created 날짜 측정일 측정일시 日付 日時 測定日 測定日時"
 )
-UNIT = _words("unit units einheit unitstring yunit yunits yunitlabel forceunit unitsy")
-TIME = _words("time times t zeit temps tempo sec seconds xvalue abscissa timestamps")
+UNIT = _words("unit units einheit unitstring yunit yunits yunitlabel forceunit unitsy 단위 単位")
+TIME = _words(
+    "time times t zeit temps tempo sec seconds xvalue abscissa timestamps 시간 시각 時間 時刻"
+)
+# Names of channels that show the encoding of a header.
+_FORCE = _words("kraft stoßkraft 힘 충격력 하중 力 衝撃力 荷重")
+WORDS = RATE | STEP | DATE | UNIT | TIME | _FORCE
 
 RATE_UNITS = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "1/s": 1.0, "sps": 1.0}
 TIME_UNITS = {
@@ -52,6 +58,8 @@ NUMBER = re.compile(
     rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
     re.IGNORECASE,
 )
+# Full-width brackets of Japanese and Korean titles, and those of ASCII.
+_BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d", "()[]")
 # Maximum length of a title or value.
 MAX_LENGTH = 200
 
@@ -73,7 +81,7 @@ def split_title(title: str) -> tuple[str, str]:
     >>> split_title("time_s")
     ('time', 's')
     """
-    text = title.strip().strip("\"'").strip()[:MAX_LENGTH]
+    text = title.strip().strip("\"'").strip()[:MAX_LENGTH].translate(_BRACKETS)
     bracket, loose = (pattern.fullmatch(text) for pattern in TITLE)
     if bracket:
         return bracket["name"].strip(), bracket["unit"].strip()

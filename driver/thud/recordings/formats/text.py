@@ -15,6 +15,7 @@ from thud.base.columns import (
     GROUPING,
     DecimalMark,
     find_decimal,
+    find_encoding,
     find_separator,
     is_number,
     read_lines,
@@ -45,6 +46,7 @@ from thud.recordings.header_aliases import (
     STEP,
     TIME_UNITS,
     UNIT,
+    WORDS,
     find_rate,
     find_word,
     is_time,
@@ -113,11 +115,8 @@ class _Table:
 def read_channels(path: Path) -> list[Channel]:
     """Return the columns of numbers of a text file except the times."""
     require_small(path, "text", MAX_IN_MEMORY)
-    with path.open("rb") as file:
-        mark = file.read(2)
-    encoding = "utf-16" if mark in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig"
-    # A header may have an encoding other than UTF-8.
-    with path.open(encoding=encoding, errors="replace") as text:
+    # A header may have an encoding that is not known.
+    with path.open(encoding=find_encoding(path, _is_known), errors="replace") as text:
         table = _Table(shown_path(path))
         _read_header(read_lines(text, table.name, ALLOWED), table)
         text.seek(0)
@@ -128,6 +127,12 @@ def read_channels(path: Path) -> list[Channel]:
         text.seek(0)
         values = _read_numbers(_lines_of_numbers(text, table), table)
     return _channels(table, values)
+
+
+def _is_known(word: str) -> bool:
+    """Whether a word of a header is known, or its unit."""
+    name, unit = split_title(word)
+    return plain(name) in WORDS or bool(find_unit(unit or name))
 
 
 def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
