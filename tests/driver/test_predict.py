@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import html
+import io
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,8 +29,6 @@ from thud.report.predicted_floor import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from conftest import ErrorsOf
 
 TABLES = ["bands.csv", "contributions.csv", "paths.csv", "ratings.csv"]
@@ -271,12 +271,9 @@ def test_workbook_has_every_table(floor: PredictedFloor, tmp_path: Path) -> None
     files = contents([replace(floor, name="=1+1")], tmp_path, report=False)
     (tmp_path / "a.xlsx").write_bytes(files["predictions.xlsx"])
     book = openpyxl.load_workbook(tmp_path / "a.xlsx")
-    assert [f"{name}.csv" for name in book.sheetnames] == [
-        "bands.csv",
-        "ratings.csv",
-        "contributions.csv",
-        "paths.csv",
-    ]
+    assert book.sheetnames == [
+        "bands", "ratings", "contributions", "paths", "assumptions", "warnings",
+    ]  # fmt: skip
     rows = list(book["bands"].iter_rows(values_only=True))
     column = rows[0].index("statistical, dB")
     assert [row[column] for row in rows[1:]] == pytest.approx(floor.prediction.level)
@@ -376,3 +373,26 @@ def test_reports_of_other_floors_are_removed(
     assert {*names_in(tmp_path / "out")} == {
         ".thud", "mine.pdf", "predictions.xlsx", *TABLES
     }  # fmt: skip
+
+
+def test_workbook_has_fitted_columns_assumptions_and_warnings() -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    floor = predicted(volume=40.0)
+    book = openpyxl.load_workbook(
+        io.BytesIO(contents([floor], Path(), report=False)["predictions.xlsx"])
+    )
+    rows = list(book["assumptions"].iter_rows(min_row=2, values_only=True))
+    assert rows == [(floor.name, *row) for row in floor.assumptions[1:]]
+    texts = [row[1] for row in book["warnings"].iter_rows(min_row=2, values_only=True)]
+    assert texts == list(floor.prediction.warnings)
+    for sheet in book:
+        assert sheet.freeze_panes == "B2"
+        titles = [cell for cell in sheet[1] if len(cell.value) < 55]
+        widths = [sheet.column_dimensions[cell.column_letter].width for cell in titles]
+        assert all(w > len(c.value) for w, c in zip(widths, titles, strict=True))
+
+
+def test_changes_are_sorted_by_their_effect() -> None:
+    changes = predicted(volume=40.0).changes
+    sizes = [abs(change.difference) for change in changes]
+    assert sizes == sorted(sizes, reverse=True)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+# Maximum width of a column that is written, characters.
+_MAX_WIDTH = 60
 # Maximum number of rows that are read of a sheet.
 MAX_ROWS = 10_000
 
@@ -66,9 +68,17 @@ def workbook(sheets: Mapping[str, Iterable[Sequence[str | float]]]) -> bytes:
                 if isinstance(cell.value, str):
                     cell.data_type = "s"
         sheet.freeze_panes = "B2"
+        for column in sheet.columns:
+            width = max(len(_shown(cell.value)) for cell in column) + 2
+            sheet.column_dimensions[column[0].column_letter].width = min(width, _MAX_WIDTH)
     content = io.BytesIO()
     book.save(content)
     return content.getvalue()
+
+
+def _shown(value: object) -> str:
+    """Return a cell about as spreadsheet programs show it."""
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
 def _split(

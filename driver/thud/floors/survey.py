@@ -249,7 +249,8 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
         Columns with a header row, as text or in the first sheet of a workbook (.xlsx) that has
         numbers: ``frequency``, Hz; ``background``, dB, and ``reverberation_time``, s, if known;
         every other column holds the levels of a position, dB. Titles may be German, Korean or
-        Japanese, in UTF-8, or in the encodings of spreadsheets in these languages. There is a row for each rated band, and optionally for other bands.
+        Japanese, in UTF-8, or in the encodings of spreadsheets in these languages. There is
+        a row for each rated band, and optionally for other bands.
     volume
         Volume of the room, m3.
 

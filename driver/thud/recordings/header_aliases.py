@@ -29,7 +29,8 @@ RATE = _words(
 STEP = _words(
     "dt deltat deltax timestep samplinginterval sampleinterval sampletime samplingtime "
     "sampleperiod samplingperiod timeincrement xincrement wfincrement increment interval ts "
-    "tsample abtastintervall abtastzeit 샘플링간격 시간간격 サンプリング間隔 サンプリング周期 時間間隔"
+    "tsample abtastintervall abtastzeit 샘플링간격 시간간격 "
+    "サンプリング間隔 サンプリング周期 時間間隔"
 )
 DATE = _words(
     "date datum datetime recorded recordingdate measurementdate measured starttime timestamp "

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.workbooks import workbook
-from thud.report.predicted_floor import contribution_title, deviation_text, tables
+from thud.report.predicted_floor import contribution_title, deviation_text, sheets, tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -69,7 +69,7 @@ def contents(floors: Sequence[PredictedFloor], folder: Path, *, report: bool) ->
     rows = tables(floors, changes=report)
     result = {f"{name}.csv": _csv(table) for name, table in rows.items()}
     if find_spec("openpyxl"):
-        result[WORKBOOK] = workbook(rows)
+        result[WORKBOOK] = workbook({**rows, **sheets(floors)})
     if report:
         for floor in floors:
             result |= page_contents(floor, folder)

@@ -68,6 +68,8 @@ _MAIN = (
     "length", "width", "thickness", "sheathing_thickness", "joist_height", "density",
     "screed_thickness", "layer_stiffness", "loss_factor", "support", "reverberation_time",
 )  # fmt: skip
+# Deviation that is not listed by its value, dB.
+_NEGLIGIBLE = 0.05
 # Added to a thickness, m.
 _ADDED = 0.01
 _THICKNESSES = {
@@ -224,6 +226,8 @@ class PredictedFloor:
             except ThudError:
                 difference = np.nan
             result.append(Change(text, difference))
+        # The largest effect first; changes that are not allowed last.
+        result.sort(key=lambda change: (np.isnan(change.difference), -abs(change.difference)))
         return tuple(result)
 
     @property
@@ -260,9 +264,11 @@ def contribution_title(name: str) -> str:
 def deviation_text(ends: tuple[float, float]) -> str:
     """Return lower and upper deviation, dB.
 
-    >>> deviation_text((-1.5, 1.5)), deviation_text((-1.26, 0.0))
-    ('±1.5', '−1.3 to 0.0')
+    >>> deviation_text((-1.5, 1.5)), deviation_text((-1.26, 0.0)), deviation_text((-0.04, 0.0))
+    ('±1.5', '−1.3 to 0.0', 'less than 0.1')
     """
+    if max(map(abs, ends)) < _NEGLIGIBLE:
+        return "less than 0.1"
     low, high = (f"{end:z.1f}".replace("-", "−") for end in ends)
     return f"±{high}" if low == f"−{high}" else f"{low} to {high}"
 
@@ -329,6 +335,16 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
             changed += [(floor.name, *change) for change in floor.changes]
     result = {"bands": bands, "ratings": ratings, "contributions": contributions, "paths": paths}
     return {**result, "changes": changed} if changes else result
+
+
+def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
+    """Return the assumptions and the warnings of floors as tables, each with a header."""
+    assumptions: list[Cells] = [("floor", "quantity", "value", "source")]
+    warnings: list[Cells] = [("floor", "warning")]
+    for floor in floors:
+        assumptions += [(floor.name, *row) for row in floor.assumptions[1:]]
+        warnings += [(floor.name, warning) for warning in floor.prediction.warnings]
+    return {"assumptions": assumptions, "warnings": warnings}
 
 
 def _rating_entry(
