@@ -22,9 +22,11 @@ module thud_modal_radiation
    !> Number of wavenumbers of sound per band, at which the transforms are computed.
    integer, parameter :: n_wavenumber = 3
 
-   !> Minimum and maximum number of frequencies per wavenumber, and number of modes in a band from which the minimum is
-   !> enough.
-   integer, parameter :: min_frequencies = 3, max_frequencies = 12, many_modes = 40
+   !> Smallest loss factor and angular frequency, rad/s, of a mode: without losses a resonance has no mean.
+   real(wp), parameter :: min_loss_factor = 1.0e-6_wp, min_omega = 1.0_wp
+
+   !> Relative error of mean squares by the amplitudes that represent them.
+   real(wp), parameter :: mean_error = 1.0e-4_wp
 
    !> Modes up to this ratio of frequencies take part in a band, and all modes up to this angular frequency, rad/s.
    real(wp), parameter :: max_ratio = 2.5_wp, min_highest = 2*pi*500.0_wp
@@ -101,7 +103,8 @@ contains
       real(wp), intent(in), optional :: stated_strike(:, :)
       type(wave_series_type) :: along, across
       type(shapes_type) :: shapes
-      real(wp), allocatable :: strike(:, :), drive(:, :), omega(:), loss_factor(:)
+      real(wp), allocatable :: strike(:, :), drive(:, :)
+      complex(wp), allocatable :: pole(:)
       integer, allocatable :: kept(:)
       real(wp) :: power, velocity, total, highest
       logical :: has_strikes
@@ -123,16 +126,15 @@ contains
          ! Of so many modes, those far from the band matter little.
          if (size(kept) > max_modes) kept = pack(kept, modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio &
             .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
-         omega = modes%omega(kept)
-         loss_factor = modes%loss_factor(kept)
+         pole = max(modes%omega(kept), min_omega)**2*cmplx(1.0_wp, max(modes%loss_factor(kept), min_loss_factor), wp)
          shapes = get_shapes(modes, modes%stack%radiator, kept)
          if (has_strikes) then
             call get_mode_values(modes%modes, 1, modes%stack%length*strike(1, :), modes%stack%width*strike(2, :), &
                drive, kept)
-            call add_strikes(shapes, get_shapes(modes, modes%stack%bearing, kept), omega, loss_factor, drive, air, &
-               bands(i), get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
+            call add_strikes(shapes, get_shapes(modes, modes%stack%bearing, kept), pole, drive, air, bands(i), &
+               get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
          else
-            call add_modes(shapes, omega, loss_factor, modes%stack%length*modes%stack%width, air, bands(i), &
+            call add_modes(shapes, pole, modes%stack%length*modes%stack%width, air, bands(i), &
                get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
          end if
          if (.not. velocity > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
@@ -188,57 +190,114 @@ contains
       end do
    end function get_shapes
 
-   !> Sums of a band over frequencies and strike points, with the cross terms of the modes.
-   subroutine add_strikes(shapes, bearing, omega, loss_factor, drive, air, band, along, across, power, velocity, total)
+   !> Integrals over the frequencies of a band and sums over strike points, with the cross terms of the modes.
+   subroutine add_strikes(shapes, bearing, pole, drive, air, band, along, across, power, velocity, total)
       !> Shapes of the radiating and of the bearing plate.
       type(shapes_type), intent(in) :: shapes, bearing
-      !> Angular frequencies, rad/s, and loss factors: [n_mode].
-      real(wp), intent(in) :: omega(:), loss_factor(:)
+      !> Squared angular frequencies with their losses, omega**2 (1 + i eta), rad2/s2: [n_mode].
+      complex(wp), intent(in) :: pole(:)
       !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
       real(wp), intent(in) :: drive(:, :)
       type(air_type), intent(in) :: air
       type(band_type), intent(in) :: band
       !> Transforms of the functions of x and of y.
       type(wave_series_type), intent(in) :: along, across
-      !> Sums of radiated power over rho0 c0 and of the squared velocity times area, m4/s2, and of their weights.
+      !> Integrals of radiated power over rho0 c0 and of the squared velocity times area, m4/s2 rad/s, and of 1.
       real(wp), intent(out) :: power, velocity, total
       type(transforms_type) :: transforms
-      complex(wp) :: response(size(omega))
-      real(wp), allocatable :: amplitude(:, :, :), coefficient(:, :)
-      real(wp) :: ratio, frequency
+      real(wp), allocatable :: amplitude(:, :), coefficient(:, :), weight(:, :)
       real(wp) :: edge(2)
-      integer :: j, k, l, n
+      integer :: j, k
 
       power = 0.0_wp
       velocity = 0.0_wp
       total = 0.0_wp
-      ratio = (band%upper/band%lower)**(1.0_wp/n_wavenumber)
-      n = get_frequency_count(omega, loss_factor, band, ratio)
-      allocate (amplitude(size(omega), size(drive, 2), 2*n))
+      weight = reshape([get_squares(shapes), get_squares(bearing)], [size(pole), 2])
       do j = 1, n_wavenumber
-         edge = band%lower*ratio**[j - 1, j]
-         do l = 1, n
-            ! Geometric steps, whose widths are proportional to the frequency.
-            frequency = edge(1)*ratio**((l - 0.5_wp)/n)
-            associate (w => 2*pi*frequency)
-               response = sqrt(frequency)*cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, omega**2*loss_factor, wp)
-            end associate
-            do k = 1, size(drive, 2)
-               amplitude(:, k, 2*l - 1) = response%re*drive(:, k)
-               amplitude(:, k, 2*l) = response%im*drive(:, k)
-            end do
-            total = total + frequency*size(drive, 2)
-         end do
-         associate (all_amplitudes => reshape(amplitude, [size(omega), size(drive, 2)*2*n]))
-            ! The functions are orthonormal.
-            call get_coefficients(bearing, all_amplitudes, coefficient)
-            velocity = velocity + sum(coefficient**2)
-            call get_coefficients(shapes, all_amplitudes, coefficient)
-         end associate
+         edge = get_interval(band, j)
+         call get_amplitudes(pole, drive, weight, 2*pi*edge, amplitude)
+         total = total + 2*pi*(edge(2) - edge(1))*size(drive, 2)
+         ! The functions are orthonormal.
+         call get_coefficients(bearing, amplitude, coefficient)
+         velocity = velocity + sum(coefficient**2)
+         call get_coefficients(shapes, amplitude, coefficient)
          transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
          power = power + sum(get_powers(transforms, [(k, k=1, size(shapes%x))], [(k, k=1, size(shapes%y))], coefficient))
       end do
    end subroutine add_strikes
+
+   !> Amplitudes of the modes whose squares and products add up to those of the responses to forces, integrated over
+   !> frequencies.
+   !>
+   !> With r_k = omega/(pole_k - omega**2), the integral of r_k conjg(r_l) is (F_k - conjg(F_l))/(conjg(pole_l) - pole_k), F
+   !> being that of pole/(pole - omega**2). The amplitudes are the columns of a Cholesky factor of these integrals, the
+   !> largest rest first, until the rest matters no more: far from their resonances, modes move alike at all frequencies.
+   subroutine get_amplitudes(pole, drive, weight, edge, amplitude)
+      !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
+      complex(wp), intent(in) :: pole(:)
+      !> Shapes under the forces, 1/sqrt(kg): [n_mode, n_force].
+      real(wp), intent(in) :: drive(:, :)
+      !> Weights of the squared amplitudes in the sums that are wanted: [n_mode, n_sum].
+      real(wp), intent(in) :: weight(:, :)
+      !> Lowest and highest angular frequency, rad/s.
+      real(wp), intent(in) :: edge(2)
+      !> The amplitudes, (rad/s)**(1/2) m/(N s) sqrt(kg): [n_mode, n].
+      real(wp), allocatable, intent(out) :: amplitude(:, :)
+      complex(wp), dimension(size(pole)) :: integral
+      real(wp), dimension(size(pole)) :: rest, share
+      real(wp), allocatable :: factor(:, :)
+      integer :: j, k, n
+
+      integral = get_integral(pole, edge(1), edge(2))
+      rest = -integral%im/pole%im*sum(drive**2, dim=2)
+      share = 0.0_wp
+      do k = 1, size(weight, 2)
+         share = share + weight(:, k)/max(sum(weight(:, k)*rest), tiny(1.0_wp))
+      end do
+      allocate (factor(size(pole), size(pole)))
+      n = 0
+      do while (n < size(pole))
+         if (sum(share*rest) <= mean_error) exit
+         j = maxloc(share*rest, dim=1)
+         factor(:, n + 1) = (real((integral - conjg(integral(j)))/(conjg(pole(j)) - pole), wp)*matmul(drive, drive(j, :)) &
+            - matmul(factor(:, :n), factor(j, :n)))/sqrt(rest(j))
+         n = n + 1
+         rest = max(rest - factor(:, n)**2, 0.0_wp)
+         rest(j) = 0.0_wp
+      end do
+      amplitude = factor(:, :n)
+   end subroutine get_amplitudes
+
+   !> Integral of pole/(pole - omega**2) over angular frequencies.
+   elemental function get_integral(pole, low, high) result(integral)
+      !> Squared angular frequency with its losses, rad2/s2.
+      complex(wp), intent(in) :: pole
+      !> Limits, rad/s.
+      real(wp), intent(in) :: low, high
+      complex(wp) :: integral
+
+      associate (root => sqrt(pole))
+         integral = root/2*(log((root + high)/(root + low)) - log((root - high)/(root - low)))
+      end associate
+   end function get_integral
+
+   !> Integrals of the squared shapes over the plate, m2/kg: [n_mode].
+   pure function get_squares(shapes) result(square)
+      type(shapes_type), intent(in) :: shapes
+      real(wp), allocatable :: square(:)
+      integer :: i
+
+      square = [(sum(shapes%block(i)%coefficient**2, dim=1), i=1, size(shapes%block))]
+   end function get_squares
+
+   !> Lowest and highest frequency of one of `n_wavenumber` parts of a band, Hz.
+   pure function get_interval(band, number) result(edge)
+      type(band_type), intent(in) :: band
+      integer, intent(in) :: number
+      real(wp) :: edge(2)
+
+      edge = band%lower*(band%upper/band%lower)**([number - 1, number]/real(n_wavenumber, wp))
+   end function get_interval
 
    !> Coefficients of the functions of all shapes, those of x first: [n_x*n_y, n_column].
    pure subroutine get_coefficients(shapes, amplitude, coefficient)
@@ -266,52 +325,42 @@ contains
       end do
    end subroutine get_coefficients
 
-   !> Sums of a band over frequencies for modes that are orthogonal, averaged over all strike points.
-   subroutine add_modes(shapes, omega, loss_factor, area, air, band, along, across, power, velocity, total)
+   !> Integrals over the frequencies of a band for modes that are orthogonal, averaged over all strike points.
+   subroutine add_modes(shapes, pole, area, air, band, along, across, power, velocity, total)
       type(shapes_type), intent(in) :: shapes
-      !> Angular frequencies, rad/s, and loss factors: [n_mode].
-      real(wp), intent(in) :: omega(:), loss_factor(:)
+      !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
+      complex(wp), intent(in) :: pole(:)
       !> Area of the floor, m2.
       real(wp), intent(in) :: area
       type(air_type), intent(in) :: air
       type(band_type), intent(in) :: band
       !> Transforms of the functions of x and of y.
       type(wave_series_type), intent(in) :: along, across
-      !> Sums as in `add_strikes`.
+      !> Integrals as in `add_strikes`.
       real(wp), intent(out) :: power, velocity, total
       type(transforms_type) :: transforms
-      real(wp), dimension(size(omega)) :: square, resistance, response
-      real(wp) :: ratio, frequency
+      real(wp), dimension(size(pole)) :: square, resistance, response
       real(wp) :: edge(2)
-      integer :: i, j, l, n, n_before
+      integer :: i, j, n
 
       power = 0.0_wp
       velocity = 0.0_wp
       total = 0.0_wp
-      ratio = (band%upper/band%lower)**(1.0_wp/n_wavenumber)
-      n = get_frequency_count(omega, loss_factor, band, ratio)
+      square = get_squares(shapes)
       do j = 1, n_wavenumber
-         edge = band%lower*ratio**[j - 1, j]
+         edge = get_interval(band, j)
          transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
-         n_before = 0
+         n = 0
          do i = 1, size(shapes%block)
-            associate (block => shapes%block(i), first => n_before + 1, &
-               last => n_before + size(shapes%block(i)%coefficient, 2))
-               ! Integrals of the squared shapes over the plate, m2/kg.
-               square(first:last) = sum(block%coefficient**2, dim=1)
-               resistance(first:last) = get_powers(transforms, block%x, block%y, block%coefficient)
+            associate (block => shapes%block(i), n_mode => size(shapes%block(i)%coefficient, 2))
+               resistance(n + 1:n + n_mode) = get_powers(transforms, block%x, block%y, block%coefficient)
+               n = n + n_mode
             end associate
-            n_before = n_before + size(shapes%block(i)%coefficient, 2)
          end do
-         do l = 1, n
-            frequency = edge(1)*ratio**((l - 0.5_wp)/n)
-            associate (w => 2*pi*frequency)
-               response = square*w**2/((omega**2 - w**2)**2 + (omega**2*loss_factor)**2)
-            end associate
-            power = power + frequency*sum(response*resistance)
-            velocity = velocity + frequency*sum(response*square)
-            total = total + frequency*area
-         end do
+         response = -square*aimag(get_integral(pole, 2*pi*edge(1), 2*pi*edge(2)))/pole%im
+         power = power + sum(response*resistance)
+         velocity = velocity + sum(response*square)
+         total = total + 2*pi*(edge(2) - edge(1))*area
       end do
    end subroutine add_modes
 
@@ -328,23 +377,6 @@ contains
          strike(:, i) = modulo(0.5_wp + i/plastic**[1, 2], 1.0_wp)
       end do
    end subroutine get_strike_points
-
-   !> Number of frequencies per wavenumber that resolve the resonances in a band: two per half-power width.
-   pure function get_frequency_count(omega, loss_factor, band, ratio) result(n)
-      !> Angular frequencies, rad/s, and loss factors of the modes: [n_mode].
-      real(wp), intent(in) :: omega(:), loss_factor(:)
-      type(band_type), intent(in) :: band
-      !> Ratio of the frequencies per wavenumber.
-      real(wp), intent(in) :: ratio
-      integer :: n
-      logical :: in_band(size(omega))
-
-      in_band = omega > 2*pi*band%lower/ratio .and. omega < 2*pi*band%upper*ratio
-      n = min_frequencies
-      ! Many modes make a smooth mean without resolved resonances.
-      if (count(in_band) < many_modes) n = min(max(ceiling(2*log(ratio)/max(minval(loss_factor, mask=in_band), &
-         1.0e-3_wp)), min_frequencies), max_frequencies)
-   end function get_frequency_count
 
    !> Transforms of functions as series of the wavenumber.
    pure function new_wave_series(set, ends, highest) result(series)
