@@ -82,15 +82,23 @@ def test_tables_have_the_numbers_of_the_prediction(floor: PredictedFloor, tmp_pa
         "T, s": prediction.reverberation_time,
         "statistical, dB": prediction.level,
         "spread, dB": prediction.spread,
-        "modal, dB": prediction.modal_level,
-        "simply supported, dB": prediction.simple_level,
-        "clamped, dB": prediction.clamped_level,
         "standardized, dB": prediction.standardized,
         "room modes": prediction.room_modes,
     }
     for title, values in expected.items():
         assert [float(row[title]) for row in bands] == values.tolist(), title
-    assert {*COLUMNS} - {*expected} == {"force level, dB re 1 N"}
+    by_modes = {
+        "modal, dB": prediction.modal_level,
+        "simply supported, dB": prediction.simple_level,
+        "clamped, dB": prediction.clamped_level,
+        "modal − statistical, dB": prediction.modal_level - prediction.level,
+    }
+    n = prediction.n_modal
+    assert 0 < n < len(bands)
+    for title, values in by_modes.items():
+        assert [float(row[title]) for row in bands[:n]] == values[:n].tolist(), title
+        assert not any(row[title] for row in bands[n:]), title
+    assert {*COLUMNS} - {*expected, *by_modes} == {"force level, dB re 1 N"}
     # The energy in a band is its force exposure times the conductance.
     force = np.array([float(row["force level, dB re 1 N"]) for row in bands])
     assert 10 ** (force / 10) * prediction.conductance == pytest.approx(prediction.energy, rel=1e-9)

@@ -133,6 +133,23 @@ def test_recording_is_predicted_as_the_impact_that_it_records(shell: thud.Impact
     assert found.level == pytest.approx(expected.level, abs=0.1)
 
 
+def test_implausibly_low_rating_raises_a_warning(shell: thud.Impact) -> None:
+    floor = thud.Plate(thickness=0.3, screed_thickness=0.08, layer_stiffness=6.0e6)
+    quiet = thud.predict_level(shell, floor, thud.Room(ceiling_mass=30.0, ceiling_depth=0.5))
+    for prediction in quiet, thud.predict_level(shell, thud.Plate(), thud.Room()):
+        warned = any("flanking paths, gaps" in text for text in prediction.warnings)
+        assert warned == (prediction.rated < 30)
+    assert quiet.rated < 30
+
+
+def test_difference_of_both_predictions_ends_with_the_modes(shell: thud.Impact) -> None:
+    prediction = thud.predict_level(shell, thud.Plate(), thud.Room())
+    difference = prediction.modal_level - prediction.level
+    n = prediction.n_modal
+    assert prediction.model_difference[:n] == pytest.approx(difference[:n], abs=0)
+    assert np.isnan(prediction.model_difference[n:]).all()
+
+
 def test_prediction_is_held_against_measured_levels(shell: thud.Impact) -> None:
     found = thud.predict_level(shell, thud.Plate(), thud.Room())
     measured = thud.read_room_levels(FLOORS / "field_levels.csv", volume=41.4)

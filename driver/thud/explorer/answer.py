@@ -23,7 +23,6 @@ from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
 from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.level.rating import class_text
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.report.predicted_floor import contribution_title
@@ -120,8 +119,7 @@ def answer_case(case: Case) -> Answer:
     if case.room is not None and case.floor is not None:
         prediction = predict_level(impact)
         answer["room"] = _room(prediction)
-        classes = class_text(prediction.octave_rating.korean_class or 0)
-        answer["headline"] = room_headline(prediction, classes)
+        answer["headline"] = room_headline(prediction)
         known = answer["warnings"]
         answer["warnings"] += [text for text in prediction.warnings if text not in known]
     answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
@@ -234,11 +232,12 @@ def _ratings_text(prediction: RoomPrediction) -> str:
     both = f"statistical {prediction.rating.rounded} dB"
     if prediction.n_modal:
         both += f", by modes {prediction.modal_rating.rounded} dB"
-    octaves = prediction.octave_rating
+    iso_717, korean, iso_16283 = prediction.standards
+    known = f", {prediction.class_text}" if prediction.class_text else ""
     words = [
-        f"L_iA,Fmax {prediction.rated_text} (ISO 717-2), {both}",
-        f"octaves {octaves.rounded} dB (KS F 2863-2), {class_text(octaves.korean_class or 0)}",
-        f"standardized {prediction.standardized_rating.rounded} dB (ISO 16283-2)",
+        f"{prediction.rated_name} {prediction.rated_text}{iso_717}, {both}",
+        f"octaves {prediction.octave_text}{korean}{known}",
+        f"standardized {prediction.standardized_rating.rounded} dB{iso_16283}",
     ]
     required = prediction.requirement
     return "; ".join([*words, *([str(required)] if required else [])])

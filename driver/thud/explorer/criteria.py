@@ -86,10 +86,12 @@ def source_headline(verdict: Verdict, model: ModelVerdict | None) -> dict[str, s
     return {"text": f"{words}: {_listed(causes)}", "result": result, "detail": detail}
 
 
-def room_headline(prediction: RoomPrediction, class_text: str) -> dict[str, str]:
+def room_headline(prediction: RoomPrediction) -> dict[str, str]:
     """Return text, result and detail of the level in a room."""
     required = prediction.requirement
-    parts = ["L_iA,Fmax by ISO 717-2 with its range", f"KS F 2863-2: {class_text}"]
+    parts = [f"{prediction.rated_name}{prediction.standards[0]} with its range"]
+    if prediction.class_text:
+        parts.append(f"KS F 2863-2: {prediction.class_text}")
     if required:
         parts.append(str(required))
     result = RESULTS[required.verdict] if required else "level"

@@ -42,12 +42,12 @@ class FloorComparison(Displayed, Page):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the predictions, with the names of the floors."""
-        return [
-            f"{name}: {warning}"
-            for name, prediction in self.predictions.items()
-            for warning in prediction.warnings
-        ]
+        """Warnings of the predictions, each once, with the names of its floors."""
+        floors: dict[str, list[str]] = {}
+        for name, prediction in self.predictions.items():
+            for warning in prediction.warnings:
+                floors.setdefault(warning, []).append(name)
+        return [f"{', '.join(names)}: {warning}" for warning, names in floors.items()]
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, with a column for each floor."""

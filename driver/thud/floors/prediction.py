@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 BANDS = BANDWIDTHS[1]
 # Maximum change of the peak force by the floor, dB, for which the blocked force raises no warning.
 MAX_CHANGE = 0.1
+# A-weighted level below which other paths than those of the prediction dominate in a building, dB.
+MIN_PLAUSIBLE = 30.0
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -100,6 +102,12 @@ class RoomPrediction(RoomLevel, Displayed):
     def rated_name(self) -> str:
         """Name of the rating: ``"L_iA,Fmax"``; of the tyre ``"A-weighted level"``."""
         return "L_iA,Fmax" if self.is_ball else "A-weighted level"
+
+    @property
+    def standards(self) -> tuple[str, str, str]:
+        """Standards of `rated`, `octave_rating` and `standardized_rating`; empty for the tyre."""
+        names = " (ISO 717-2)", " (KS F 2863-2)", " (ISO 16283-2)"
+        return names if self.is_ball else ("", "", "")
 
     @property
     def source_note(self) -> str:
@@ -192,6 +200,15 @@ class RoomPrediction(RoomLevel, Displayed):
         return rating(self.standardized, BANDS)
 
     @property
+    def model_difference(self) -> Array:
+        """Level by modes − statistical level, dB, shape (12,): uncertainty of the model.
+
+        NaN above the modal bands.
+        """
+        modal = np.arange(len(self.level)) < self.n_modal
+        return np.where(modal, self.modal_level - self.level, np.nan)
+
+    @property
     def has_few_modes(self) -> NDArray[np.bool_]:
         """Whether a band has fewer than `few_modes` of floor or room, shape (12,)."""
         return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
@@ -213,6 +230,11 @@ class RoomPrediction(RoomLevel, Displayed):
             result.append(
                 "there is no prediction by modes: the rating is that of the statistical one, and "
                 "its interval contains neither the edges nor the model"
+            )
+        if self.rated < MIN_PLAUSIBLE:
+            result.append(
+                f"the rating is below {MIN_PLAUSIBLE:g} dB: in a building, flanking paths, gaps "
+                "and bridges that are not in the prediction are expected to be louder"
             )
         if self.force == "blocked" and abs(self.force_change) > MAX_CHANGE:
             result.append(
@@ -261,15 +283,13 @@ class RoomPrediction(RoomLevel, Displayed):
     def __repr__(self) -> str:
         """Return the single-number ratings."""
         required = self.requirement
-        iso_717, korean, iso_16283 = (
-            (", ISO 717-2", " (KS F 2863-2)", " (ISO 16283-2)") if self.is_ball else ("", "", "")
-        )
+        iso_717, korean, iso_16283 = self.standards
         note, classes = (
             f", {text}" if text else "" for text in (self.source_note, self.class_text)
         )
         modal = f"modal {self.modal_rating.rounded} dB" if self.n_modal else "no modal prediction"
         return (
-            f"<RoomPrediction: {self.rated_name} {self.rated_text}{iso_717}{note}; "
+            f"<RoomPrediction: {self.rated_name}{iso_717} {self.rated_text}{note}; "
             f"statistical {self.rating.rounded} dB, {modal}; "
             f"statistical, of octaves{korean}, {self.octave_text}{classes}, "
             f"standardized {self.standardized_rating.rounded} dB{iso_16283}"

@@ -379,4 +379,5 @@ def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:
         )  # fmt: skip
     axes.set_yticks(y, [escape_label(fill(name, _NAME)) for name in comparison.predictions])
     axes.set_ylim(len(y) - 0.4, -0.6)
-    axes.set_xlabel(f"{RATING_SYMBOL} (ISO 717-2), dB")
+    balls = all(prediction.is_ball for prediction in predictions)
+    axes.set_xlabel(f"{RATING_SYMBOL} (ISO 717-2), dB" if balls else "A-weighted level, dB")

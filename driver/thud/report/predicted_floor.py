@@ -249,11 +249,15 @@ COLUMNS: dict[str, tuple[str, Callable[[PredictedFloor], Iterable[float]]]] = {
     "modal, dB": (".1f", lambda floor: floor.prediction.modal_level),
     "simply supported, dB": (".1f", lambda floor: floor.prediction.simple_level),
     "clamped, dB": (".1f", lambda floor: floor.prediction.clamped_level),
+    "modal − statistical, dB": (".1f", lambda floor: floor.prediction.model_difference),
     "standardized, dB": (".1f", lambda floor: floor.prediction.standardized),
 }
 
-# Columns that are statistical above the modal bands.
-_MODAL = ("modal, dB", "simply supported, dB", "clamped, dB")
+# Columns of modal bands only, and whether they need a choice of edges.
+_MODAL = {
+    "modal, dB": False, "simply supported, dB": True, "clamped, dB": True,
+    "modal − statistical, dB": False,
+}  # fmt: skip
 
 
 def contribution_title(name: str) -> str:
@@ -292,15 +296,24 @@ def number_text(value: float, form: str = ".3g") -> str:
 def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
     """Return the bands as rows of text, the header first; modal levels only of modal bands."""
     cells = [
-        [number_text(value, form) for value in values(floor)] for form, values in COLUMNS.values()
+        ["–" if isinstance(value, str) else number_text(value, form) for value in column]
+        for (form, _), column in zip(COLUMNS.values(), _columns(floor), strict=True)
     ]
-    prediction = floor.prediction
-    for title, column in zip(COLUMNS, cells, strict=True):
-        if title in _MODAL:
-            count = prediction.n_modal if title == _MODAL[0] or prediction.has_edges else 0
-            column[count:] = "–" * (len(column) - count)
-    bands = (f"{frequency:g}" for frequency in prediction.frequency)
+    bands = (f"{frequency:g}" for frequency in floor.prediction.frequency)
     return [("band, Hz", *COLUMNS), *zip(bands, *cells, strict=True)]
+
+
+def _columns(floor: PredictedFloor) -> list[list[float | str]]:
+    """Return the columns of bands; where a modal column has no own value, an empty text."""
+    prediction = floor.prediction
+    result: list[list[float | str]] = []
+    for title, (_, values) in COLUMNS.items():
+        column: list[float | str] = [*map(float, values(floor))]
+        if title in _MODAL:
+            count = prediction.n_modal if prediction.has_edges or not _MODAL[title] else 0
+            column[count:] = [""] * (len(column) - count)
+        result.append(column)
+    return result
 
 
 def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list[Cells]]:
@@ -313,13 +326,12 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
     changed: list[Cells] = [("floor", "change", "difference, dB")]
     for floor in floors:
         prediction = floor.prediction
+        count = len(prediction.frequency)
         columns = [
-            prediction.frequency, *(values(floor) for _, values in COLUMNS.values()),
-            prediction.floor_modes, prediction.room_modes,
-            np.arange(len(prediction.frequency)) < prediction.n_modal,
+            map(float, prediction.frequency), *_columns(floor), map(float, prediction.floor_modes),
+            map(float, prediction.room_modes), map(float, np.arange(count) < prediction.n_modal),
         ]  # fmt: skip
-        rows = zip(*(map(float, column) for column in columns), strict=True)
-        bands += [(floor.name, *row) for row in rows]
+        bands += [(floor.name, *row) for row in zip(*columns, strict=True)]
         ratings += [(floor.name, *entry) for entry in floor.ratings]
         for end, value in zip(("lower", "upper"), prediction.interval, strict=True):
             standard = floor.ratings[0][1]
