@@ -546,7 +546,7 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
         assert judged is not None
         assert (judged.required, judged.verdict) == (limit, verdict)
         assert judged.level == pytest.approx(mean, abs=1e-9)
-        keys = f"volume = 70\n reverberation_time = 1.5\n required = {limit}"
+        keys = f"volume = 50\n reverberation_time = 1.5\n required = {limit}"
         text = ROOM_CASE.replace("volume = 40", f"{keys}\n required_rating = '{name}'")
         text = text.replace("&model name = 'hollow_sphere' /\n", "")
         done = run(case_file(text), "-o", f"out_{limit}")

@@ -37,7 +37,7 @@ module thud_modal_radiation
    integer, parameter :: max_modes = 2000, max_coupled = 200
    real(wp), parameter :: near_ratio = 1.3_wp
 
-   !> Functions whose product has a smaller mean than this, relative to the largest, are orthogonal but for rounding.
+   !> Orthonormal functions whose product has a smaller integral over a part are orthogonal there, but for rounding.
    real(wp), parameter :: rounding = 1.0e-9_wp
 
    !> Modes whose products have a smaller mean than this, relative to their squares, are orthogonal.
@@ -359,7 +359,7 @@ contains
       integer, intent(in) :: first(:), second(:)
       logical :: yes
 
-      yes = any(abs(overlap(first, second)) > rounding*maxval(abs(overlap)))
+      yes = any(abs(overlap(first, second)) > rounding)
    end function are_coupled
 
    !> Shapes of several blocks as those of one.
