@@ -603,7 +603,7 @@ contains
       end do
    end subroutine add_modes
 
-   !> Integrals over frequencies of the real parts of r_k conjg(r_l), as in `get_amplitudes`, rad/s (m/(N s) kg)**2:
+   !> Integrals over frequencies of the real parts of r_k conjg(r_l), as in `get_amplitudes`, s:
    !> [n_mode, n_mode].
    pure function get_responses(pole, edge) result(response)
       !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
