@@ -71,7 +71,7 @@ contains
       type(modal_radiation_type) :: radiation
       type(plate_type) :: plate
       type(room_level_type) :: bare
-      real(wp), allocatable :: level(:), conductance(:), radiation_factor(:)
+      real(wp), allocatable :: level(:), conductance(:)
 
       call get_room_bands(bands, error)
       if (allocated(error)) return
@@ -84,19 +84,19 @@ contains
          if (.not. allocated(error)) call check_below(plate, case%room, error)
          if (.not. allocated(error)) call floor%get_radiating_modes(plate, modes, error)
          if (allocated(error)) return
-         radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)*get_area_ratio(case%room, plate)
-         if (case%room%radiation == modal_radiation .or. floor%has_modal_conductance()) then
-            call get_radiation(case%room, floor, plate, modes, bands, radiation, error)
-            if (allocated(error)) return
-            if (case%room%radiation == modal_radiation) radiation_factor = radiation%radiation_factor
-            if (floor%has_modal_conductance()) conductance = radiation%conductance
+         call get_radiation(case%room, floor, plate, modes, bands, radiation, error)
+         if (allocated(error)) return
+         if (case%room%radiation /= modal_radiation) then
+            radiation%radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)
+            radiation%upper_factor = radiation%radiation_factor
          end if
-         call get_room_level(plate, conductance, radiation_factor, case%room, bands, level, prediction)
+         if (.not. floor%has_modal_conductance()) radiation%conductance = conductance
+         call get_room_level(plate, radiation, case%room, bands, level, prediction)
          if (.not. with_modes) return
-         call get_room_level(plate, conductance, radiation_factor, get_bare_room(case%room), bands, level, bare)
+         call get_room_level(plate, radiation, get_bare_room(case%room), bands, level, bare)
          call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, &
             prediction%level - bare%level - floor%get_improvement(size(bands)), prediction, error)
-         if (.not. allocated(error)) call add_contributions(case, plate, conductance, radiation_factor, level, prediction)
+         if (.not. allocated(error)) call add_contributions(case, plate, radiation, level, prediction)
       end associate
    end subroutine predict
 
@@ -120,13 +120,14 @@ contains
       integer :: n
 
       n = count(bands%upper <= modes%limit/(2*pi))
-      allocate (radiation%radiation_factor(0), radiation%conductance(0))
-      if (n > 0) call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
+      call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
       if (n == size(bands)) return
       call floor%get_room_modes(uncoupled_support, simple_plate, simple_modes, error)
       if (allocated(error)) return
       call get_modal_radiation(simple_modes, plate, room%air, bands(n + 1:), get_area(room, plate), beyond)
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor]
+      radiation%upper_factor = [radiation%upper_factor, beyond%upper_factor]
+      radiation%energy_beyond = [radiation%energy_beyond, beyond%energy_beyond]
       radiation%conductance = [radiation%conductance, &
          beyond%conductance + floor%get_bridge_conductance(bands(n + 1:)%center)]
    end subroutine get_radiation
@@ -141,17 +142,6 @@ contains
          area = [room%corner_x, room%corner_x + completed%length, room%corner_y, room%corner_y + completed%width]
       end associate
    end function get_area
-
-   !> Area of a floor above a room over that of the floor.
-   pure function get_area_ratio(room, plate) result(ratio)
-      type(room_type), intent(in) :: room
-      type(plate_type), intent(in) :: plate
-      real(wp) :: ratio
-
-      associate (area => get_area(room, plate))
-         ratio = (area(2) - area(1))*(area(4) - area(3))/(plate%length*plate%width)
-      end associate
-   end function get_area_ratio
 
    !> The room as a box.
    pure function get_box(room, plate, bands) result(box)
@@ -248,11 +238,12 @@ contains
    end subroutine get_positions
 
    !> Contributions to the interval of the A-weighted level, as differences from the mean of both predictions.
-   subroutine add_contributions(case, plate, conductance, radiation_factor, level, prediction)
+   subroutine add_contributions(case, plate, radiation, level, prediction)
       type(case_type), intent(in) :: case
       type(plate_type), intent(in) :: plate
-      !> Conductance, m/(N s), radiation factor, and levels of the force, dB: [n_band].
-      real(wp), intent(in) :: conductance(:), radiation_factor(:), level(:)
+      type(modal_radiation_type), intent(in) :: radiation
+      !> Levels of the force, dB: [n_band].
+      real(wp), intent(in) :: level(:)
       type(room_level_type), intent(inout) :: prediction
       type(source_limits_type) :: limits
       type(error_type), allocatable :: error
@@ -279,7 +270,7 @@ contains
          do i = 1, 2
             room = case%room
             room%reverberation_time%values = room%reverberation_time%values*time_ratio**(2*i - 3)
-            call get_room_level(plate, conductance, radiation_factor, room, prediction%bands, level, changed)
+            call get_room_level(plate, radiation, room, prediction%bands, level, changed)
             time(i) = get_weighted(changed%level) - get_weighted(prediction%level)
          end do
          positions = coverage*get_weighted_spread(prediction)*[-1, 1]

@@ -232,11 +232,13 @@ contains
    end function get_plate_radiation
 
    !> Total loss factor: internal, radiation of both sides, edges (ISO 12354-1 annex C).
-   elemental function get_total_loss(plate, air, frequency) result(loss_factor)
+   elemental function get_total_loss(plate, air, frequency, radiation_factor) result(loss_factor)
       type(plate_type), intent(in) :: plate
       type(air_type), intent(in) :: air
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency
+      !> Mean radiation factor of both sides (default: that of free waves).
+      real(wp), intent(in), optional :: radiation_factor
       real(wp) :: loss_factor
       real(wp) :: sigma, absorption
 
@@ -251,7 +253,11 @@ contains
       end if
       absorption = plate%edge_absorption
       if (plate%edges == 'building') absorption = building_absorption*2*(plate%length + plate%width)
-      sigma = get_plate_radiation(plate, air, frequency)
+      if (present(radiation_factor)) then
+         sigma = radiation_factor
+      else
+         sigma = get_plate_radiation(plate, air, frequency)
+      end if
       loss_factor = plate%loss_factor &
          + 2*air%density*air%sound_speed*sigma/(2*pi*frequency*get_surface_mass(plate)) &
          + air%sound_speed/(pi**2*plate%length*plate%width*sqrt(frequency*get_critical_frequency(plate, air))) &

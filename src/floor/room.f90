@@ -10,6 +10,7 @@ module thud_room
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
    use thud_kinds, only: wp
    use thud_lapack, only: dgetf2, dgetrs
+   use thud_modal_radiation, only: modal_radiation_type
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level, get_rounded, get_standardization, &
@@ -44,6 +45,9 @@ module thud_room
 
    !> Number of modes in a band below which the statistical result is unreliable.
    real(wp), parameter :: few_modes = 5.0_wp
+
+   !> Least ratio of the energies of the modes above the room to those of the modes beyond it.
+   real(wp), parameter :: min_energy_ratio = 1.02_wp
 
    !> Time step of a history, s: 4 % of the detector's time constant.
    real(wp), parameter :: history_step = 5.0e-3_wp
@@ -300,13 +304,11 @@ contains
    !>
    !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
    !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
-   subroutine get_room_level(plate, conductance, radiation_factor, stated_room, bands, force_level, prediction)
+   subroutine get_room_level(plate, radiation, stated_room, bands, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
-      !> Real part of the mobility of the floor, averaged over positions, m/(N s): [n_band].
-      real(wp), intent(in) :: conductance(:)
-      !> Radiation factor of the plate: [n_band].
-      real(wp), intent(in) :: radiation_factor(:)
+      !> Its conductance, radiation factors and energy beyond the room: [n_band].
+      type(modal_radiation_type), intent(in) :: radiation
       type(room_type), intent(in) :: stated_room
       !> Bands from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
@@ -321,13 +323,14 @@ contains
       room = get_completed_room(stated_room, plate)
       width = bands%upper - bands%lower
       prediction%bands = bands
-      prediction%conductance = conductance
+      prediction%conductance = radiation%conductance
       prediction%surface_mass = get_surface_mass(plate)
       prediction%volume = room%volume
       prediction%sides = [room%length, room%width, room%height]
-      prediction%energy = 10**(force_level/10)*conductance
-      prediction%radiation_factor = radiation_factor
-      prediction%loss_factor = get_total_loss(plate, room%air, bands%center)
+      prediction%energy = 10**(force_level/10)*radiation%conductance
+      prediction%radiation_factor = radiation%radiation_factor
+      prediction%loss_factor = get_total_loss(plate, room%air, bands%center, &
+         (radiation%radiation_factor + radiation%upper_factor)/2)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
       prediction%room_modes = get_room_mode_density(room, bands%center)*width
@@ -335,7 +338,7 @@ contains
       allocate (prediction%path_share(size(bands), 1 + room%walls%lengths%count))
       floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
-         energies(i) = get_band_energies(plate, room, prediction, i)
+         energies(i) = get_band_energies(plate, radiation, room, prediction, i)
          call get_fast_maximum(energies(i)%loss_matrix, energies(i)%initial_energy, energies(i)%weight, maximum(i), &
             prediction%time(i))
          prediction%path_share(i, :) = get_path_shares(energies(i), size(prediction%path_share, 2))
@@ -439,17 +442,22 @@ contains
       end do
    end subroutine add_history
 
-   !> Energies of a band: floor, walls, room and ceiling cavity, with the flows between them.
+   !> Energies of a band: floor, walls, room, ceiling cavity and the floor beyond the room, with the flows between them.
    !>
-   !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a bare one.
+   !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room, and to the other side by the factor there.
+   !> The room loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a bare one.
+   !>
+   !> Energy flows from the floor above the room to the floor beyond it at the rate that gives, with the losses of both and a
+   !> steady force, their energies by the modes.
    !>
    !> With a ceiling of transmission t, a fraction of the floor's radiation reaches the room through the stiffness of the
    !> air. Of the rest, t**2 reaches the room directly and 1 - t**2 the cavity, from which sound leaves through the ceiling
    !> (Craik and Smith 2000). The cavity receives t (1 - t) of the sound that the room sends to the ceiling. A ceiling
    !> without mass, t = 1, has no effect.
-   pure function get_band_energies(plate, room, prediction, band) result(energies)
-      type(plate_type), intent(in) :: plate
+   pure function get_band_energies(floor, radiation, room, prediction, band) result(energies)
+      !> The whole floor.
+      type(plate_type), intent(in) :: floor
+      type(modal_radiation_type), intent(in) :: radiation
       type(room_type), intent(in) :: room
       !> Prediction with reverberation times, energies and radiation factors.
       type(room_level_type), intent(in) :: prediction
@@ -459,9 +467,14 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
-      real(wp) :: decay, transmission, forced, free
+      type(plate_type) :: plate
+      real(wp) :: decay, transmission, forced, free, beyond, density
       integer :: i, at_room, at_cavity
 
+      ! The part above the room.
+      plate = floor
+      plate%length = min(room%length, floor%length)
+      plate%width = min(room%width, floor%width)
       plates = [plate, get_walls(room%walls)]
       at_room = size(plates) + 1
       at_cavity = at_room + 1
@@ -471,8 +484,9 @@ contains
             *[prediction%radiation_factor(band), get_plate_radiation(plates(2:), air, f)]
          decay = decay_of_60_db/prediction%reverberation_time(band)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
-            [2*pi*f*get_total_loss(plates, air, f), decay], &
-            [2*pi*f*plates%loss_factor + radiated, merge(0.0_wp, decay, room%reverberation_of == finished_room)])
+            [2*pi*f*[prediction%loss_factor(band), get_total_loss(plates(2:), air, f)], decay], &
+            [2*pi*f*plates%loss_factor + radiated*[radiation%upper_factor(band)/radiation%radiation_factor(band), &
+            spread(1.0_wp, 1, size(plates) - 1)], merge(0.0_wp, decay, room%reverberation_of == finished_room)])
          if (ceiling%mass > 0.0_wp) then
             transmission = get_mass_law(ceiling, air, f)
             forced = get_forced_velocity_ratio(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
@@ -490,6 +504,17 @@ contains
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
+         if (plate%length*plate%width < floor%length*floor%width*(1 - 1.0e-9_wp)) then
+            associate (loss => 2*pi*f*prediction%loss_factor(band), above => get_mode_density(plate), &
+               ratio => radiation%energy_beyond(band))
+               ! At most almost equal energies of all modes: with few modes, more energy may lie beyond the room.
+               density = max(get_mode_density(floor) - above, min_energy_ratio*ratio*above)
+               beyond = loss*ratio/(1 - ratio*above/density)
+               call add_subsystem(flow, density, loss)
+               call connect(flow, 1, size(flow%internal_loss), beyond)
+               flow%total(1) = flow%total(1) + beyond
+            end associate
+         end if
          ! The decay of a finished room contains what it loses to floor and walls.
          if (room%reverberation_of == finished_room) then
             associate (leaving => flow%rate(:, at_room))

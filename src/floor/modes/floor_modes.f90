@@ -34,8 +34,6 @@ module thud_floor_modes
       real(wp) :: limit = 0.0_wp, sum_limit = 0.0_wp
       !> Frequency above which the modes of the floor are not known, rad/s.
       real(wp) :: known_limit = huge(1.0_wp)
-      !> The shapes of the radiating plate are orthogonal over its area.
-      logical :: is_orthogonal = .false.
    end type floor_modes_type
 
    !> Modes, and the numbers that determine them.
@@ -82,7 +80,6 @@ contains
          end if
       end do
       modes%stack = stack
-      modes%is_orthogonal = is_single_plate(stack)
       call get_stack_modes(stack, wanted, modes%modes, resolved, failed)
       if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
@@ -102,15 +99,6 @@ contains
       call move_alloc(key, cached(oldest)%key)
       oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
-
-   !> Whether a stack is one plate without ribs.
-   pure function is_single_plate(stack) result(yes)
-      type(plate_stack_type), intent(in) :: stack
-      logical :: yes
-
-      yes = size(stack%plate) == 1
-      if (yes) yes = .not. allocated(stack%plate(1)%ribs)
-   end function is_single_plate
 
    !> Whether a plate yields in shear: its waves are short, and many functions gain little.
    pure function has_shear(stack) result(yes)

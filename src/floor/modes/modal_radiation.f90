@@ -2,22 +2,23 @@
 !>
 !> The power of a velocity v with the transform V over the plate is rho0 c0 k0/(4 pi**2) times the integral of |V|**2/kz over
 !> the wavenumbers below that of sound, k0 (Williams, *Fourier Acoustics*). It contains the cross terms of all modes.
+!>
+!> The mean over all strike points of an area is exact: with the velocities r of the modes per unit of their force, and G the
+!> means of the products of their shapes at the strike points, the power is the double sum of r_k conj(r_l) G_kl R_kl, where R
+!> holds the powers of pairs of modes.
 module thud_modal_radiation
    use thud_band, only: band_type
    use thud_constants, only: pi
    use thud_floor_modes, only: floor_modes_type
-   use thud_function_set, only: function_set_type, get_functions, get_quadrature
+   use thud_function_set, only: function_set_type, get_functions, get_overlap, get_quadrature
    use thud_kinds, only: wp
    use thud_matrix_product, only: get_product, get_transposed_product
    use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
-   use thud_ritz_system, only: get_mode_values, get_ranges
+   use thud_ritz_system, only: get_mode_values, get_ranges, product_type
    implicit none (type, external)
    private
 
    public :: get_modal_radiation, get_strike_points, modal_radiation_type
-
-   !> Number of strike points over which floors are averaged whose modes have no orthogonal shapes under the source.
-   integer, parameter :: n_strike = 16
 
    !> Number of wavenumbers of sound per band, at which the transforms are computed.
    integer, parameter :: n_wavenumber = 3
@@ -31,22 +32,54 @@ module thud_modal_radiation
    !> Modes up to this ratio of frequencies take part in a band, and all modes up to this angular frequency, rad/s.
    real(wp), parameter :: max_ratio = 2.5_wp, min_highest = 2*pi*500.0_wp
 
-   !> Number of modes above which only those within a ratio of frequencies to the band take part.
-   integer, parameter :: max_modes = 2000
+   !> Number of modes, and of modes that strikes on a part of the floor couple, above which only those within a ratio of
+   !> frequencies to the band take part.
+   integer, parameter :: max_modes = 2000, max_coupled = 200
    real(wp), parameter :: near_ratio = 1.3_wp
+
+   !> Orthonormal functions whose product has a smaller integral over a part are orthogonal there, but for rounding.
+   real(wp), parameter :: rounding = 1.0e-9_wp
+
+   !> Modes whose products have a smaller mean than this, relative to their squares, are orthogonal.
+   real(wp), parameter :: max_overlap = 0.05_wp
 
    !> Maximum number of directions of a quadrature: on large floors, the mean over many modes needs no more.
    integer, parameter :: max_directions = 64
 
-   !> Answer of a floor to a force at its mean position, per band.
+   !> Answer of a floor to a force at its mean position above the room, per band.
    type :: modal_radiation_type
-      !> Radiation factor: power over rho0 c0 times area times mean-square velocity: [n_band].
+      !> Radiation factor of the part above the room: power over rho0 c0 times area times mean-square velocity there:
+      !> [n_band].
       real(wp), allocatable :: radiation_factor(:)
+      !> The same of its upper side: [n_band].
+      real(wp), allocatable :: upper_factor(:)
       !> Power that the bearing plate dissipates per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
-      !> Power that it radiates to one side per mean-square force, m/(N s): [n_band].
+      !> Power that the floor radiates into the room per mean-square force, m/(N s): [n_band].
       real(wp), allocatable :: radiated(:)
+      !> Energy of the bearing plate beyond the room over that above the room: [n_band].
+      real(wp), allocatable :: energy_beyond(:)
    end type modal_radiation_type
+
+   !> Integrals over an area of products of functions of x and of those of y: [n_x, n_x], [n_y, n_y].
+   type :: overlap_type
+      real(wp), allocatable :: x(:, :), y(:, :)
+   end type overlap_type
+
+   !> Part of the floor above the room.
+   type :: part_type
+      !> Area, m2, and that of the whole floor.
+      real(wp) :: area = 0.0_wp, whole = 0.0_wp
+      !> Integrals of products of functions of x and y over the part, of the plate under the source and of the bearing plate;
+      !> not allocated for the whole floor, over which functions are orthonormal.
+      type(overlap_type) :: struck, bearing
+   end type part_type
+
+   !> Integrals over angular frequencies: radiated power over rho0 c0, squared velocity times area of the bearing plate and of
+   !> its part above the room, m4/s2 rad/s, and 1, rad/s.
+   type :: sums_type
+      real(wp) :: power = 0.0_wp, velocity = 0.0_wp, above = 0.0_wp, width = 0.0_wp
+   end type sums_type
 
    !> Shapes of some modes in a block.
    type :: block_shapes_type
@@ -61,6 +94,19 @@ module thud_modal_radiation
       integer, allocatable :: x(:), y(:)
       type(block_shapes_type), allocatable :: block(:)
    end type shapes_type
+
+   !> Modes whose shapes have products with a mean at the strike points.
+   type :: coupled_modes_type
+      !> Their numbers among those that take part: [n_mode].
+      integer, allocatable :: mode(:)
+      !> Shapes of the radiating plate.
+      type(block_shapes_type) :: radiator
+      !> Means G over the strike points, and G times the integrals over the bearing plate and its part above the room, of
+      !> products of shapes: [n_mode, n_mode].
+      real(wp), allocatable :: drive(:, :), velocity(:, :), above(:, :)
+      !> Means of products of different shapes vanish.
+      logical :: is_orthogonal = .false.
+   end type coupled_modes_type
 
    !> Cosine and sine transforms of functions about the center of an interval, as Chebyshev series of the wavenumber. They
    !> are entire functions of it, so that few terms give them to rounding.
@@ -87,8 +133,8 @@ module thud_modal_radiation
 
 contains
 
-   !> Radiation of a floor in bands, averaged over strike points and over the frequencies of each band. Averaged over all
-   !> strike points, the cross terms of orthogonal modes vanish. In bands beyond the modes the plate takes their place.
+   !> Radiation of a floor in bands, averaged over the strike points above the room and over the frequencies of each band. In
+   !> bands beyond the modes the plate takes their place.
    subroutine get_modal_radiation(modes, plate, air, bands, area, radiation, stated_strike)
       type(floor_modes_type), intent(in) :: modes
       !> The bearing plate, with its mass and total losses.
@@ -99,57 +145,91 @@ contains
       !> Ends of the part of the plate above the room along length and width, m: [4].
       real(wp), intent(in) :: area(4)
       type(modal_radiation_type), intent(out) :: radiation
-      !> Strike points, relative to length and width (default: a mean over the floor): [2, n].
+      !> Strike points, relative to length and width (default: the mean over the part above the room): [2, n].
       real(wp), intent(in), optional :: stated_strike(:, :)
       type(wave_series_type) :: along, across
-      type(shapes_type) :: shapes
-      real(wp), allocatable :: strike(:, :), drive(:, :)
+      type(shapes_type) :: radiator
+      type(part_type) :: part
+      type(sums_type) :: sums
+      real(wp), allocatable :: drive(:, :)
       complex(wp), allocatable :: pole(:)
       integer, allocatable :: kept(:)
-      real(wp) :: power, velocity, total, highest
-      logical :: has_strikes
+      real(wp) :: highest
+      logical :: couples_all
       integer :: i, k
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
-      allocate (radiation%radiated(size(bands)))
-      call get_strike_points(n_strike, strike)
-      if (present(stated_strike)) strike = stated_strike
-      has_strikes = present(stated_strike) .or. .not. modes%is_orthogonal
+      allocate (radiation%radiated(size(bands)), radiation%energy_beyond(size(bands)))
       highest = 2*pi*maxval(bands%upper)/air%sound_speed
-      associate (radiator => modes%modes%displacement(modes%stack%radiator))
-         along = new_wave_series(radiator%x, area(1:2), highest)
-         across = new_wave_series(radiator%y, area(3:4), highest)
+      part = new_part(modes, area)
+      couples_all = all([area(2) - area(1), area(4) - area(3)] &
+         < [modes%stack%length, modes%stack%width]*(1 - 1.0e-9_wp))
+      associate (displacement => modes%modes%displacement(modes%stack%radiator))
+         along = new_wave_series(displacement%x, area(1:2), highest)
+         across = new_wave_series(displacement%y, area(3:4), highest)
       end associate
       do i = 1, size(bands)
          kept = pack([(k, k=1, size(modes%omega))], &
             modes%omega < min(modes%limit, max(max_ratio*2*pi*bands(i)%upper, min_highest)))
          ! Of so many modes, those far from the band matter little.
-         if (size(kept) > max_modes) kept = pack(kept, modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio &
-            .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
+         if (size(kept) > merge(max_coupled, max_modes, couples_all)) kept = pack(kept, &
+            modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
          pole = max(modes%omega(kept), min_omega)**2*cmplx(1.0_wp, max(modes%loss_factor(kept), min_loss_factor), wp)
-         shapes = get_shapes(modes, modes%stack%radiator, kept)
-         if (has_strikes) then
-            call get_mode_values(modes%modes, 1, modes%stack%length*strike(1, :), modes%stack%width*strike(2, :), &
-               drive, kept)
-            call add_strikes(shapes, get_shapes(modes, modes%stack%bearing, kept), pole, drive, air, bands(i), &
-               get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
+         radiator = get_shapes(modes, modes%stack%radiator, kept)
+         if (present(stated_strike)) then
+            call get_mode_values(modes%modes, 1, modes%stack%length*stated_strike(1, :), &
+               modes%stack%width*stated_strike(2, :), drive, kept)
+            call add_strikes(radiator, get_shapes(modes, modes%stack%bearing, kept), part, pole, drive, air, bands(i), &
+               get_some(along, radiator%x), get_some(across, radiator%y), sums)
          else
-            call add_modes(shapes, pole, modes%stack%length*modes%stack%width, air, bands(i), &
-               get_some(along, shapes%x), get_some(across, shapes%y), power, velocity, total)
+            call add_modes(get_coupled_modes(modes, part, radiator, kept), pole, air, bands(i), &
+               get_some(along, radiator%x), get_some(across, radiator%y), sums)
          end if
-         if (.not. velocity > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
+         if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
             ! A plate without modes there, or without known ones.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
             radiation%conductance(i) = 1/get_resistance(plate)
             radiation%radiated(i) = 0.0_wp
+            radiation%energy_beyond(i) = part%whole/part%area - 1
             cycle
          end if
-         radiation%radiation_factor(i) = power/velocity
-         radiation%radiated(i) = air%density*air%sound_speed*power/total
-         radiation%conductance(i) = velocity/total*get_surface_mass(plate)*2*pi*bands(i)%center &
+         radiation%radiation_factor(i) = sums%power/sums%above
+         radiation%radiated(i) = air%density*air%sound_speed*sums%power/sums%width
+         radiation%energy_beyond(i) = sums%velocity/sums%above - 1
+         ! The modes have these losses.
+         radiation%conductance(i) = sums%velocity/sums%width*get_surface_mass(plate)*2*pi*bands(i)%center &
             *get_total_loss(plate, air, bands(i)%center)
       end do
+      radiation%upper_factor = radiation%radiation_factor
+      ! The upper side of a floor with a subceiling is that of the bearing plate.
+      if (modes%stack%radiator /= modes%stack%bearing) radiation%upper_factor = get_plate_radiation(plate, air, bands%center)
    end subroutine get_modal_radiation
+
+   !> Part of a floor above a room.
+   function new_part(modes, area) result(part)
+      type(floor_modes_type), intent(in) :: modes
+      !> Its ends along length and width, m.
+      real(wp), intent(in) :: area(4)
+      type(part_type) :: part
+
+      part%area = (area(2) - area(1))*(area(4) - area(3))
+      part%whole = modes%stack%length*modes%stack%width
+      if (part%area > part%whole*(1 - 1.0e-9_wp)) return
+      associate (displacement => modes%modes%displacement)
+         part%struck = new_overlap(displacement(1))
+         part%bearing = new_overlap(displacement(modes%stack%bearing))
+      end associate
+   contains
+
+      !> Integrals over the part.
+      function new_overlap(set) result(overlap)
+         type(product_type), intent(in) :: set
+         type(overlap_type) :: overlap
+
+         overlap%x = get_overlap(set%x, 0, set%x, 0, area(1), area(2))
+         overlap%y = get_overlap(set%y, 0, set%y, 0, area(3), area(4))
+      end function new_overlap
+   end function new_part
 
    !> Shapes of a plate in some modes.
    pure function get_shapes(modes, plate, kept) result(shapes)
@@ -190,10 +270,175 @@ contains
       end do
    end function get_shapes
 
-   !> Integrals over the frequencies of a band and sums over strike points, with the cross terms of the modes.
-   subroutine add_strikes(shapes, bearing, pole, drive, air, band, along, across, power, velocity, total)
+   !> Modes that take part, in sets whose shapes have products with a mean at the strike points.
+   function get_coupled_modes(modes, part, radiator, kept) result(coupled)
+      type(floor_modes_type), intent(in) :: modes
+      type(part_type), intent(in) :: part
+      !> Shapes of the radiating plate.
+      type(shapes_type), intent(in) :: radiator
+      !> Numbers of the modes: [n_mode].
+      integer, intent(in) :: kept(:)
+      type(coupled_modes_type), allocatable :: coupled(:)
+      type(shapes_type) :: struck, bearing
+      integer, allocatable :: set(:), members(:), last(:)
+      integer :: i, j, k
+
+      struck = get_shapes(modes, 1, kept)
+      bearing = get_shapes(modes, modes%stack%bearing, kept)
+      set = get_sets(struck, part%struck)
+      allocate (last(0:size(set)), source=0)
+      do i = 1, size(set)
+         last(i) = last(i - 1) + size(struck%block(i)%coefficient, 2)
+      end do
+      allocate (coupled(maxval([0, set])))
+      do i = 1, size(coupled)
+         associate (these => coupled(i))
+            members = pack([(k, k=1, size(set))], set == i)
+            these%mode = [([(j, j=last(members(k) - 1) + 1, last(members(k)))], k=1, size(members))]
+            these%radiator = get_merged(radiator, members)
+            these%drive = get_integrals(get_merged(struck, members), struck, part%struck)/part%area
+            these%velocity = these%drive*get_integrals(get_merged(bearing, members), bearing, overlap_type())
+            these%above = these%velocity
+            if (allocated(part%bearing%x)) these%above = these%drive*get_integrals(get_merged(bearing, members), bearing, &
+               part%bearing)
+            these%is_orthogonal = are_orthogonal(these%drive)
+         end associate
+      end do
+   end function get_coupled_modes
+
+   !> Whether shapes are orthogonal, from the means of their products.
+   pure function are_orthogonal(mean) result(yes)
+      real(wp), intent(in) :: mean(:, :)
+      logical :: yes
+      integer :: i
+
+      yes = .true.
+      associate (norm => sqrt(get_diagonal(mean)))
+         do i = 2, size(norm)
+            yes = yes .and. all(abs(mean(:i - 1, i)) <= max_overlap*norm(i)*norm(:i - 1))
+         end do
+      end associate
+   end function are_orthogonal
+
+   !> Number of the set of each block: blocks with functions that are not orthogonal belong to one. Over the whole floor, each
+   !> block has its own: [n_block].
+   pure function get_sets(shapes, overlap) result(set)
+      type(shapes_type), intent(in) :: shapes
+      !> Integrals of products of all functions over the strike points.
+      type(overlap_type), intent(in) :: overlap
+      integer :: set(size(shapes%block))
+      integer :: i, j, n, one, other
+
+      set = [(i, i=1, size(set))]
+      if (.not. allocated(overlap%x)) return
+      do i = 2, size(set)
+         do j = 1, i - 1
+            if (set(i) == set(j)) cycle
+            if (.not. are_coupled(overlap%x, shapes%x(shapes%block(i)%x), shapes%x(shapes%block(j)%x))) cycle
+            if (.not. are_coupled(overlap%y, shapes%y(shapes%block(i)%y), shapes%y(shapes%block(j)%y))) cycle
+            one = min(set(i), set(j))
+            other = max(set(i), set(j))
+            where (set == other) set = one
+         end do
+      end do
+      ! Numbers without gaps.
+      n = 0
+      do i = 1, size(set)
+         if (set(i) /= i) cycle
+         n = n + 1
+         where (set == i) set = -n
+      end do
+      set = -set
+   end function get_sets
+
+   !> Whether some functions of two lists are not orthogonal.
+   pure function are_coupled(overlap, first, second) result(yes)
+      !> Integrals of products of all functions.
+      real(wp), intent(in) :: overlap(:, :)
+      !> Numbers of the functions.
+      integer, intent(in) :: first(:), second(:)
+      logical :: yes
+
+      yes = any(abs(overlap(first, second)) > rounding)
+   end function are_coupled
+
+   !> Shapes of several blocks as those of one.
+   pure function get_merged(shapes, members) result(merged)
+      type(shapes_type), intent(in) :: shapes
+      !> Numbers of the blocks.
+      integer, intent(in) :: members(:)
+      type(block_shapes_type) :: merged
+      integer, allocatable :: at_x(:), at_y(:)
+      integer :: i, k, l, n
+
+      if (size(members) == 1) then
+         merged = shapes%block(members(1))
+         return
+      end if
+      allocate (at_x(size(shapes%x)), at_y(size(shapes%y)), source=0)
+      n = 0
+      do i = 1, size(members)
+         associate (block => shapes%block(members(i)))
+            at_x(block%x) = 1
+            at_y(block%y) = 1
+            n = n + size(block%coefficient, 2)
+         end associate
+      end do
+      merged%x = pack([(k, k=1, size(at_x))], at_x == 1)
+      merged%y = pack([(k, k=1, size(at_y))], at_y == 1)
+      at_x(merged%x) = [(k, k=1, size(merged%x))]
+      at_y(merged%y) = [(k, k=1, size(merged%y))]
+      allocate (merged%coefficient(size(merged%x)*size(merged%y), n), source=0.0_wp)
+      n = 0
+      do i = 1, size(members)
+         associate (block => shapes%block(members(i)), n_mode => size(shapes%block(members(i))%coefficient, 2))
+            do k = 1, size(block%y)
+               do l = 1, size(block%x)
+                  merged%coefficient(at_x(block%x(l)) + (at_y(block%y(k)) - 1)*size(merged%x), n + 1:n + n_mode) = &
+                     block%coefficient(l + (k - 1)*size(block%x), :)
+               end do
+            end do
+            n = n + n_mode
+         end associate
+      end do
+   end function get_merged
+
+   !> Integrals of products of shapes over an area, m2/kg: [n_mode, n_mode].
+   pure function get_integrals(block, shapes, overlap) result(integral)
+      type(block_shapes_type), intent(in) :: block
+      !> The shapes to whose functions the block refers.
+      type(shapes_type), intent(in) :: shapes
+      !> Integrals of products of functions over the area, for the whole floor not allocated.
+      type(overlap_type), intent(in) :: overlap
+      real(wp), allocatable :: integral(:, :)
+
+      integral = get_transposed_product(block%coefficient, get_weighted(block%coefficient, shapes%x(block%x), &
+         shapes%y(block%y), overlap))
+   end function get_integrals
+
+   !> Coefficients of shapes times the integrals of products of their functions: [n_x*n_y, n_column].
+   pure function get_weighted(coefficient, x, y, overlap) result(weighted)
+      !> Coefficients of the products, x first: [n_x*n_y, n_column].
+      real(wp), intent(in) :: coefficient(:, :)
+      !> Numbers of the functions of x and y.
+      integer, intent(in) :: x(:), y(:)
+      type(overlap_type), intent(in) :: overlap
+      real(wp), allocatable :: weighted(:, :)
+      integer :: i
+
+      weighted = coefficient
+      if (.not. allocated(overlap%x)) return
+      do i = 1, size(coefficient, 2)
+         weighted(:, i) = reshape(get_product(get_product(overlap%x(x, x), reshape(coefficient(:, i), [size(x), size(y)])), &
+            overlap%y(y, y)), [size(x)*size(y)])
+      end do
+   end function get_weighted
+
+   !> Integrals over the frequencies of a band and means over strike points, with the cross terms of the modes.
+   subroutine add_strikes(radiator, bearing, part, pole, drive, air, band, along, across, sums)
       !> Shapes of the radiating and of the bearing plate.
-      type(shapes_type), intent(in) :: shapes, bearing
+      type(shapes_type), intent(in) :: radiator, bearing
+      type(part_type), intent(in) :: part
       !> Squared angular frequencies with their losses, omega**2 (1 + i eta), rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
       !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
@@ -202,27 +447,25 @@ contains
       type(band_type), intent(in) :: band
       !> Transforms of the functions of x and of y.
       type(wave_series_type), intent(in) :: along, across
-      !> Integrals of radiated power over rho0 c0 and of the squared velocity times area, m4/s2 rad/s, and of 1.
-      real(wp), intent(out) :: power, velocity, total
+      type(sums_type), intent(out) :: sums
       type(transforms_type) :: transforms
       real(wp), allocatable :: amplitude(:, :), coefficient(:, :), weight(:, :)
       real(wp) :: edge(2)
       integer :: j, k
 
-      power = 0.0_wp
-      velocity = 0.0_wp
-      total = 0.0_wp
-      weight = reshape([get_squares(shapes), get_squares(bearing)], [size(pole), 2])
+      weight = reshape([get_squares(radiator), get_squares(bearing)], [size(pole), 2])
       do j = 1, n_wavenumber
          edge = get_interval(band, j)
          call get_amplitudes(pole, drive, weight, 2*pi*edge, amplitude)
-         total = total + 2*pi*(edge(2) - edge(1))*size(drive, 2)
+         sums%width = sums%width + 2*pi*(edge(2) - edge(1))*size(drive, 2)
          ! The functions are orthonormal.
          call get_coefficients(bearing, amplitude, coefficient)
-         velocity = velocity + sum(coefficient**2)
-         call get_coefficients(shapes, amplitude, coefficient)
+         sums%velocity = sums%velocity + sum(coefficient**2)
+         sums%above = sums%above + sum(coefficient*get_weighted(coefficient, bearing%x, bearing%y, part%bearing))
+         call get_coefficients(radiator, amplitude, coefficient)
          transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
-         power = power + sum(get_powers(transforms, [(k, k=1, size(shapes%x))], [(k, k=1, size(shapes%y))], coefficient))
+         sums%power = sums%power + sum(get_powers(transforms, [(k, k=1, size(radiator%x))], [(k, k=1, size(radiator%y))], &
+            coefficient))
       end do
    end subroutine add_strikes
 
@@ -325,44 +568,66 @@ contains
       end do
    end subroutine get_coefficients
 
-   !> Integrals over the frequencies of a band for modes that are orthogonal, averaged over all strike points.
-   subroutine add_modes(shapes, pole, area, air, band, along, across, power, velocity, total)
-      type(shapes_type), intent(in) :: shapes
+   !> Integrals over the frequencies of a band, averaged over the strike points.
+   subroutine add_modes(coupled, pole, air, band, along, across, sums)
+      type(coupled_modes_type), intent(in) :: coupled(:)
       !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
-      !> Area of the floor, m2.
-      real(wp), intent(in) :: area
       type(air_type), intent(in) :: air
       type(band_type), intent(in) :: band
       !> Transforms of the functions of x and of y.
       type(wave_series_type), intent(in) :: along, across
-      !> Integrals as in `add_strikes`.
-      real(wp), intent(out) :: power, velocity, total
+      type(sums_type), intent(out) :: sums
       type(transforms_type) :: transforms
-      real(wp), dimension(size(pole)) :: square, resistance, response
+      real(wp), allocatable :: response(:, :)
       real(wp) :: edge(2)
-      integer :: i, j, n
+      integer :: i, j
 
-      power = 0.0_wp
-      velocity = 0.0_wp
-      total = 0.0_wp
-      square = get_squares(shapes)
       do j = 1, n_wavenumber
          edge = get_interval(band, j)
+         sums%width = sums%width + 2*pi*(edge(2) - edge(1))
          transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
-         n = 0
-         do i = 1, size(shapes%block)
-            associate (block => shapes%block(i), n_mode => size(shapes%block(i)%coefficient, 2))
-               resistance(n + 1:n + n_mode) = get_powers(transforms, block%x, block%y, block%coefficient)
-               n = n + n_mode
+         do i = 1, size(coupled)
+            associate (these => coupled(i))
+               response = get_responses(pole(these%mode), 2*pi*edge)
+               sums%velocity = sums%velocity + sum(response*these%velocity)
+               sums%above = sums%above + sum(response*these%above)
+               if (these%is_orthogonal) then
+                  sums%power = sums%power + sum(get_diagonal(response*these%drive) &
+                     *get_powers(transforms, these%radiator%x, these%radiator%y, these%radiator%coefficient))
+               else
+                  sums%power = sums%power + sum(response*these%drive*get_pair_powers(transforms, these%radiator))
+               end if
             end associate
          end do
-         response = -square*aimag(get_integral(pole, 2*pi*edge(1), 2*pi*edge(2)))/pole%im
-         power = power + sum(response*resistance)
-         velocity = velocity + sum(response*square)
-         total = total + 2*pi*(edge(2) - edge(1))*area
       end do
    end subroutine add_modes
+
+   !> Integrals over frequencies of the real parts of r_k conjg(r_l), as in `get_amplitudes`, s:
+   !> [n_mode, n_mode].
+   pure function get_responses(pole, edge) result(response)
+      !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
+      complex(wp), intent(in) :: pole(:)
+      !> Lowest and highest angular frequency, rad/s.
+      real(wp), intent(in) :: edge(2)
+      real(wp) :: response(size(pole), size(pole))
+      complex(wp) :: integral(size(pole))
+      integer :: i
+
+      integral = get_integral(pole, edge(1), edge(2))
+      do i = 1, size(pole)
+         response(:, i) = real((integral - conjg(integral(i)))/(conjg(pole(i)) - pole), wp)
+      end do
+   end function get_responses
+
+   !> Diagonal of a matrix.
+   pure function get_diagonal(matrix) result(diagonal)
+      real(wp), intent(in) :: matrix(:, :)
+      real(wp) :: diagonal(size(matrix, 1))
+      integer :: i
+
+      diagonal = [(matrix(i, i), i=1, size(diagonal))]
+   end function get_diagonal
 
    !> Relative positions that fill a floor evenly (the R2 sequence of Roberts): [2, n].
    pure subroutine get_strike_points(n, strike)
@@ -477,7 +742,7 @@ contains
       real(wp) :: power(size(coefficient, 2))
       real(wp), allocatable :: velocity(:, :), wave(:, :)
       integer, allocatable :: in_x(:), in_y(:)
-      integer :: i, k, l, p, q
+      integer :: i, k, p, q
 
       power = 0.0_wp
       do p = 1, 2
@@ -487,15 +752,7 @@ contains
             in_y = pack([(k, k=1, size(y))], transforms%has_across(y, q))
             if (size(in_y) == 0) cycle
             associate (n_y => size(in_y), n_column => size(coefficient, 2))
-               if (allocated(velocity)) deallocate (velocity)
-               allocate (velocity(size(in_x), n_y*n_column))
-               do i = 1, n_column
-                  do k = 1, n_y
-                     do l = 1, size(in_x)
-                        velocity(l, (i - 1)*n_y + k) = coefficient(in_x(l) + (in_y(k) - 1)*size(x), i)
-                     end do
-                  end do
-               end do
+               velocity = get_some_coefficients(coefficient, size(x), in_x, in_y)
                wave = get_transposed_product(velocity, transforms%along(x(in_x), :, p))
                if (n_y == 1) then
                   power = power + matmul(wave**2, transforms%across(y(in_y(1)), y(in_y(1)), :, q))
@@ -509,5 +766,69 @@ contains
          end do
       end do
    end function get_powers
+
+   !> Coefficients of some of the functions: [n_in_x, n_in_y*n_column].
+   pure function get_some_coefficients(coefficient, n_x, in_x, in_y) result(some)
+      !> Coefficients of the products, x first: [n_x*n_y, n_column].
+      real(wp), intent(in) :: coefficient(:, :)
+      !> Number of the functions of x.
+      integer, intent(in) :: n_x
+      !> Positions of the functions in the lists of x and of y.
+      integer, intent(in) :: in_x(:), in_y(:)
+      real(wp) :: some(size(in_x), size(in_y)*size(coefficient, 2))
+      integer :: i, k, l
+
+      do i = 1, size(coefficient, 2)
+         do k = 1, size(in_y)
+            do l = 1, size(in_x)
+               some(l, (i - 1)*size(in_y) + k) = coefficient(in_x(l) + (in_y(k) - 1)*n_x, i)
+            end do
+         end do
+      end do
+   end function get_some_coefficients
+
+   !> Radiated powers over rho0 c0 of pairs of shapes, m4/s2: [n_mode, n_mode].
+   pure function get_pair_powers(transforms, shapes) result(power)
+      type(transforms_type), intent(in) :: transforms
+      type(block_shapes_type), intent(in) :: shapes
+      real(wp) :: power(size(shapes%coefficient, 2), size(shapes%coefficient, 2))
+      real(wp), allocatable :: velocity(:, :), wave(:, :), resistance(:, :), all_waves(:, :), weighted(:, :)
+      integer, allocatable :: in_x(:), in_y(:)
+      integer :: i, k, p, q
+
+      power = 0.0_wp
+      do p = 1, 2
+         in_x = pack([(k, k=1, size(shapes%x))], transforms%has_along(shapes%x, p))
+         if (size(in_x) == 0) cycle
+         do q = 1, 2
+            in_y = pack([(k, k=1, size(shapes%y))], transforms%has_across(shapes%y, q))
+            if (size(in_y) == 0) cycle
+            velocity = get_some_coefficients(shapes%coefficient, size(shapes%x), in_x, in_y)
+            associate (n_y => size(in_y), y => shapes%y(in_y), along => transforms%along(shapes%x(in_x), :, p))
+               if (size(in_x) == 1) then
+                  ! All modes have the same function of x.
+                  allocate (resistance(n_y, n_y), source=0.0_wp)
+                  do i = 1, size(along, 2)
+                     resistance = resistance + along(1, i)**2*transforms%across(y, y, i, q)
+                  end do
+                  velocity = reshape(velocity, [n_y, size(power, 1)])
+                  power = power + get_transposed_product(velocity, get_product(resistance, velocity))
+                  deallocate (resistance)
+                  cycle
+               end if
+               wave = get_transposed_product(velocity, along)
+               ! All angles at once, as one product of large matrices is faster.
+               allocate (all_waves(n_y*size(wave, 2), size(power, 1)), weighted(n_y*size(wave, 2), size(power, 1)))
+               do i = 1, size(wave, 2)
+                  velocity = reshape(wave(:, i), [n_y, size(power, 1)])
+                  all_waves((i - 1)*n_y + 1:i*n_y, :) = velocity
+                  weighted((i - 1)*n_y + 1:i*n_y, :) = get_product(transforms%across(y, y, i, q), velocity)
+               end do
+               power = power + get_transposed_product(all_waves, weighted)
+               deallocate (all_waves, weighted)
+            end associate
+         end do
+      end do
+   end function get_pair_powers
 
 end module thud_modal_radiation

@@ -16,9 +16,6 @@ module thud_sampled_modes
 
    public :: get_square_integrals, read_sampled_modes
 
-   !> Modes whose product has a smaller integral than this, relative to their squares, are orthogonal.
-   real(wp), parameter :: max_overlap = 0.05_wp
-
    !> Maximum size of a file, bytes.
    integer(int64), parameter :: max_size = 200000000_int64
 
@@ -104,25 +101,9 @@ contains
                shape%coefficient(:, i) = reshape(matmul(matmul(by_x, table%shape(:, :, order(i))), transpose(by_y)), &
                   [n_x*n_y])
             end do
-            modes%is_orthogonal = are_orthogonal(shape%coefficient)
          end associate
       end associate
    end subroutine get_sampled_modes
-
-   !> Whether modes are orthogonal over the area of the floor.
-   pure function are_orthogonal(coefficient) result(yes)
-      !> Coefficients of orthonormal functions: [n_function, n_mode].
-      real(wp), intent(in) :: coefficient(:, :)
-      logical :: yes
-      real(wp) :: norm(size(coefficient, 2))
-      integer :: i
-
-      norm = norm2(coefficient, dim=1)
-      yes = .true.
-      do i = 2, size(norm)
-         yes = yes .and. all(abs(matmul(coefficient(:, i), coefficient(:, :i - 1))) <= max_overlap*norm(i)*norm(:i - 1))
-      end do
-   end function are_orthogonal
 
    !> Integrals of the squared shapes over the floor for a modal mass of 1 kg, m2/kg: [n_mode].
    pure function get_square_integrals(modes) result(square)
