@@ -22,7 +22,7 @@ module thud_room
    private
 
    public :: check_below, check_below_subceiling, check_room, few_modes, get_completed_room, get_reverberation_times
-   public :: get_required_interval, get_room_bands, get_room_fields, get_room_level, judge_requirement, modal_radiation
+   public :: get_rated, get_room_bands, get_room_fields, get_room_level, judge_requirement, modal_radiation
    public :: room_level_type, room_type, standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
@@ -355,15 +355,16 @@ contains
       call add_history(energies, prediction)
    end subroutine get_room_level
 
-   !> Ends of the interval of the rating that is required, dB: that of both predictions of the one-third-octave bands, moved
-   !> by the difference of the statistical ratings.
-   pure function get_required_interval(room, prediction) result(ends)
-      !> A room with a requirement.
-      type(room_type), intent(in) :: room
+   !> A rating by the mean of both predictions, and the ends of its interval, not rounded, dB: those of `rated`, moved by the
+   !> difference of the statistical ratings.
+   pure function get_rated(prediction, name) result(rated)
       type(room_level_type), intent(in) :: prediction
-      real(wp) :: ends(2)
+      !> One of `rating_names`.
+      character(len=*), intent(in) :: name
+      !> Mean, lower and upper end.
+      real(wp) :: rated(3)
 
-      ends = prediction%interval + get_statistical(room%required_rating) - get_statistical('thirds')
+      rated = [prediction%rated, prediction%interval] + get_statistical(name) - get_statistical('thirds')
    contains
 
       !> A statistical rating, dB.
@@ -373,7 +374,7 @@ contains
 
          level = prediction%rating(findloc(rating_names == name, .true., dim=1))
       end function get_statistical
-   end function get_required_interval
+   end function get_rated
 
    !> Verdict on the requirement of a room: whether all levels of the interval, rounded, are at most the required one.
    pure function judge_requirement(room, prediction) result(verdict)
@@ -382,10 +383,10 @@ contains
       type(room_level_type), intent(in) :: prediction
       character(len=38) :: verdict
 
-      associate (ends => get_rounded(get_required_interval(room, prediction)))
+      associate (rated => get_rounded(get_rated(prediction, room%required_rating)))
          verdict = 'undecided'
-         if (ends(2) <= room%required) verdict = 'met'
-         if (ends(1) > room%required) verdict = 'not met'
+         if (rated(3) <= room%required) verdict = 'met'
+         if (rated(2) > room%required) verdict = 'not met'
          if (.not. prediction%source_conforms) verdict = 'undecided: the source does not conform'
       end associate
    end function judge_requirement

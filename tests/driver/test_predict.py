@@ -105,8 +105,11 @@ def test_tables_have_the_numbers_of_the_prediction(floor: PredictedFloor, tmp_pa
     ratings = {row["rating"]: row for row in read_table(files["ratings.csv"])}
     assert float(ratings["statistical prediction"]["value, dB"]) == prediction.rating.a_weighted
     assert float(ratings["prediction by modes"]["value, dB"]) == prediction.modal_rating.a_weighted
-    octaves = ratings["statistical, of octaves"]
-    assert float(octaves["value, dB"]) == prediction.octave_rating.a_weighted
+    for title, name in (("of octaves", "octaves"), ("standardized", "standardized")):
+        assert float(ratings[title]["value, dB"]) == prediction.rated_of(name)
+        # The mean of both predictions, moved by the difference of the statistical ratings.
+        moved = prediction.ratings[name].a_weighted - prediction.rating.a_weighted
+        assert prediction.rated_of(name) == pytest.approx(prediction.rated + moved)
     assert ratings["required"]["text"] == str(prediction.requirement)
 
 

@@ -237,7 +237,7 @@ def _ratings_text(prediction: RoomPrediction) -> str:
     words = [
         f"{prediction.rated_name} {prediction.rated_text}{iso_717}, {both}",
         f"octaves {prediction.octave_text}{korean}{known}",
-        f"standardized {prediction.standardized_rating.rounded} dB{iso_16283}",
+        f"standardized {prediction.standardized_text}{iso_16283}",
     ]
     required = prediction.requirement
     return "; ".join([*words, *([str(required)] if required else [])])

@@ -54,8 +54,8 @@ class FloorComparison(Displayed, Page):
         octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
         titles = (
             "", "floor", "force", "source", "L_iA,Fmax (ISO 717-2)", "by modes, dB",
-            "statistical, dB", "statistical, of octaves (KS F 2863-2)", "class (KS F 2863-2)",
-            "standardized (ISO 16283-2), dB", "required, dB", *octaves,
+            "statistical, dB", "of octaves (KS F 2863-2)", "class (KS F 2863-2)",
+            "standardized (ISO 16283-2)", "required, dB", *octaves,
             "energy into the bearing floor, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
         columns = (_column(*item) for item in self.predictions.items())
@@ -149,7 +149,7 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         prediction.octave_text,
         # In few words, as the columns are as wide as their cells.
         "not stated" if prediction.source_note else prediction.class_text.partition(" (")[0],
-        str(prediction.standardized_rating.rounded),
+        prediction.standardized_text,
         _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
         f"{1e3 * prediction.energy.sum():.3g}",

@@ -90,8 +90,7 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def rated_text(self) -> str:
         """Mean rating of both predictions with its interval, such as ``"57 dB (55 to 60)"``."""
-        low, high = map(rounded, self.interval)
-        return f"{rounded(self.rated)} dB ({low} to {high})"
+        return self._text_of("thirds")
 
     @property
     def is_ball(self) -> bool:
@@ -116,13 +115,21 @@ class RoomPrediction(RoomLevel, Displayed):
 
     @property
     def octave_text(self) -> str:
-        """Statistical rating of octaves with its interval, such as ``"59 dB (56 to 61)"``."""
-        low, high = map(rounded, self.interval_of("octaves"))
-        return f"{self.octave_rating.rounded} dB ({low} to {high})"
+        """Mean rating of octaves with its interval, such as ``"59 dB (56 to 61)"``."""
+        return self._text_of("octaves")
+
+    @property
+    def standardized_text(self) -> str:
+        """Mean rating of standardized bands with its interval."""
+        return self._text_of("standardized")
+
+    def _text_of(self, name: RoomRequiredRating) -> str:
+        low, high = map(rounded, self.interval_of(name))
+        return f"{rounded(self.rated_of(name))} dB ({low} to {high})"
 
     @property
     def class_text(self) -> str:
-        """Class of the statistical rating of octaves, and the classes of its interval.
+        """Class of the mean rating of octaves, and the classes of its interval.
 
         Instead the reason if the source does not conform; empty for the tyre.
         """
@@ -130,7 +137,7 @@ class RoomPrediction(RoomLevel, Displayed):
             return ""
         if self.source_note:
             return f"class not stated: {self.source_note}"
-        return class_range(self.octave_rating.korean_class or 0, self.interval_of("octaves"))
+        return class_range(self.rated_of("octaves"), self.interval_of("octaves"))
 
     @property
     def radiated_share(self) -> Array:
@@ -168,6 +175,10 @@ class RoomPrediction(RoomLevel, Displayed):
             "standardized": self.standardized_rating,
         }
 
+    def rated_of(self, name: RoomRequiredRating) -> float:
+        """Return a rating by the mean of both predictions, dB."""
+        return self.rated + self._shift(name)
+
     def interval_of(self, name: RoomRequiredRating) -> tuple[float, float]:
         """Return the interval of a rating, dB: that of both predictions, moved to the rating."""
         low, high = self.interval
@@ -185,7 +196,7 @@ class RoomPrediction(RoomLevel, Displayed):
             return None
         name = room.required_rating
         return Requirement(
-            name, room.required, self.rated + self._shift(name), self.interval_of(name),
+            name, room.required, self.rated_of(name), self.interval_of(name),
             self.source.limits_source or SOURCES[0], not self.source_warnings,
         )  # fmt: skip
 
@@ -291,8 +302,8 @@ class RoomPrediction(RoomLevel, Displayed):
         return (
             f"<RoomPrediction: {self.rated_name}{iso_717} {self.rated_text}{note}; "
             f"statistical {self.rating.rounded} dB, {modal}; "
-            f"statistical, of octaves{korean}, {self.octave_text}{classes}, "
-            f"standardized {self.standardized_rating.rounded} dB{iso_16283}"
+            f"of octaves{korean} {self.octave_text}{classes}; "
+            f"standardized{iso_16283} {self.standardized_text}"
             f"{f'; {required}' if required else ''}>"
         )
 

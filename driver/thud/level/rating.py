@@ -153,16 +153,16 @@ def class_name(korean_class: int) -> str:
     return f"class {CLASSES[korean_class]}" if korean_class else "no class"
 
 
-def class_range(korean_class: int, interval: tuple[float, float]) -> str:
-    """Return a class of KS F 2863-2, and the classes of the ends of an interval if they differ.
+def class_range(level: float, interval: tuple[float, float]) -> str:
+    """Return the class of a level by KS F 2863-2, and those of the ends of an interval if they differ.
 
-    >>> class_range(4, (46.0, 48.0)), class_range(0, (47.2, 58.0))
+    >>> class_range(47.0, (46.0, 48.0)), class_range(52.6, (47.2, 58.0))
     ('class 4 (at most 49 dB)', 'no class; interval: class 4 to no class')
     """
-    ends = [
-        next((i for i, limit in enumerate(CLASS_LIMITS, 1) if meets(end, limit)), 0)
-        for end in interval
-    ]
+    korean_class, *ends = (
+        next((i for i, limit in enumerate(CLASS_LIMITS, 1) if meets(value, limit)), 0)
+        for value in (level, *interval)
+    )
     if {*ends} == {korean_class}:
         return class_text(korean_class)
     names = " to ".join(dict.fromkeys(map(class_name, ends)))

@@ -158,9 +158,12 @@ class PredictedFloor:
                 _rating_entry("by modes, clamped", "ISO 717-2", prediction.clamped_level),
             ]
         result += [
-            _rating_entry("statistical, standardized", "ISO 16283-2", prediction.standardized),
             (
-                "statistical, of octaves", "KS F 2863-2", prediction.octave_rating.a_weighted,
+                "standardized", "ISO 16283-2", prediction.rated_of("standardized"),
+                prediction.standardized_text,
+            ),
+            (
+                "of octaves", "KS F 2863-2", prediction.rated_of("octaves"),
                 f"{prediction.octave_text}{known}",
             ),
         ]  # fmt: skip

@@ -7,7 +7,7 @@ module thud_room_report
    use thud_kinds, only: wp
    use thud_rating, only: class_limits, get_a_weighted_level, get_class, get_rounded, rating_names, rating_titles
    use thud_report, only: line
-   use thud_room, only: few_modes, get_required_interval, judge_requirement, room_level_type
+   use thud_room, only: few_modes, get_rated, judge_requirement, room_level_type
    use thud_room_prediction, only: contribution_names
    use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, significant, to_text
    implicit none (type, external)
@@ -122,8 +122,14 @@ contains
       character(len=1) :: separator
       integer :: i
 
-      text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%rated))//' dB (' &
-         //get_range_text(prediction%interval)//'), of one-third octaves, ISO 717-2'//newline//'  statistical ' &
+      text = text//newline//'  Means of both predictions, with their intervals:'//newline
+      do i = 1, size(rating_names)
+         associate (rated => get_rated(prediction, rating_names(i)))
+            text = text//'  '//rating_titles(i)//to_text(get_rounded(rated(1)))//' dB ('//get_range_text(rated(2:))//')'//newline
+            if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, rated(1))
+         end associate
+      end do
+      text = text//'  Of one-third octaves: statistical ' &
          //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, '
       if (prediction%n_modal > 0) then
          text = text//'modal ' &
@@ -141,20 +147,14 @@ contains
             //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
          separator = ','
       end do
-      text = text//' dB'//newline//'  Statistical:'//newline
-      do i = 1, size(rating_names)
-         text = text//'  '//rating_titles(i)//to_text(get_rounded(prediction%rating(i)))//' dB (' &
-            //fixed(prediction%rating(i), 2)//')'
-         text = text//newline
-         if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, prediction%rating(i))
-      end do
+      text = text//' dB'//newline
       if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
          //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
          //' %, from the walls the rest.'//newline
-      associate (room => case%room)
+      associate (room => case%room, required => get_rated(prediction, case%room%required_rating))
          if (room%required > 0.0_wp) text = text//'  Required of '//trim(room%required_rating)//': at most ' &
             //to_text(room%required)//' dB: '//trim(judge_requirement(room, prediction))//' (' &
-            //get_range_text(get_required_interval(room, prediction))//').'//newline
+            //get_range_text(required(2:))//').'//newline
       end associate
       text = text//'  Statistical means over positions, by the ' &
          //trim(merge('contact force', 'blocked force', coupled))//'.'//newline
@@ -205,21 +205,24 @@ contains
       type(room_level_type), intent(in) :: prediction
       !> The group.
       character(len=:), allocatable :: text
+      real(wp) :: rated(3)
 
       text = newline//'&room_summary'//newline//line('rating', join_quoted(rating_names), '') &
-         //line('meaning', join_quoted(rating_titles), '')//line('level', join(prediction%rating), 'dB') &
+         //line('meaning', join_quoted(rating_titles), '')//line('level', join(prediction%rating), 'dB, statistical') &
          //line('rounded', join(real(get_rounded(prediction%rating), wp)), 'dB')
+      rated = get_rated(prediction, rating_names(1))
       if (has_class(case, prediction)) text = text &
-         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none')
+         //line('class', to_text(get_class(rated(1))), 'of octaves, KS F 2863-2; 0: none')
       text = text//line('rated', to_text(prediction%rated), 'dB, mean of both predictions, ISO 717-2') &
          //line('interval', join(prediction%interval), 'dB')
       if (prediction%n_modal > 0) text = text//line('modal', &
          to_text(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level)), 'dB, by the modes, ISO 717-2')
       text = text//line('contribution', join_quoted(contribution_names), '') &
          //line('lower', join(prediction%contribution(1, :)), 'dB')//line('upper', join(prediction%contribution(2, :)), 'dB')
+      rated = get_rated(prediction, case%room%required_rating)
       if (case%room%required > 0.0_wp) text = text//line('required', to_text(case%room%required), 'dB') &
          //line('required_rating', quoted(case%room%required_rating), '') &
-         //line('required_interval', join(get_required_interval(case%room, prediction)), 'dB') &
+         //line('required_interval', join(rated(2:)), 'dB') &
          //line('verdict', quoted(judge_requirement(case%room, prediction)), '')
       text = text//'/'//newline
    end function get_room_summary
