@@ -9,7 +9,7 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, point_spring_type, ribs_type, rigid_support
-   public :: get_counts, get_resolved_frequency, has_sines, is_uncoupled
+   public :: get_counts, get_degree, get_resolved_frequency, has_sines, is_uncoupled
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -18,6 +18,9 @@ module thud_plate_stack
    !> are, if only those along the width are, and if none is. The first four take about as long.
    integer, parameter :: max_coupled(0:2) = [700, 1100, 1700]
    integer, parameter :: max_half_coupled = 6000, max_uncoupled = 100000
+
+   !> Ratio of the number of modes of a beam to that of the half waves which they resolve.
+   real(wp), parameter :: beam_ratio = 1.2_wp
 
    !> Springs along an edge of a plate.
    type :: edge_type
@@ -190,12 +193,23 @@ contains
          half = min(half, many)
          if (has_sines(plate, i)) then
             n(i) = 4 + int(2*half/pi)
+         else if (maxval(plate%shear) > 0.0_wp) then
+            n(i) = get_degree(half)
          else
-            ! A wave of half the length `half` in radians has Legendre coefficients up to this degree.
-            n(i) = 8 + int(half + 4*half**(1.0_wp/3))
+            ! Modes of a beam lack the coupling of both curvatures at free edges: some more.
+            n(i) = 4 + int(beam_ratio*2*half/pi)
          end if
       end do
    end function get_counts
+
+   !> Degree of the polynomials that resolve a wave: its Legendre coefficients end about there.
+   elemental function get_degree(half) result(degree)
+      !> Phase of the wave over half the length, rad.
+      real(wp), intent(in) :: half
+      integer :: degree
+
+      degree = 8 + int(half + 4*half**(1.0_wp/3))
+   end function get_degree
 
    !> Whether both ends of a plate in one direction are simply supported, without further supports.
    pure function has_sines(plate, direction) result(yes)

@@ -1,11 +1,12 @@
 !> Modes of plates above each other, with ribs and resilient layers, as a Ritz system. The rotations of plates that are not
 !> rigid in shear (Mindlin) are static displacements.
 module thud_stack_modes
+   use thud_constants, only: pi
    use thud_function_set, only: amplitudes, cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
-   use thud_plate_stack, only: get_counts, get_resolved_frequency, has_sines, layer_type, orthotropic_type, &
-      plate_stack_type, ribs_type, rigid_support
+   use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, has_sines, layer_type, &
+      orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
       solve_ritz_system
    implicit none (type, external)
@@ -93,7 +94,7 @@ contains
    end function get_amplitudes
 
    !> Functions of the deflection and the rotations of a plate.
-   pure function new_motion(stack, plate, frequency) result(motion)
+   function new_motion(stack, plate, frequency) result(motion)
       type(plate_stack_type), intent(in) :: stack
       type(orthotropic_type), intent(in) :: plate
       !> Frequency up to which waves are resolved, Hz.
@@ -102,10 +103,14 @@ contains
       type(function_set_type) :: deflection(2), rotation(2)
       real(wp), allocatable :: lines(:)
       real(wp) :: sides(2)
-      integer :: n(2)
+      integer :: n(2), degree(2)
+      logical :: is_thin
       integer :: i
 
       n = get_counts(stack, plate, frequency)
+      is_thin = .not. maxval(plate%shear) > 0.0_wp
+      degree = n
+      if (is_thin) degree = get_degree((n + 2)*pi/2)
       sides = [stack%length, stack%width]
       do i = 1, 2
          if (has_sines(plate, i)) then
@@ -119,16 +124,90 @@ contains
          associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])
             associate (fixed => [pack(ends, edge%deflection >= rigid_support), lines], &
                clamped => pack(ends, edge%rotation >= rigid_support))
-               deflection(i) = new_polynomials(sides(i), n(i) + size(fixed) + size(clamped), [fixed, clamped], &
+               deflection(i) = new_polynomials(sides(i), degree(i) + size(fixed) + size(clamped), [fixed, clamped], &
                   [spread(0, 1, size(fixed)), spread(1, 1, size(clamped))])
-               rotation(i) = new_polynomials(sides(i), n(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
+               rotation(i) = new_polynomials(sides(i), degree(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
             end associate
+            if (is_thin) call keep_beam_modes(deflection(i), edge, merge(plate%along, plate%across, i == 1), n(i))
          end associate
       end do
       motion%deflection = product_type(deflection(1), deflection(2))
       motion%rotation_x = product_type(rotation(1), deflection(2), is_static=.true.)
       motion%rotation_y = product_type(deflection(1), rotation(2), is_static=.true.)
    end function new_motion
+
+   !> Replaces polynomials by the lowest modes of a beam, which are far fewer for the same waves.
+   subroutine keep_beam_modes(set, edge, bending, n)
+      type(function_set_type), intent(inout) :: set
+      !> Springs at both ends.
+      type(edge_type), intent(in) :: edge(2)
+      !> Bending stiffness per width, N m.
+      real(wp), intent(in) :: bending
+      !> Number of modes.
+      integer, intent(in) :: n
+      real(wp), parameter :: unit(1, 1) = 1.0_wp
+      type(ritz_system_type) :: system
+      type(modes_type) :: modes
+      real(wp), allocatable :: shape(:, :), omega(:), ends(:, :), added(:, :)
+      logical, allocatable :: kept(:)
+      integer, allocatable :: chosen(:)
+      logical :: failed
+      integer :: i, j, number, order, parity
+
+      call add_displacement(system, product_type(set, function_set_type(cosines, 1.0_wp, 1)), number)
+      ! With the mass B per length, angular frequencies are squared wavenumbers.
+      call add_stiffness(system, 1, 1, bending, get_overlap(set, 2, set, 2), unit, 0.0_wp)
+      call add_mass(system, 1, 1, bending, get_overlap(set, 0, set, 0), unit)
+      do order = 0, 1
+         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0))
+      end do
+      call solve_ritz_system(system, modes, failed)
+      if (failed) return
+      allocate (shape(set%count, set%count), source=0.0_wp)
+      allocate (omega(0))
+      do i = 1, size(modes%block)
+         associate (block => modes%block(i))
+            shape(block%shape(1)%x, size(omega) + 1:size(omega) + size(block%omega)) = sqrt(bending)*block%shape(1)%coefficient
+            omega = [omega, block%omega]
+         end associate
+      end do
+      set%coefficient = matmul(set%coefficient, shape)
+      allocate (kept(set%count), source=.false.)
+      do i = 1, n
+         j = minloc(omega, dim=1, mask=.not. kept)
+         kept(j) = .true.
+      end do
+      set%complete = sqrt(maxval(omega, mask=kept)) + pi/(2*set%length)
+      chosen = pack([(i, i=1, set%count)], kept)
+      ! What the other modes add to the deflection under forces and moments at the ends, even and odd.
+      added = reshape([real(wp) ::], [set%count, 0])
+      do order = 0, 1
+         ends = get_functions(set, [0.0_wp, set%length], order)
+         do parity = -1, 1, 2
+            call add_deflection(merge(0.0_wp, (ends(1, :) + parity*ends(2, :))/max(omega, tiny(omega))**2, kept), order)
+         end do
+      end do
+      added = matmul(set%coefficient, added)
+      set%coefficient(:, :n) = set%coefficient(:, chosen)
+      set%count = n + size(added, 2)
+      set%coefficient(:, n + 1:set%count) = added
+      set%coefficient = set%coefficient(:, :set%count)
+   contains
+
+      !> Adds a sum of modes, made orthogonal to those that were added, unless it is too small or depends on them.
+      subroutine add_deflection(deflection, order)
+         real(wp), intent(in) :: deflection(:)
+         !> Order of the derivative on which the load acts.
+         integer, intent(in) :: order
+         real(wp) :: rest(size(deflection))
+
+         rest = deflection - matmul(added, matmul(transpose(added), deflection))
+         rest = rest - matmul(added, matmul(transpose(added), rest))
+         ! Compared with the deflection of a beam as long as a wave.
+         if (norm2(rest) < 1.0e-4_wp*set%complete**(order - 3.5_wp)) return
+         added = reshape([added, rest/norm2(rest)], [size(added, 1), size(added, 2) + 1])
+      end subroutine add_deflection
+   end subroutine keep_beam_modes
 
    !> Stiffness and mass of a plate that is rigid in shear (Kirchhoff).
    subroutine add_thin_plate(system, plate, motion)
