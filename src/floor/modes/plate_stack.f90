@@ -9,7 +9,7 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, point_spring_type, ribs_type, rigid_support
-   public :: get_counts, get_degree, get_resolved_frequency, has_sines, is_uncoupled
+   public :: get_counts, get_degree, get_resolved_frequency, has_sines, is_uncoupled, with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -89,6 +89,25 @@ module thud_plate_stack
    end type plate_stack_type
 
 contains
+
+   !> A stack whose stiffest edges are rigid: springs against rotation from 1e7 B/l and against deflection from 1e10 B/l**3
+   !> on change frequencies by less than 1e-6, but would be lost in the rounding of the largest stiffness.
+   pure function with_rigid_edges(stack) result(held)
+      type(plate_stack_type), intent(in) :: stack
+      type(plate_stack_type) :: held
+      real(wp) :: bending(4), side(4)
+      integer :: i
+
+      held = stack
+      side = [stack%length, stack%length, stack%width, stack%width]
+      do i = 1, size(held%plate)
+         associate (plate => held%plate(i))
+            bending = [plate%along, plate%along, plate%across, plate%across]
+            where (plate%edge%rotation >= 1.0e7_wp*bending/side) plate%edge%rotation = rigid_support
+            where (plate%edge%deflection >= 1.0e10_wp*bending/side**3) plate%edge%deflection = rigid_support
+         end associate
+      end do
+   end function with_rigid_edges
 
    !> Frequency up to which the functions of a stack resolve its waves, Hz.
    pure function get_resolved_frequency(stack, max_frequency) result(frequency)
