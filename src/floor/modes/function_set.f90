@@ -242,6 +242,15 @@ contains
       end do
    end function get_functions
 
+   !> Number of the elementary functions of a set: at least as many as it has.
+   elemental function get_order(set) result(order)
+      type(function_set_type), intent(in) :: set
+      integer :: order
+
+      order = set%count
+      if (set%kind == polynomials) order = max(order, size(set%coefficient, 1))
+   end function get_order
+
    !> Points and weights of a quadrature on an interval that integrates products of two functions.
    pure subroutine get_quadrature(count, from, to, point, weight)
       !> Number of points; the number of the functions plus 20 integrates their products to rounding.
@@ -281,7 +290,7 @@ contains
       ends = [0.0_wp, first%length]
       if (present(from)) ends(1) = from
       if (present(to)) ends(2) = to
-      call get_quadrature(first%count + second%count + 20, ends(1), ends(2), point, weight)
+      call get_quadrature(get_order(first) + get_order(second) + 20, ends(1), ends(2), point, weight)
       associate (left => get_functions(first, point, first_order), right => get_functions(second, point, second_order))
          overlap = get_transposed_product(left*spread(weight, 2, first%count), right)
       end associate

@@ -9,7 +9,8 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, point_spring_type, ribs_type, rigid_support
-   public :: get_counts, get_degree, get_resolved_frequency, has_sines, is_uncoupled, with_rigid_edges
+   public :: get_counts, get_degree, get_resolved_frequency, get_twisting_ribs, has_sines, is_uncoupled
+   public :: with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -218,8 +219,26 @@ contains
             ! Modes of a beam lack the coupling of both curvatures at free edges: some more.
             n(i) = 4 + int(beam_ratio*2*half/pi)
          end if
+         n(i) = n(i) + size(get_twisting_ribs(plate, i))
       end do
    end function get_counts
+
+   !> Positions of ribs across a direction that resist torsion, of a plate that is rigid in shear, m: [n_rib].
+   pure function get_twisting_ribs(plate, direction) result(position)
+      type(orthotropic_type), intent(in) :: plate
+      !> 1: along the length, 2: along the width.
+      integer, intent(in) :: direction
+      real(wp), allocatable :: position(:)
+      integer :: i
+
+      allocate (position(0))
+      if (.not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
+      do i = 1, size(plate%ribs)
+         associate (ribs => plate%ribs(i))
+            if (ribs%torsion > 0.0_wp .and. (ribs%along_width .eqv. direction == 1)) position = [position, ribs%position]
+         end associate
+      end do
+   end function get_twisting_ribs
 
    !> Degree of the polynomials that resolve a wave: its Legendre coefficients end about there.
    elemental function get_degree(half) result(degree)
