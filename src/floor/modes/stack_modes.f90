@@ -9,13 +9,11 @@ module thud_stack_modes
       layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
       solve_ritz_system
+   use thud_truncated_compliance, only: rib_ratio
    implicit none (type, external)
    private
 
    public :: get_stack_modes
-
-   !> Ratio of the shortest waves at ribs that resist torsion to those that are complete.
-   real(wp), parameter :: rib_ratio = 2.5_wp
 
    !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
    type :: plate_motion_type
