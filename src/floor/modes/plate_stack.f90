@@ -223,7 +223,7 @@ contains
       end do
    end function get_counts
 
-   !> Positions of ribs across a direction that resist torsion, of a plate that is rigid in shear, m: [n_rib].
+   !> Positions of ribs across a direction that resist rotation, of a plate that is rigid in shear, m: [n_rib].
    pure function get_twisting_ribs(plate, direction) result(position)
       type(orthotropic_type), intent(in) :: plate
       !> 1: along the length, 2: along the width.
@@ -235,7 +235,8 @@ contains
       if (.not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
       do i = 1, size(plate%ribs)
          associate (ribs => plate%ribs(i))
-            if (ribs%torsion > 0.0_wp .and. (ribs%along_width .eqv. direction == 1)) position = [position, ribs%position]
+            if (ribs%along_width .neqv. direction == 1) cycle
+            if (max(ribs%torsion, ribs%inertia) > 0.0_wp) position = [position, ribs%position]
          end associate
       end do
    end function get_twisting_ribs
