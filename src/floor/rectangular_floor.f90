@@ -27,6 +27,9 @@ module thud_rectangular_floor
    !> Minimum distance of the source from a rigid line, m: the radius of the contact.
    real(wp), parameter :: min_distance = 0.05_wp
 
+   !> Minimum distance of two rigid lines, m: less than any wall or beam is thick.
+   real(wp), parameter :: min_line_distance = 0.01_wp
+
    !> Numbers of octaves and one-third-octave bands of a rating.
    integer, parameter :: octave_bands = 4, third_bands = 12
 
@@ -162,6 +165,8 @@ contains
       call check_positions(options%line_y, 'line_y', base%plate%width)
       call check_positions(options%screed%bridge_x, 'bridge_x', base%plate%length)
       call check_positions(options%screed%bridge_y, 'bridge_y', base%plate%width)
+      call check_distances(options%line_x, 'line_x')
+      call check_distances(options%line_y, 'line_y')
       associate (source => options%get_source())
          call check_source(options%line_x, 'line_x', source(1)*base%plate%length)
          call check_source(options%line_y, 'line_y', source(2)*base%plate%width)
@@ -200,6 +205,23 @@ contains
          edge = get_edges(options, options%support)
          yes = all(edge%deflection <= 0.0_wp)
       end function is_loose
+
+      !> Checks that no two lines coincide, which would support the floor once, but count twice.
+      subroutine check_distances(list, key)
+         type(list_type), intent(in) :: list
+         character(len=*), intent(in) :: key
+         integer :: i
+
+         if (allocated(error)) return
+         do i = 2, list%count
+            associate (line => list%values(i))
+               if (all(abs(list%values(:i - 1) - line) >= min_line_distance)) cycle
+               error = input_error('&'//trim(base%group)//': '//key//' = '//to_text(line)//' m is stated twice, or within ' &
+                  //to_text(1000*min_line_distance)//' mm of another value; allowed: each line once')
+               return
+            end associate
+         end do
+      end subroutine check_distances
 
       !> Checks that the source does not lie on a rigid line.
       subroutine check_source(list, key, source)
@@ -286,22 +308,8 @@ contains
       call options%get_modes(group, plate, modes, error)
       if (allocated(error)) return
       if (options%screed%thickness > 0.0_wp) plate = get_screed_plate(options%screed, plate)
-      associate (upper => modes%stack%plate(1))
-         call new_floor_receiver(trim(group), modes, get_resistance(plate)*get_rib_factor(upper, plate), source, point, &
-            receiver, error)
-      end associate
+      call new_floor_receiver(trim(group), modes, get_resistance(plate), source, point, receiver, error)
    end subroutine get_mobility_at
-
-   !> Ratio of the resistance of the plate between ribs to that of the plate with smeared ribs.
-   pure function get_rib_factor(upper, plate) result(factor)
-      type(orthotropic_type), intent(in) :: upper
-      !> The plate with smeared ribs.
-      type(plate_type), intent(in) :: plate
-      real(wp) :: factor
-
-      factor = 1.0_wp
-      if (allocated(upper%ribs)) factor = 8*sqrt(sqrt(upper%along*upper%across)*upper%mass)/get_resistance(plate)
-   end function get_rib_factor
 
    !> Relative position of the source.
    function get_source(options) result(source)

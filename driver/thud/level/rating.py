@@ -154,7 +154,7 @@ def class_name(korean_class: int) -> str:
 
 
 def class_range(level: float, interval: tuple[float, float]) -> str:
-    """Return the class of a level by KS F 2863-2, and those of the ends of an interval if they differ.
+    """Return the class of a level by KS F 2863-2, and those of its interval if they differ.
 
     >>> class_range(47.0, (46.0, 48.0)), class_range(52.6, (47.2, 58.0))
     ('class 4 (at most 49 dB)', 'no class; interval: class 4 to no class')

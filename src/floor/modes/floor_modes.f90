@@ -2,13 +2,15 @@
 module thud_floor_modes
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
+   use thud_function_set, only: get_highest_wavenumber
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_total_loss, plate_type
-   use thud_plate_stack, only: is_uncoupled, plate_stack_type
+   use thud_plate_stack, only: is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
    use thud_ritz_system, only: get_mode_values, modes_type
    use thud_stack_modes, only: get_stack_modes
+   use thud_truncated_compliance, only: get_truncated_compliance
    implicit none (type, external)
    private
 
@@ -62,15 +64,17 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Frequency up to which modes are wanted, Hz (default: `mode_limit`, and beyond for the static compliance).
       real(wp), intent(in), optional :: max_frequency
+      type(plate_stack_type) :: held
       real(wp), allocatable :: share(:), frequency(:), key(:)
       real(wp) :: wanted, resolved
       integer :: i
       logical :: failed
 
+      held = with_rigid_edges(stack)
       wanted = mode_limit*resolution
-      if (is_uncoupled(stack) .and. .not. has_shear(stack)) wanted = mode_limit*sum_limit_factor
+      if (is_uncoupled(held) .and. .not. has_shear(held)) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
-      allocate (key, source=[wanted, get_key(stack, bearing)])
+      allocate (key, source=[wanted, get_key(held, bearing)])
       do i = 1, size(cached)
          if (.not. allocated(cached(i)%key)) exit
          if (size(key) /= size(cached(i)%key)) cycle
@@ -79,8 +83,8 @@ contains
             return
          end if
       end do
-      modes%stack = stack
-      call get_stack_modes(stack, wanted, modes%modes, resolved, failed)
+      modes%stack = held
+      call get_stack_modes(held, wanted, modes%modes, resolved, failed)
       if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
          return
@@ -160,19 +164,29 @@ contains
       real(wp), allocatable :: value(:, :), gain(:)
       logical, allocatable :: individual(:)
       real(wp) :: compliance
+      logical :: has_all
 
-      associate (length => modes%stack%length, width => modes%stack%width, omega => modes%omega)
+      ! Sums of functions are stopped at a frequency, or have the compliance of all their modes.
+      has_all = .not. (is_uncoupled(modes%stack) .or. has_shear(modes%stack))
+      associate (length => modes%stack%length, width => modes%stack%width, omega => modes%omega, &
+         set => modes%modes%displacement(1))
          call get_mode_values(modes%modes, 1, length*[source(1), point(1)], width*[source(2), point(2)], value)
          gain = value(:, 1)*value(:, 2)
          individual = omega < modes%limit
-         ! Uncoupled modes are complete up to the limit of the sum, coupled ones have all modes of the functions.
-         compliance = sum(gain/max(omega, 1.0_wp)**2, mask=.not. individual &
-            .and. (omega < modes%sum_limit .or. .not. is_uncoupled(modes%stack)))
+         compliance = sum(gain/max(omega, 1.0_wp)**2, mask=.not. individual .and. (omega < modes%sum_limit .or. has_all))
+         ! Shorter waves cancel on average, except at the source.
+         if (any(abs(source - point) >= epsilon(1.0_wp))) then
+            continue
+         else if (has_all) then
+            compliance = compliance + get_truncated_compliance(modes%stack%plate(1), &
+               get_highest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
+         else
+            compliance = compliance + 2/(pi*resistance*modes%sum_limit)
+         end if
       end associate
-      ! Above the sum, the modes cancel on average, except at the source.
-      if (all(abs(source - point) < epsilon(1.0_wp))) compliance = compliance + 2/(pi*resistance*modes%sum_limit)
       ! With the mode density n(omega) and the compliance 1/(m'' S omega**2) of each (S: area), the residual modes have the
       ! compliance 2/(pi Z limit), averaged over positions; with this corner their conductance is 1/Z at high frequencies.
+      ! On a joist the compliance, and so the conductance, is that of joist and plate.
       call new_modal_receiver(group, pack(gain, individual), pack(modes%omega, individual), &
          pack(modes%loss_factor, individual), [compliance, pi/(2*sqrt(2.0_wp))*modes%limit], receiver, error)
    end subroutine new_floor_receiver

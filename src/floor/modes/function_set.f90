@@ -8,8 +8,8 @@ module thud_function_set
    implicit none (type, external)
    private
 
-   public :: amplitudes, cosines, function_set_type, get_functions, get_overlap, get_quadrature, new_polynomials, new_splines
-   public :: sines
+   public :: amplitudes, cosines, function_set_type, get_functions, get_highest_wavenumber, get_overlap, get_quadrature
+   public :: new_polynomials, new_splines, sines
 
    !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
    !> rotations of simply supported plates, polynomials, amplitudes of separate members without values between them, and
@@ -33,9 +33,20 @@ module thud_function_set
       !> Nodes of splines, m: [count], and second derivatives there of the splines that are 1 at one node, 1/m2:
       !> [count, count].
       real(wp), allocatable :: node(:), curvature(:, :)
+      !> Wavenumber up to which polynomials that are modes of a beam are complete, 1/m.
+      real(wp) :: complete = 0.0_wp
    end type function_set_type
 
 contains
+
+   !> Wavenumber up to which sines, or modes of a beam, are complete, 1/m.
+   elemental function get_highest_wavenumber(set) result(wavenumber)
+      type(function_set_type), intent(in) :: set
+      real(wp) :: wavenumber
+
+      wavenumber = set%complete
+      if (set%kind == sines) wavenumber = (set%count + 0.5_wp)*pi/set%length
+   end function get_highest_wavenumber
 
    !> Polynomials up to a degree that fulfill constraints: at each position, the derivative of the given order is 0.
    !>
@@ -231,6 +242,15 @@ contains
       end do
    end function get_functions
 
+   !> Number of the elementary functions of a set: at least as many as it has.
+   elemental function get_order(set) result(order)
+      type(function_set_type), intent(in) :: set
+      integer :: order
+
+      order = set%count
+      if (set%kind == polynomials) order = max(order, size(set%coefficient, 1))
+   end function get_order
+
    !> Points and weights of a quadrature on an interval that integrates products of two functions.
    pure subroutine get_quadrature(count, from, to, point, weight)
       !> Number of points; the number of the functions plus 20 integrates their products to rounding.
@@ -270,7 +290,7 @@ contains
       ends = [0.0_wp, first%length]
       if (present(from)) ends(1) = from
       if (present(to)) ends(2) = to
-      call get_quadrature(first%count + second%count + 20, ends(1), ends(2), point, weight)
+      call get_quadrature(get_order(first) + get_order(second) + 20, ends(1), ends(2), point, weight)
       associate (left => get_functions(first, point, first_order), right => get_functions(second, point, second_order))
          overlap = get_transposed_product(left*spread(weight, 2, first%count), right)
       end associate

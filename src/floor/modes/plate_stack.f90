@@ -9,7 +9,8 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, point_spring_type, ribs_type, rigid_support
-   public :: get_counts, get_resolved_frequency, has_sines, is_uncoupled
+   public :: get_counts, get_degree, get_resolved_frequency, get_twisting_ribs, has_sines, is_uncoupled
+   public :: with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -18,6 +19,9 @@ module thud_plate_stack
    !> are, if only those along the width are, and if none is. The first four take about as long.
    integer, parameter :: max_coupled(0:2) = [700, 1100, 1700]
    integer, parameter :: max_half_coupled = 6000, max_uncoupled = 100000
+
+   !> Ratio of the number of modes of a beam to that of the half waves which they resolve.
+   real(wp), parameter :: beam_ratio = 1.2_wp
 
    !> Springs along an edge of a plate.
    type :: edge_type
@@ -86,6 +90,25 @@ module thud_plate_stack
    end type plate_stack_type
 
 contains
+
+   !> A stack whose stiffest edges are rigid: springs against rotation from 1e7 B/l and against deflection from 1e10 B/l**3
+   !> on change frequencies by less than 1e-6, but would be lost in the rounding of the largest stiffness.
+   pure function with_rigid_edges(stack) result(held)
+      type(plate_stack_type), intent(in) :: stack
+      type(plate_stack_type) :: held
+      real(wp) :: bending(4), side(4)
+      integer :: i
+
+      held = stack
+      side = [stack%length, stack%length, stack%width, stack%width]
+      do i = 1, size(held%plate)
+         associate (plate => held%plate(i))
+            bending = [plate%along, plate%along, plate%across, plate%across]
+            where (plate%edge%rotation >= 1.0e7_wp*bending/side) plate%edge%rotation = rigid_support
+            where (plate%edge%deflection >= 1.0e10_wp*bending/side**3) plate%edge%deflection = rigid_support
+         end associate
+      end do
+   end function with_rigid_edges
 
    !> Frequency up to which the functions of a stack resolve its waves, Hz.
    pure function get_resolved_frequency(stack, max_frequency) result(frequency)
@@ -190,12 +213,42 @@ contains
          half = min(half, many)
          if (has_sines(plate, i)) then
             n(i) = 4 + int(2*half/pi)
+         else if (maxval(plate%shear) > 0.0_wp) then
+            n(i) = get_degree(half)
          else
-            ! A wave of half the length `half` in radians has Legendre coefficients up to this degree.
-            n(i) = 8 + int(half + 4*half**(1.0_wp/3))
+            ! Modes of a beam lack the coupling of both curvatures at free edges: some more.
+            n(i) = 4 + int(beam_ratio*2*half/pi)
          end if
+         n(i) = n(i) + size(get_twisting_ribs(plate, i))
       end do
    end function get_counts
+
+   !> Positions of ribs across a direction that resist rotation, of a plate that is rigid in shear, m: [n_rib].
+   pure function get_twisting_ribs(plate, direction) result(position)
+      type(orthotropic_type), intent(in) :: plate
+      !> 1: along the length, 2: along the width.
+      integer, intent(in) :: direction
+      real(wp), allocatable :: position(:)
+      integer :: i
+
+      allocate (position(0))
+      if (.not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
+      do i = 1, size(plate%ribs)
+         associate (ribs => plate%ribs(i))
+            if (ribs%along_width .neqv. direction == 1) cycle
+            if (max(ribs%torsion, ribs%inertia) > 0.0_wp) position = [position, ribs%position]
+         end associate
+      end do
+   end function get_twisting_ribs
+
+   !> Degree of the polynomials that resolve a wave: its Legendre coefficients end about there.
+   elemental function get_degree(half) result(degree)
+      !> Phase of the wave over half the length, rad.
+      real(wp), intent(in) :: half
+      integer :: degree
+
+      degree = 8 + int(half + 4*half**(1.0_wp/3))
+   end function get_degree
 
    !> Whether both ends of a plate in one direction are simply supported, without further supports.
    pure function has_sines(plate, direction) result(yes)

@@ -1,13 +1,15 @@
 !> Modes of plates above each other, with ribs and resilient layers, as a Ritz system. The rotations of plates that are not
 !> rigid in shear (Mindlin) are static displacements.
 module thud_stack_modes
+   use thud_constants, only: pi
    use thud_function_set, only: amplitudes, cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
-   use thud_plate_stack, only: get_counts, get_resolved_frequency, has_sines, layer_type, orthotropic_type, &
-      plate_stack_type, ribs_type, rigid_support
+   use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, get_twisting_ribs, has_sines, &
+      layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
       solve_ritz_system
+   use thud_truncated_compliance, only: rib_ratio
    implicit none (type, external)
    private
 
@@ -93,42 +95,134 @@ contains
    end function get_amplitudes
 
    !> Functions of the deflection and the rotations of a plate.
-   pure function new_motion(stack, plate, frequency) result(motion)
+   function new_motion(stack, plate, frequency) result(motion)
       type(plate_stack_type), intent(in) :: stack
       type(orthotropic_type), intent(in) :: plate
       !> Frequency up to which waves are resolved, Hz.
       real(wp), intent(in) :: frequency
       type(plate_motion_type) :: motion
       type(function_set_type) :: deflection(2), rotation(2)
-      real(wp), allocatable :: lines(:)
+      real(wp), allocatable :: lines(:), twisting(:)
       real(wp) :: sides(2)
-      integer :: n(2)
+      integer :: n(2), degree(2), n_rib
+      logical :: is_thin
       integer :: i
 
       n = get_counts(stack, plate, frequency)
+      is_thin = .not. maxval(plate%shear) > 0.0_wp
       sides = [stack%length, stack%width]
       do i = 1, 2
-         if (has_sines(plate, i)) then
+         twisting = get_twisting_ribs(plate, i)
+         n_rib = size(twisting)
+         if (has_sines(plate, i) .and. n_rib == 0) then
             deflection(i) = function_set_type(sines, sides(i), n(i))
             rotation(i) = function_set_type(cosines, sides(i), n(i))
             cycle
          end if
+         degree(i) = n(i)
+         ! What ribs add consists of shorter waves, too.
+         if (is_thin) degree(i) = get_degree((merge(1.0_wp, rib_ratio, n_rib == 0)*(n(i) - n_rib) + 2)*pi/2)
          lines = spread(0.0_wp, 1, 0)
          if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
          if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
          associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])
             associate (fixed => [pack(ends, edge%deflection >= rigid_support), lines], &
                clamped => pack(ends, edge%rotation >= rigid_support))
-               deflection(i) = new_polynomials(sides(i), n(i) + size(fixed) + size(clamped), [fixed, clamped], &
+               deflection(i) = new_polynomials(sides(i), degree(i) + size(fixed) + size(clamped), [fixed, clamped], &
                   [spread(0, 1, size(fixed)), spread(1, 1, size(clamped))])
-               rotation(i) = new_polynomials(sides(i), n(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
+               rotation(i) = new_polynomials(sides(i), degree(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
             end associate
+            if (is_thin) call keep_beam_modes(deflection(i), edge, merge(plate%along, plate%across, i == 1), &
+               n(i) - n_rib, twisting)
          end associate
       end do
       motion%deflection = product_type(deflection(1), deflection(2))
       motion%rotation_x = product_type(rotation(1), deflection(2), is_static=.true.)
       motion%rotation_y = product_type(deflection(1), rotation(2), is_static=.true.)
    end function new_motion
+
+   !> Replaces polynomials by the lowest modes of a beam, which are far fewer for the same waves.
+   !>
+   !> What the others would add under forces and moments at the ends, and under moments of ribs that resist torsion, is kept,
+   !> too: at free edges and at such ribs the curvature is not that of a beam, which its modes approach slowly.
+   subroutine keep_beam_modes(set, edge, bending, n, rib)
+      type(function_set_type), intent(inout) :: set
+      !> Springs at both ends.
+      type(edge_type), intent(in) :: edge(2)
+      !> Bending stiffness per width, N m.
+      real(wp), intent(in) :: bending
+      !> Number of modes.
+      integer, intent(in) :: n
+      !> Positions of ribs that resist torsion, m: [n_rib].
+      real(wp), intent(in) :: rib(:)
+      real(wp), parameter :: unit(1, 1) = 1.0_wp
+      type(ritz_system_type) :: system
+      type(modes_type) :: modes
+      real(wp), allocatable :: shape(:, :), omega(:), added(:, :)
+      logical, allocatable :: kept(:)
+      integer, allocatable :: chosen(:)
+      logical :: failed
+      integer :: i, j, number, order
+
+      call add_displacement(system, product_type(set, function_set_type(cosines, 1.0_wp, 1)), number)
+      ! With the mass B per length, angular frequencies are squared wavenumbers.
+      call add_stiffness(system, 1, 1, bending, get_overlap(set, 2, set, 2), unit, 0.0_wp)
+      call add_mass(system, 1, 1, bending, get_overlap(set, 0, set, 0), unit)
+      do order = 0, 1
+         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0))
+      end do
+      call solve_ritz_system(system, modes, failed)
+      if (failed) return
+      allocate (shape(set%count, set%count), source=0.0_wp)
+      allocate (omega(0))
+      do i = 1, size(modes%block)
+         associate (block => modes%block(i))
+            shape(block%shape(1)%x, size(omega) + 1:size(omega) + size(block%omega)) = sqrt(bending)*block%shape(1)%coefficient
+            omega = [omega, block%omega]
+         end associate
+      end do
+      set%coefficient = matmul(set%coefficient, shape)
+      allocate (kept(set%count), source=.false.)
+      do i = 1, n
+         j = minloc(omega, dim=1, mask=.not. kept)
+         kept(j) = .true.
+      end do
+      set%complete = sqrt(maxval(omega, mask=kept)) + pi/(2*set%length)
+      chosen = pack([(i, i=1, set%count)], kept)
+      added = reshape([real(wp) ::], [set%count, 0])
+      do order = 0, 1
+         call add_deflections(get_functions(set, [0.0_wp, set%length], order), order)
+      end do
+      call add_deflections(get_functions(set, rib, 1), 1)
+      added = matmul(set%coefficient, added)
+      set%coefficient(:, :n) = set%coefficient(:, chosen)
+      set%count = n + size(added, 2)
+      set%coefficient(:, n + 1:set%count) = added
+      set%coefficient = set%coefficient(:, :set%count)
+   contains
+
+      !> Adds the deflections of the other modes under loads, even and odd ones: orthogonal to those that were added, unless
+      !> they are too small or depend on them.
+      subroutine add_deflections(value, order)
+         !> Values of the modes or their derivatives where the loads act: [n_load, n_mode].
+         real(wp), intent(in) :: value(:, :)
+         !> Order of the derivative.
+         integer, intent(in) :: order
+         real(wp) :: deflection(size(value, 2), size(value, 1)), rest(size(value, 2))
+         integer :: k, repetition
+
+         deflection = matmul(transpose(value), get_amplitudes(size(value, 1)))
+         do k = 1, size(deflection, 2)
+            rest = merge(0.0_wp, deflection(:, k)/max(omega, tiny(omega))**2, kept)
+            do repetition = 1, 2
+               rest = rest - matmul(added, matmul(transpose(added), rest))
+            end do
+            ! Compared with the deflection of a beam as long as a wave.
+            if (norm2(rest) < 1.0e-4_wp*set%complete**(order - 3.5_wp)) cycle
+            added = reshape([added, rest/norm2(rest)], [size(added, 1), size(added, 2) + 1])
+         end do
+      end subroutine add_deflections
+   end subroutine keep_beam_modes
 
    !> Stiffness and mass of a plate that is rigid in shear (Kirchhoff).
    subroutine add_thin_plate(system, plate, motion)
