@@ -314,6 +314,16 @@ def test_bad_value_is_named_at_its_field(
     assert wall.get_attribute("aria-invalid") is None
 
 
+def test_error_of_a_folded_field_opens_it(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    # A soft ball is longer on the floor than the record.
+    fill(page, "ball.youngs_modulus", "0.1")
+    duration = field(page, "sampling.duration")
+    sync_api.expect(duration).to_have_attribute("aria-invalid", "true")
+    sync_api.expect(duration).to_be_focused()
+    sync_api.expect(duration).to_be_in_viewport()
+
+
 def test_error_of_a_recording_is_at_its_field(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     open_door(page, "recording")
@@ -386,6 +396,7 @@ def test_fields_change_to_si_units(browser: Browser, server: Served) -> None:
     # The browser and the link remember them.
     share(page, "#link")
     address = page.evaluate("navigator.clipboard.readText()")
+    page.wait_for_timeout(600)
     page.reload()
     sync_api.expect(wall).to_have_value("0.03")
     share(page, "#units")
