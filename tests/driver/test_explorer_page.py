@@ -404,7 +404,7 @@ def test_fields_change_to_si_units(browser: Browser, server: Served) -> None:
     page.goto("about:blank")
     page.goto(address)
     sync_api.expect(wall).to_have_value("0.03")
-    sync_api.expect(page.locator("#units")).to_have_text("Fields in mm and MPa")
+    sync_api.expect(page.locator("#units")).to_have_text("Fields in mm, MPa")
 
 
 # ---- Comparison, history, storage and link.

@@ -381,7 +381,7 @@ async function setUnits(name) {
 }
 
 function nameUnits() {
-  byId("units").textContent = units.get() ? "Fields in mm and MPa" : "Fields in SI units";
+  byId("units").textContent = units.get() ? "Fields in mm, MPa" : "Fields in SI units";
 }
 
 async function switchUnits() {
