@@ -36,8 +36,11 @@ COMPLETIONS = {
 }
 # A line of the executable's help: short and long name, value, meaning.
 OPTION = re.compile(r"^  (-\w, )?(--\w+)? ?([A-Z][\w.]*)? +(\S.*(?:\n {9,}.*)*)", re.MULTILINE)
-# Of a case with all keys: a group, or a comment and its key; optional groups are commented out.
-KEY = re.compile(r"^(?:! )?(?:(&\w+)|   ! (.+)\n(?:! )?   (\w+ = .*))$", re.MULTILINE)
+# Of a case with all keys: a group, or a comment of one or more lines and its key; optional groups
+# are commented out.
+KEY = re.compile(
+    r"^(?:! )?(?:(&\w+)|   ! ((?:.+\n(?:! )?   ! )*.+)\n(?:! )?   (\w+ = .*))$", re.MULTILINE
+)
 WIDTH = 78
 
 
@@ -188,7 +191,8 @@ def manual(program: Program, date: str, keys: str = "") -> str:
     if keys:
         parts.append(".SH KEYS\nGroups and keys of an input file, with their defaults. SI units.\n")
     for group, comment, default in KEY.findall(keys):
-        parts.append(f".SS {group}\n" if group else entry(typed(default), comment))
+        meaning = " ".join(re.sub(r"\n(! )?   ! ", "\n", comment).split())
+        parts.append(f".SS {group}\n" if group else entry(typed(default), meaning))
     parts.append('.SH "EXIT STATUS"\n')
     for number, meaning in re.findall(r"(\d+) ([^,]+?)[,.]", program.exit_codes):
         parts.append(entry(typed(number), " ".join(meaning.split())))

@@ -119,7 +119,7 @@ def drop_file(page: Page, content: bytes, name: str) -> None:
 
 def share(page: Page, selector: str) -> None:
     """Click an entry of the menu of the case."""
-    page.locator("#share summary").click()
+    page.locator("#menu summary").click()
     page.locator(selector).click()
 
 
@@ -314,6 +314,16 @@ def test_bad_value_is_named_at_its_field(
     assert wall.get_attribute("aria-invalid") is None
 
 
+def test_error_of_a_folded_field_opens_it(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    # A soft ball is longer on the floor than the record.
+    fill(page, "ball.youngs_modulus", "0.1")
+    duration = field(page, "sampling.duration")
+    sync_api.expect(duration).to_have_attribute("aria-invalid", "true")
+    sync_api.expect(duration).to_be_focused()
+    sync_api.expect(duration).to_be_in_viewport()
+
+
 def test_error_of_a_recording_is_at_its_field(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     open_door(page, "recording")
@@ -359,6 +369,42 @@ def test_slider_keys_reach_the_ends(browser: Browser, server: Served) -> None:
     settle(page)
     sync_api.expect(field(page, "drop.height")).to_have_value("3")
     sync_api.expect(page.locator("#criteria tbody tr").first).to_contain_text("high")
+
+
+def test_fields_change_to_si_units(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    wall, label = field(page, "ball.wall_thickness"), page.locator("[for='ball.wall_thickness']")
+    sync_api.expect(label).to_have_text("Wall thickness, mm")
+    page.locator("#keep").click()
+    share(page, "#units")
+    settle(page)
+    sync_api.expect(label).to_have_text("Wall thickness, m")
+    sync_api.expect(wall).to_have_value("0.032")
+    sync_api.expect(field(page, "ball.youngs_modulus")).to_have_value("1600000")
+    # Steps, help, names and errors have the same units.
+    wall.focus()
+    page.keyboard.press("ArrowDown")
+    sync_api.expect(wall).to_have_value("0.031")
+    sync_api.expect(field(page, "ball.outer_radius.help")).to_contain_text("allowed: 0 to 10 m")
+    settle(page)
+    assert names_of(page) == ["Wall 0.031 m", "Wall 0.032 m"]
+    fill(page, "ball.wall_thickness", "0.2")
+    message = "Wall thickness = 0.2 m is not allowed; allowed: more than 0 m and less than outer"
+    sync_api.expect(page.locator("#message")).to_contain_text(message)
+    fill(page, "ball.wall_thickness", "0.03")
+    settle(page)
+    # The browser and the link remember them.
+    share(page, "#link")
+    address = page.evaluate("navigator.clipboard.readText()")
+    page.wait_for_timeout(600)
+    page.reload()
+    sync_api.expect(wall).to_have_value("0.03")
+    share(page, "#units")
+    sync_api.expect(wall).to_have_value("30")
+    page.goto("about:blank")
+    page.goto(address)
+    sync_api.expect(wall).to_have_value("0.03")
+    sync_api.expect(page.locator("#units")).to_have_text("Fields in mm, MPa")
 
 
 # ---- Comparison, history, storage and link.

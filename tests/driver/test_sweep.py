@@ -628,7 +628,7 @@ def test_command_writes_figure_and_table(
     assert names_in(folder) == names
     printed = capsys.readouterr()
     assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
-    assert "peak_force, N" in printed.out
+    assert "peak force, N" in printed.out
     assert "Results: outputs/sweep" in printed.out
 
 

@@ -214,7 +214,8 @@ def new_parser() -> argparse.ArgumentParser:
         prog="thud-driver",
         description="Cases with figures, recordings, floors, fits and studies.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
-        "3 not conforming (--check), 130 interrupted, 143 terminated.",
+        "3 not conforming (--check), 130 interrupted, 143 terminated. Environment: NO_COLOR=1 "
+        "shows no colors.",
     )
     parser.add_argument("--version", action="version", version=f"thud {version()}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="name")

@@ -27,7 +27,7 @@ from thud.base.checks import refuse
 from thud.case.case import read_case
 from thud.explorer.criteria import glossary
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import construction_form, form
+from thud.explorer.form import SI_UNITS, construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.messages import describe_error
 from thud.explorer.models import changed_values, floor_facts, model_facts, standard_ball
@@ -51,6 +51,8 @@ MAX_FILES = 100
 MAX_FIELDS = 100
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
+# Header that is "SI" if fields and messages are to have SI units.
+UNITS = "x-thud-units"
 # Maximum pause between two chunks of a body, s.
 BODY_TIMEOUT = 20.0
 # Level of compression: higher ones save a few percent and take twice as long.
@@ -118,7 +120,6 @@ def new_application(
         lifespan=lifespan,
     )
     application.state.about = {
-        "form": form(),
         "constructions": construction_form(),
         "recording": recording_form(),
         "models": model_facts(),
@@ -151,7 +152,7 @@ async def _page(request: Request) -> Response:
 
 
 async def _about(request: Request) -> Response:
-    return JSONResponse(request.app.state.about, headers=HEADERS)
+    return JSONResponse({**request.app.state.about, "form": form()}, headers=HEADERS)
 
 
 async def _solve(request: Request) -> Response:
@@ -272,6 +273,7 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
         if not secrets.compare_digest(token, request.app.state.token.encode()):
             message = "open the full address shown in the terminal: it holds the token"
             raise HTTPException(403, message)
+        SI_UNITS.set(request.headers.get(UNITS) == "SI")
         return await endpoint(request)
 
     return answer

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from thud.level.levels import BANDWIDTHS
+from thud.impact.quantities import ALL_QUANTITIES, BANDS
 from thud.studies.blocks import read_dataset
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study_result import SampleResult
@@ -51,13 +51,14 @@ class Sweep(SampleResult):
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         for name, variable in self.dataset.data_vars.items():
             if variable.dtype.kind == "f":
-                bands = next((name for name in BANDWIDTHS if name in variable.dims), None)
+                quantity = ALL_QUANTITIES[str(name)]
+                bands = next((name for name in BANDS if name in variable.dims), None)
                 for band in self.dataset[bands].values if bands else [None]:
                     values = variable.sel({bands: band}) if bands else variable
                     at = "" if band is None else f" {band:g} Hz"
-                    label = f"{name}{at}, {variable.attrs['units']}".removesuffix(", 1")
+                    label = f"{quantity.title}{at}, {quantity.display_unit}".removesuffix(", ")
                     numbers = (values.min(), values.median(), values.max())
-                    rows.append((label, *(f"{float(number):z.4g}" for number in numbers)))
+                    rows.append((label, *(quantity.show(float(number)) for number in numbers)))
         rows.append(("conforming samples", "", "", f"{int(self.dataset['conforms'].sum())}"))
         return rows
 

@@ -133,7 +133,7 @@ class Surrogate(StudyResult):
         for name, *numbers in zip(self.labels, self.errors, largest, self.scale, strict=True):
             if np.isfinite(numbers[0]):
                 note = "" if numbers[0] <= self.bound else "withheld"
-                rows.append((name, *(f"{number:.3f}" for number in numbers), note))
+                rows.append((name, *(f"{number:.2g}" for number in numbers), note))
         return rows
 
     warnings = ()

@@ -1,6 +1,6 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
 import { byId, button, element, saveFile } from "./page.js";
-import { ConnectionError, ServerError, ask, follow, fragment, getAbout } from "./request.js";
+import { ConnectionError, ServerError, ask, firstAbout, follow, fragment, requestAbout, units } from "./request.js";
 import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms, showWarnings } from "./results.js";
 import { STORE, firstVariant } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
@@ -343,7 +343,7 @@ function restoreStored() {
 
 async function copyLink() {
   const variants = kept.filter(({ values }) => values).map(({ door, values, title }) => ({ door, values, title }));
-  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants };
+  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, units: units.get() };
   const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
   const isCopied = await copyText(address, "Copy this link");
   if (isCopied) flash("link", "Link copied");
@@ -361,8 +361,9 @@ function flash(id, text) {
 async function takeLink(text) {
   let content = null;
   try { content = JSON.parse(text); } catch { return false; }
-  const { door, ball, floor, variants } = content ?? {};
+  const { door, ball, floor, variants, units: name } = content ?? {};
   if (!DOORS.includes(door) || ![ball, floor].every(isCase) || !Array.isArray(variants) || !variants.every((variant) => isCase(variant?.values))) return false;
+  await setUnits(name);
   takeValues(floor);
   state.door = door;
   for (const variant of variants) {
@@ -370,6 +371,26 @@ async function takeLink(text) {
     if (answer) kept = [...kept, { door: variant.door, style: freeStyle(kept.filter((other) => (other.door === "floor") === (variant.door === "floor"))), values: variant.values, title: variant.title, answer }];
   }
   return true;
+}
+
+/** Take over the units of the fields, "SI" or empty; the server describes the fields in them. */
+async function setUnits(name) {
+  units.set(name === "SI" ? name : "");
+  Object.assign(about, await requestAbout());
+  nameUnits();
+}
+
+function nameUnits() {
+  byId("units").textContent = units.get() ? "Fields in mm, MPa" : "Fields in SI units";
+}
+
+async function switchUnits() {
+  try {
+    await setUnits(units.get() ? "" : "SI");
+    openDoor(state.door);
+    // Warnings have the units of the fields; those of a recording are always SI units.
+    if (state.door !== "recording") solve();
+  } catch (error) { showError(error); }
 }
 
 function reset() {
@@ -440,6 +461,7 @@ function listen() {
   byId("keep").addEventListener("click", keep);
   byId("undo").addEventListener("click", () => goTo(steps.at - 1));
   byId("redo").addEventListener("click", () => goTo(steps.at + 1));
+  byId("units").addEventListener("click", switchUnits);
   byId("reset").addEventListener("click", reset);
   byId("link").addEventListener("click", copyLink);
   byId("save_page").addEventListener("click", () => { const variants = variantsOfDoor(); if (variants.length) saveFile("thud.html", pageOf(variants, about.version), "text/html"); });
@@ -471,7 +493,7 @@ function listen() {
 
 async function main() {
   try {
-    Object.assign(about, await getAbout());
+    Object.assign(about, await firstAbout);
   } catch (error) {
     byId("verdict").replaceChildren();
     setOutdated(true, false);
@@ -480,6 +502,7 @@ async function main() {
     return;
   }
   byId("tools").hidden = false;
+  nameUnits();
   addPlotMenus();
   listen();
   const link = fragment.get("case");

@@ -358,7 +358,11 @@ export function markField(name, message = "") {
   for (const error of document.querySelectorAll("#panel .error")) error.textContent = "";
   const input = name && (byId(name) ?? byId(`recording_${name}`));
   if (!input) return;
-  input.closest("details")?.setAttribute("open", "");
+  const folded = input.closest("details:not([open])");
+  if (folded) {
+    folded.open = true;
+    input.focus();
+  }
   input.setAttribute("aria-invalid", "true");
   const error = byId(`${input.id}.error`);
   if (error) error.textContent = message;

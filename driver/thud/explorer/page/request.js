@@ -22,6 +22,12 @@ if (fragment.get("token")) {
   history.replaceState(null, "", fragment.size ? `#${fragment}` : location.pathname);
 }
 
+/** Units of the fields: "SI", or empty for mm, MPa and so on. */
+export const units = {
+  get: () => localStorage.getItem("units") ?? "",
+  set: (name) => localStorage.setItem("units", name),
+};
+
 /** Return the response; throw ServerError, ConnectionError or, if the request was cancelled, AbortError. */
 export async function ask(path, options = {}) {
   // Another page in this browser may have stored the token of a new server.
@@ -29,7 +35,7 @@ export async function ask(path, options = {}) {
   if (!token) throw new ConnectionError(MISSING_TOKEN);
   let response = null;
   try {
-    response = await fetch(path, { ...options, headers: { "X-Thud-Token": token } });
+    response = await fetch(path, { ...options, headers: { "X-Thud-Token": token, "X-Thud-Units": units.get() } });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new ConnectionError(`The server does not answer; ${restart()}`);
@@ -63,10 +69,8 @@ export async function follow(path, body, signal, onProgress) {
   }
 }
 
-const requestAbout = () => ask("about").then((response) => response.json());
-// Requested before the rest of the page has arrived.
-const firstAbout = requestAbout();
-firstAbout.catch(() => {});
-
 /** Return what the server says of itself. */
-export const getAbout = () => firstAbout;
+export const requestAbout = () => ask("about").then((response) => response.json());
+/** The same, requested before the rest of the page has arrived. */
+export const firstAbout = requestAbout();
+firstAbout.catch(() => {});
