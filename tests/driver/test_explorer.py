@@ -762,6 +762,26 @@ def test_source_that_conforms_needs_no_change(client: TestClient) -> None:
     assert answer["none"] == "The source conforms already."
 
 
+def test_layers_that_meet_the_requirement_of_a_room_are_found(client: TestClient) -> None:
+    plate = {"thickness": 0.18, "screed_thickness": 0.05, "layer_stiffness": 15e6}
+    room = {"volume": 50.0, "required": 52.0, "required_rating": "thirds"}
+    values = {"floor": {"name": "plate"}, "plate": plate, "room": room}
+    answer = last_report(client, "/improve", json=values)["answer"]
+    assert answer["none"] == ""
+    assert {entry["key"] for entry in answer["changes"]} <= {f"plate.{name}" for name in plate}
+    for change in answer["changes"]:
+        name = change["key"].partition(".")[2]
+        floor = thud.Plate(**plate | {name: change["value"]})
+        below = thud.Room(**room)  # type: ignore[arg-type]
+        required = thud.predict_level(floor=floor, room=below).requirement
+        assert required is not None
+        assert change["text"].endswith("interval") == (required.verdict == "met")
+        assert round(required.level) <= 52
+    met = values | {"room": room | {"required": 80.0}}
+    answer = last_report(client, "/improve", json=met)["answer"]
+    assert answer["none"] == "The requirement is met already."
+
+
 def test_fit_to_a_recording_returns_its_values(client: TestClient) -> None:
     truth = {"model": {"name": "hunt_crossley"}, "drop": {"height": 0.9}}
     truth |= {"hunt_crossley": {"contact_time": 0.019, "restitution": 0.75}}

@@ -1,4 +1,4 @@
-"""Changes of a source for the page: the smallest that conforms, and a fit to a recording."""
+"""Changes for the page: of a source that conforms, of a floor that meets a requirement, and fits."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ from thud.explorer.form import fields_by_key
 from thud.explorer.messages import lower
 from thud.explorer.models import MODEL_FACTS, Facts
 from thud.explorer.recording import read_copies
+from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.level.assessment import get_criteria
+from thud.level.rating import meets
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
 
@@ -47,6 +49,12 @@ MESH = 6, 64
 BLOCK = 10
 # Maximum number of further steps if the source does not conform with the mesh of the case.
 FURTHER_STEPS = 5
+# Layers of floors, the step of a thickness, m, and of a stiffness, and the maximum number of steps.
+LAYERS = "thickness", "screed_thickness", "layer_stiffness", "subceiling_thickness"
+THICKNESS_STEP = 0.01
+STIFFNESS_STEP = 0.1
+FLOOR_STEPS = 15
+FLOOR_NOTE = "Each layer alone; the level need not fall with each step, as modes of the room move."
 NOTE = "By the values of the case alone: what is not known of the source is not considered."
 # Significant digits of changed values.
 DIGITS = 3
@@ -58,6 +66,8 @@ def improve(values: Values) -> Work:
     Only one parameter is changed at a time; what is not known of the source is not considered.
     """
     case = new_case(values)
+    if case.room is not None and case.floor is not None:
+        return (yield from _improve_floor(case))
     verdict = compute(case).assess()
     if verdict:
         return {"changes": [], "none": "The source conforms already.", "note": NOTE}
@@ -80,6 +90,66 @@ def improve(values: Values) -> Work:
     if not names:
         none = "This model has no parameters to change."
     return {"changes": [], "none": none, "note": NOTE}
+
+
+def _improve_floor(case: Case) -> Work:
+    """Search for each layer of a floor the smallest change that meets the requirement of the room.
+
+    Thicknesses grow in steps of 10 mm, stiffnesses fall in steps of 10 %. The level need not fall
+    with each step, so the first step that meets the requirement is the smallest. Two answers are
+    given where both are found: by the mean rating, and by its whole interval.
+    """
+    required = predict_level(compute(case)).requirement
+    if required is None:
+        refuse("&room: required = 0: the room has no requirement", "the required level, dB")
+    if required.verdict == "met":
+        return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
+    names = [name for name in LAYERS if getattr(case.floor, name, 0.0)]
+    changes = []
+    for i, name in enumerate(names):
+        begin, length = i / len(names), 1 / len(names)
+        changes += yield from _floor_changes(case, name, begin, length)
+    labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
+    none = (
+        ""
+        if changes
+        else f"No change of a single layer meets the requirement: tried {labels}, up to twice a "
+        "thickness and down to a fifth of a stiffness."
+        if names
+        else "This floor has no layers to change."
+    )
+    return {"changes": changes, "none": none, "note": FLOOR_NOTE}
+
+
+def _floor_changes(
+    case: Case, name: str, begin: float, length: float
+) -> Generator[tuple[float, float], None, list[dict[str, Any]]]:
+    """Return the changes of a layer that meet the requirement by the mean and by the interval."""
+    start = float(getattr(case.floor, name))
+    _, high = limits(find_key(name, key_owners(case))[0], case)
+    steps = range(1, FLOOR_STEPS + 1)
+    if name.endswith("stiffness"):
+        tried = [start * (1 - STIFFNESS_STEP) ** i for i in steps]
+    else:
+        tried = [start + THICKNESS_STEP * i for i in steps if THICKNESS_STEP * i <= start]
+    tried = [float(f"{value:.{DIGITS}g}") for value in tried if value <= high]
+    changes: list[dict[str, Any]] = []
+    for i, value in enumerate(tried):
+        yield begin + length * i / len(tried), begin + length * (i + 1) / len(tried)
+        try:
+            required = predict_level(compute(with_values(case, {name: value}))).requirement
+        except ThudError:
+            break
+        if required is None or required.verdict.startswith("undecided:"):
+            break
+        if required.verdict == "met" or (not changes and meets(required.level, required.required)):
+            change = _change(case, name, start, value)
+            by = "whole interval" if required.verdict == "met" else "mean"
+            change["text"] += f": {required.shown}, met by the {by}"
+            changes.append(change)
+        if required.verdict == "met":
+            break
+    return changes
 
 
 def _facts(model: str) -> Facts:

@@ -45,6 +45,8 @@ def in_words(message: str) -> str:
     ...          "allowed: 0 < wall_thickness < outer_radius = 0.089 m")
     'Wall thickness = 200 mm is not allowed; allowed: more than 0 mm and less than outer radius, \
 89 mm'
+    >>> in_words("&ball: youngs_modulus = 2.08 MPa is the modulus of another model")
+    "Young's modulus = 2.08 MPa is the modulus of another model"
     """
     match = _KEY.match(message)
     first = fields_by_key().get((match[1], match[2])) if match else None
@@ -85,7 +87,9 @@ def _in_unit(text: str, field: Field) -> str:
     def convert(match: re.Match[str]) -> str:
         return f" = {_scaled(match[1], power)}{suffix}"
 
-    si = rf"(?: {re.escape(field['si_unit'])}(?!\w))?" if field["si_unit"] else ""
+    name = re.escape(field["si_unit"])
+    # A value with a prefix, such as 2.08 MPa, is as readable as it is.
+    si = rf"(?: {name}(?!\w))?(?! [kMG]{name}(?!\w))" if name else ""
     return re.sub(rf"^ = ({_NUMBER}){si}(?![\w.])", convert, text)
 
 

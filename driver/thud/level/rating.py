@@ -114,13 +114,18 @@ class Requirement:
             return "met"
         return "undecided" if low else "not met"
 
+    @property
+    def shown(self) -> str:
+        """Rating with its interval, such as ``"49 dB (46 to 51)"``."""
+        low, high = map(rounded, self.interval)
+        return f"{rounded(self.level)} dB ({low} to {high})"
+
     def __str__(self) -> str:
         """Return rating, requirement and verdict in words."""
-        low, high = map(rounded, self.interval)
         is_ball = self.source == SOURCES[0]
         title = RATINGS[self.rating] if is_ball else f"A-weighted level ({self.rating})"
         return (
-            f"{title}: {rounded(self.level)} dB ({low} to {high}), "
+            f"{title}: {self.shown}, "
             f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.verdict}"
         )
 
