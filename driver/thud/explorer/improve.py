@@ -1,4 +1,4 @@
-"""Changes for the page: of a source that conforms, of a floor that meets a requirement, and fits."""
+"""Changes that help, for the page: of a source, and of a floor; fits to recordings."""
 
 from __future__ import annotations
 
