@@ -669,6 +669,17 @@ def test_edges_of_floating_plates_do_not_silence_high_bands(edges: str) -> None:
     assert np.abs(other - simple).max() < 1.0
 
 
+def test_losses_of_edge_strips_lower_the_levels_by_modes() -> None:
+    floor = thud.Plate(screed_thickness=0.05, screed_edges="strip")
+    levels = [
+        thud.predict_level(floor=replace(floor, strip_loss_factor=value), room=thud.Room())
+        for value in (0.0, 0.1, 0.5)
+    ]
+    none, some, much = (level.modal_level[:3] for level in levels)
+    assert (none > some).all()
+    assert (some > much).all()
+
+
 @pytest.mark.parametrize(
     "floor", [thud.Plate(thickness=0.2), thud.LaminateFloor(layer_thickness=(0.04,) * 5)]
 )

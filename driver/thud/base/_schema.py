@@ -642,6 +642,8 @@ class RectangularFloor(Group):
     strip_stiffness : float
         Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
         strip_stiffness <= 1e+12.
+    strip_loss_factor : float
+        Loss factor of these strips; default: an estimate; 0 <= strip_loss_factor <= 1.
     bridge_x : sequence of float
         Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
     bridge_y : sequence of float
@@ -701,6 +703,7 @@ class RectangularFloor(Group):
     layer_loss_factor: float = 0.1
     screed_edges: RectangularFloorScreedEdges = "simple"
     strip_stiffness: float = 1000000.0
+    strip_loss_factor: float = 0.1
     bridge_x: Sequence[float] = ()
     bridge_y: Sequence[float] = ()
     bridge_stiffness: float = 100000000.0
@@ -1370,6 +1373,7 @@ KEYS = (
     Key("plate", "plate", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("plate", "plate", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
     Key("plate", "plate", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
     Key("plate", "plate", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("plate", "plate", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
@@ -1420,6 +1424,7 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
     Key("laminate_floor", "laminate_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
@@ -1476,6 +1481,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
     Key("joist_floor", "joist_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
