@@ -76,8 +76,8 @@ _MIN_ERROR = 1e-8
 # Maximum error of the fit without a warning, and maximum factor by which passivity increases it.
 _MAX_ERROR = 0.1
 _MAX_INCREASE = 1.5
-# Geometric means of plausible mobilities of floors, m/(N s): below those of 0.5 m of concrete, 2e-7,
-# and above those of one board on timber joists, 8e-4.
+# Range of geometric means of mobilities of floors, m/(N s): 0.5 m of concrete has 2e-7, one board
+# on timber joists 8e-4.
 _PLAUSIBLE = (1e-7, 1e-3)
 
 
@@ -275,11 +275,12 @@ def _unit_warnings(values: NDArray[np.complex128]) -> list[str]:
     low, high = _PLAUSIBLE
     if low <= mean <= high:
         return []
-    return [
+    message = (
         f"the mean mobility, {mean:.2g} m/(N s), is not that of a floor ({low:g} to {high:g} "
         "m/(N s)): check the units (m and N, not mm or kN), and whether the values are of another "
         "quantity, or an impedance"
-    ]
+    )
+    return [message]
 
 
 def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
