@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, names_in
+from conftest import MINIMAL, REPOSITORY, names_in
 from test_figure_look import assert_clean
 
 import thud
@@ -371,6 +371,17 @@ def test_names_of_cases_stay_in_the_directory(name: str, tmp_path: Path) -> None
     out = tmp_path / "out"
     cli.main(["predict", str(tmp_path / "case.nml"), "-q", "-o", str(out)])
     assert {*tmp_path.iterdir()} <= {*before, out}
+
+
+def test_tyre_falls_on_constructions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tyre = str(REPOSITORY / "inputs" / "tyre.nml")
+    words = ["predict", tyre, "--construction", "concrete 180", "-o", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("concrete 180\n  A-weighted level ")
+    assert "ISO 717-2" not in printed
+    case = thud.construction("concrete 180").case(thud.read_case(tyre))
+    assert thud.predict_level(thud.solve(case)).rated_text in printed
 
 
 def test_bad_input_is_one_sentence(tmp_path: Path, errors_of: ErrorsOf) -> None:
