@@ -1,14 +1,16 @@
 !> Walls below a floor that take energy from it through their junctions and radiate into the room.
 module thud_flanking
    use thud_constants, only: pi
+   use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_critical_frequency, get_surface_mass, plate_type
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
+   public :: check_walls, get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
 
    !> Types of junction: rigid ones, or one given by its vibration reduction index.
    character(len=*), parameter :: junctions(*) = [character(len=5) :: 'cross', 't', 'index']
@@ -16,23 +18,25 @@ module thud_flanking
    !> Reference frequency of the vibration reduction index, Hz (ISO 12354-1).
    real(wp), parameter :: reference_frequency = 1000.0_wp
 
-   !> Walls of the same construction, each along a part of the floor's edge.
+   !> Walls, each along a part of the floor's edge. Lists have one value for all walls or one for each.
    type :: walls_type
       !> Lengths of the junctions with the floor, m, one per wall.
       type(list_type) :: lengths
-      !> Height, m, and thickness, m.
-      real(wp) :: height = 2.5_wp, thickness = 0.2_wp
-      !> Density, kg/m3.
-      real(wp) :: density = 2300.0_wp
-      !> Speed of longitudinal waves, m/s.
-      real(wp) :: wave_speed = 3500.0_wp
-      !> Internal loss factor.
-      real(wp) :: loss_factor = 0.005_wp
+      !> Height, m.
+      real(wp) :: height = 2.5_wp
+      !> Thicknesses, m.
+      type(list_type) :: thickness = list_type(count=1, values=0.2_wp)
+      !> Densities, kg/m3.
+      type(list_type) :: density = list_type(count=1, values=2300.0_wp)
+      !> Speeds of longitudinal waves, m/s.
+      type(list_type) :: wave_speed = list_type(count=1, values=3500.0_wp)
+      !> Internal loss factors.
+      type(list_type) :: loss_factor = list_type(count=1, values=0.005_wp)
       !> Rigid junction at which the wall continues above the floor, and the floor continues behind the wall (`cross`) or
       !> does not (`t`), or a junction given by its index (`index`).
       character(len=name_length) :: junction = 'cross'
-      !> Vibration reduction index between floor and wall, dB, for the junction `index`.
-      real(wp) :: index = 10.0_wp
+      !> Vibration reduction indices between floor and walls, dB, for the junction `index`.
+      type(list_type) :: index = list_type(count=1, values=10.0_wp)
    end type walls_type
 
 contains
@@ -48,16 +52,54 @@ contains
          list_field('wall_lengths', walls%lengths, 'm', &
          'lengths of the flanking walls along the floor (default: no walls)', '[0.1, 100]'), &
          real_field('wall_height', walls%height, 'm', 'height of the walls', '[0.5, 20]'), &
-         real_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls', '[0.005, 2]'), &
-         real_field('wall_density', walls%density, 'kg/m3', 'density of the walls', '[10, 20000]'), &
-         real_field('wall_wave_speed', walls%wave_speed, 'm/s', 'speed of longitudinal waves in the walls', &
-         '[100, 10000]'), &
-         real_field('wall_loss_factor', walls%loss_factor, '', 'internal loss factor of the walls', '[0, 1]'), &
+         list_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls: one, or one for each of ' &
+         //'wall_lengths', '[0.005, 2]'), &
+         list_field('wall_density', walls%density, 'kg/m3', 'density of the walls: one, or one for each', &
+         '[10, 20000]'), &
+         list_field('wall_wave_speed', walls%wave_speed, 'm/s', &
+         'speed of longitudinal waves in the walls: one, or one for each', '[100, 10000]'), &
+         list_field('wall_loss_factor', walls%loss_factor, '', &
+         'internal loss factor of the walls: one, or one for each', '[0, 1]'), &
          choice_field('wall_junction', walls%junction, &
          'junction of floor and walls: rigid cross or T, or described by junction_index', junctions), &
-         real_field('junction_index', walls%index, 'dB', &
-         'vibration reduction index from floor to wall, for wall_junction index', '[-10, 80]')]
+         list_field('junction_index', walls%index, 'dB', &
+         'vibration reduction index from floor to wall, for wall_junction index: one, or one for each wall', &
+         '[-10, 80]')]
    end function get_wall_fields
+
+   !> Checks the numbers of values of the walls.
+   subroutine check_walls(walls, error)
+      type(walls_type), intent(in) :: walls
+      !> Set if a list has neither one value nor one for each wall.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (walls%lengths%count == 0) return
+      call check_count(walls%thickness, 'wall_thickness')
+      call check_count(walls%density, 'wall_density')
+      call check_count(walls%wave_speed, 'wall_wave_speed')
+      call check_count(walls%loss_factor, 'wall_loss_factor')
+      call check_count(walls%index, 'junction_index')
+   contains
+
+      subroutine check_count(list, key)
+         type(list_type), intent(in) :: list
+         character(len=*), intent(in) :: key
+
+         if (allocated(error) .or. any(list%count == [1, walls%lengths%count])) return
+         error = input_error('&room: '//key//' has '//to_text(list%count)//' values; allowed: 1, or 1 for each of the ' &
+            //to_text(walls%lengths%count)//' wall_lengths')
+      end subroutine check_count
+   end subroutine check_walls
+
+   !> The value of a wall in a list of one value for all or one for each.
+   elemental function get_value(list, wall) result(value)
+      type(list_type), intent(in) :: list
+      !> Number of the wall.
+      integer, intent(in) :: wall
+      real(wp) :: value
+
+      value = list%values(min(wall, list%count))
+   end function get_value
 
    !> The walls as plates: [n_wall].
    pure function get_walls(walls) result(plates)
@@ -67,17 +109,20 @@ contains
 
       allocate (plates(walls%lengths%count))
       do i = 1, size(plates)
-         plates(i) = plate_type(length=walls%lengths%values(i), width=walls%height, thickness=walls%thickness, &
-            density=walls%density, wave_speed=walls%wave_speed, loss_factor=walls%loss_factor)
+         plates(i) = plate_type(length=walls%lengths%values(i), width=walls%height, &
+            thickness=get_value(walls%thickness, i), density=get_value(walls%density, i), &
+            wave_speed=get_value(walls%wave_speed, i), loss_factor=get_value(walls%loss_factor, i))
       end do
    end function get_walls
 
-   !> Vibration reduction index from floor to wall (ISO 12354-1 annex E): the given index, or 8.7 + 5.7 M**2 dB for a rigid
+   !> Vibration reduction index from floor to a wall (ISO 12354-1 annex E): the given index, or 8.7 + 5.7 M**2 dB for a rigid
    !> cross and 5.7 + 5.7 M**2 dB for a rigid T, M being the decimal logarithm of the mass ratio. The minimum is
    !> 10 lg(l l0 (1/S1 + 1/S2)), l0 = 1 m.
-   pure function get_vibration_reduction(walls, floor, wall) result(index)
+   pure function get_vibration_reduction(walls, floor, wall, number) result(index)
       type(walls_type), intent(in) :: walls
       type(plate_type), intent(in) :: floor, wall
+      !> Number of the wall.
+      integer, intent(in) :: number
       !> The index, dB.
       real(wp) :: index
       real(wp) :: ratio
@@ -89,7 +134,7 @@ contains
        case ('t')
          index = 5.7_wp + 5.7_wp*ratio**2
        case default
-         index = walls%index
+         index = get_value(walls%index, number)
       end select
       index = max(index, 10*log10(wall%length*(1/(floor%length*floor%width) + 1/(wall%length*wall%width))))
    end function get_vibration_reduction

@@ -7,7 +7,8 @@ module thud_room
    use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss_matrix, new_energy_flow
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
-   use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
+   use thud_flanking, only: check_walls, get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, &
+      walls_type
    use thud_kinds, only: wp
    use thud_lapack, only: dgetf2, dgetrs
    use thud_modal_radiation, only: modal_radiation_type
@@ -192,13 +193,14 @@ contains
          //'717-2, ISO 16283-2)', rating_names)]
    end function get_room_fields
 
-   !> Checks the number of reverberation times.
+   !> Checks the numbers of reverberation times and of values of the walls.
    subroutine check_room(room, error)
       type(room_type), intent(in) :: room
-      !> Set if it is none of `time_counts`.
+      !> Set if one is not allowed.
       type(error_type), allocatable, intent(out) :: error
 
-      if (any(room%reverberation_time%count == time_counts)) return
+      call check_walls(room%walls, error)
+      if (allocated(error) .or. any(room%reverberation_time%count == time_counts)) return
       error = input_error('&room: reverberation_time has '//to_text(room%reverberation_time%count)//' values; allowed: ' &
          //'1, one for each of the 4 octaves from 63 to 500 Hz, or for each of the 12 one-third-octave bands from 50 to ' &
          //'630 Hz')
@@ -503,7 +505,7 @@ contains
          do i = 2, size(plates)
             call connect(flow, i, at_room, radiated(i))
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
-               get_vibration_reduction(room%walls, plate, plates(i)), f))
+               get_vibration_reduction(room%walls, plate, plates(i), i - 1), f))
          end do
          if (plate%length*plate%width < floor%length*floor%width*(1 - 1.0e-9_wp)) then
             associate (loss => 2*pi*f*prediction%loss_factor(band), above => get_mode_density(plate), &

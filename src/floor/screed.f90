@@ -21,8 +21,8 @@ module thud_screed
       real(wp) :: layer_stiffness = 1.0e7_wp, layer_loss_factor = 0.1_wp
       !> Edges: `simple`, `free`, or held by a strip.
       character(len=name_length) :: edges = 'simple'
-      !> Stiffness of the strip per length, N/m2.
-      real(wp) :: strip_stiffness = 1.0e6_wp
+      !> Stiffness of the strip per length, N/m2, and its loss factor, an estimate: that of the layer.
+      real(wp) :: strip_stiffness = 1.0e6_wp, strip_loss_factor = 0.1_wp
       !> Positions of rigid bridges to the plate below, m; stiffness of one, N/m.
       type(list_type) :: bridge_x, bridge_y
       real(wp) :: bridge_stiffness = 1.0e8_wp
@@ -49,6 +49,8 @@ contains
          [character(len=6) :: 'simple', 'free', 'strip']), &
          real_field('strip_stiffness', screed%strip_stiffness, 'N/m2', &
          'stiffness of edge strips against vertical motion per length, for strip', '[0, 1e12]'), &
+         real_field('strip_loss_factor', screed%strip_loss_factor, '', 'loss factor of these strips; default: an estimate', &
+         '[0, 1]'), &
          list_field('bridge_x', screed%bridge_x, 'm', 'positions along the length of bridges through the layer', &
          '(0, 100)'), &
          list_field('bridge_y', screed%bridge_y, 'm', 'positions along the width of these bridges', '(0, 100)'), &
@@ -90,7 +92,7 @@ contains
        case ('free')
          edge = edge_type(0.0_wp, 0.0_wp)
        case ('strip')
-         edge = edge_type(screed%strip_stiffness, 0.0_wp)
+         edge = edge_type(screed%strip_stiffness, 0.0_wp, screed%strip_loss_factor)
        case default
          edge = edge_type(rigid_support, 0.0_wp)
       end select

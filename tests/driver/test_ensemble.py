@@ -459,6 +459,24 @@ def test_numbers_below_a_floor_stand_in_their_columns(bands: Any) -> None:  # no
     assert without.room_level is None
 
 
+def test_samples_state_what_studies_state() -> None:
+    case = thud.Case(model=thud.HollowSphere(), floor=thud.Plate(), room=thud.Room())
+    heights = np.array([0.5, 1.0, -1.0])
+    found = thud.solve_many({"height": heights}, case)
+    first, second = found.warnings
+    assert first.startswith("1 of 3 samples have no results; most frequent reason: ")
+    assert found.reason[2] in first
+    assert "2 of 3 samples do not conform" in second
+    assert any("no numerical errors" in note for note in found.notes)
+    assert any("statistical predictions" in note for note in found.notes)
+    # Nothing is said of a source without levels, or of a room that is not there.
+    unknown = thud.solve_many({"height": [1.0]}, case, levels=False)
+    bare = thud.solve_many({"height": [0.5]})
+    assert not unknown.warnings
+    assert not bare.warnings
+    assert len(bare.notes) == 1
+
+
 def test_keywords_replace_those_of_the_case() -> None:
     case = thud.Case(
         model=thud.HollowSphere(momentum_flux="none"), sampling=thud.Sampling(48000.0, 0.04, 9),

@@ -68,6 +68,28 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     np.testing.assert_allclose(table["fitted"], table["measured"], rtol=1e-8)
 
 
+@pytest.mark.parametrize("name", ["concrete 300", "joists, 1 board"])
+def test_plausible_floors_raise_no_warning_of_units(name: str) -> None:
+    frequency = np.linspace(20.0, 700.0, 200)
+    values = thud.mobility(thud.construction(name).floor, frequency)
+    assert not any("units" in text for text in thud.fit_mobility((frequency, values)).warnings)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_implausible_unit_raises_a_warning(factor: float) -> None:
+    frequency = np.linspace(20.0, 700.0, 200)
+    values = factor * thud.mobility(thud.construction("concrete 180").floor, frequency)
+    warnings = thud.fit_mobility((frequency, values), order=8).warnings
+    assert re.search(naming("mean mobility", "not that of a floor", "m and N"), warnings[0])
+
+
+def test_impedance_is_named_where_its_fit_is_refused() -> None:
+    frequency = np.linspace(20.0, 700.0, 200)
+    values = 1 / thud.mobility(thud.construction("concrete 180").floor, frequency)
+    with pytest.raises(thud.InputError, match=naming("measurement: ", "or an impedance")):
+        thud.fit_mobility((frequency, values))
+
+
 def test_noise_is_not_fitted() -> None:
     found = thud.fit_mobility((FREQUENCY, NOISY))
     # 3 % of both parts: 4.2 %, less by the freedom of 17 coefficients in 600 parts.

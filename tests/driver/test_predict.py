@@ -5,18 +5,21 @@ from __future__ import annotations
 import csv
 import html
 import io
+import math
 import re
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, names_in
+from conftest import MINIMAL, REPOSITORY, names_in
 from test_figure_look import assert_clean
 
 import thud
 from thud import cli
+from thud.floors.resonances import resonances
 from thud.plot.room_figures import draw_ranges
 from thud.report.floor_files import contents, page_contents, screen_text
 from thud.report.floor_page import floor_page
@@ -166,6 +169,43 @@ def test_page_states_ratings_contributions_and_sources(floor: PredictedFloor, pa
         assert words in text
     for row in band_rows(floor):
         assert all(cell in text for cell in row)
+
+
+def test_report_states_project_client_and_date(
+    tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PredictedFloor, "changes", ())
+    monkeypatch.setattr("thud.report.pdf.html_to_pdf", lambda _: b"")
+    words = ["predict", "--construction", "concrete 140", "-o", str(tmp_path / "out"), "-q"]
+    details = ["--project", "Block <B>", "--client", "A & B"]
+    assert cli.main([*words, "--report", *details]) == 0
+    text = (tmp_path / "out" / "concrete_140.html").read_text(encoding="utf-8")
+    stated = re.search(r"Project: Block &lt;B&gt;<br>Client: A &amp; B<br>Date: (.*?)</p>", text)
+    assert stated
+    assert date.fromisoformat(stated[1])
+    assert "--report" in errors_of(*words, *details)
+
+
+def test_resonances_are_those_of_two_masses_on_a_spring(floor: PredictedFloor) -> None:
+    # The deck of 180 mm has 414 kg/m2, the screed 100 kg/m2 on 15 MN/m3.
+    screed = math.sqrt(15e6 * (1 / 100 + 1 / 414)) / (2 * math.pi)
+    ceiling = math.sqrt(1.2 * 343.0**2 / 0.2 * (1 / 9 + 1 / 414)) / (2 * math.pi)
+    assert resonances(floor.prediction) == pytest.approx(
+        {"floating plate on its layer": screed, "ceiling on its cavity": ceiling}
+    )
+    rows = [row[:2] for row in floor.assumptions]
+    assert ("resonance: floating plate on its layer", f"{screed:.1f} Hz") in rows
+
+
+def test_resonance_of_a_subceiling_has_the_stiffness_of_air_and_channels() -> None:
+    plate = thud.Plate(
+        thickness=0.05, subceiling_thickness=0.05, subceiling_density=2300.0,
+        subceiling_modulus=2300.0 * 3500.0**2, channel_stiffness=1e7, channel_spacing=0.1,
+    )  # fmt: skip
+    prediction = thud.predict_level(floor=plate, room=thud.Room())
+    stiffness = 1.2 * 343.0**2 / 0.1 + 1e7 / 0.1
+    (value,) = resonances(prediction).values()
+    assert value == pytest.approx(math.sqrt(2 * stiffness / 115) / (2 * math.pi))
 
 
 def test_levels_by_modes_end_with_the_modal_bands(floor: PredictedFloor) -> None:
@@ -331,6 +371,17 @@ def test_names_of_cases_stay_in_the_directory(name: str, tmp_path: Path) -> None
     out = tmp_path / "out"
     cli.main(["predict", str(tmp_path / "case.nml"), "-q", "-o", str(out)])
     assert {*tmp_path.iterdir()} <= {*before, out}
+
+
+def test_tyre_falls_on_constructions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tyre = str(REPOSITORY / "inputs" / "tyre.nml")
+    words = ["predict", tyre, "--construction", "concrete 180", "-o", str(tmp_path / "out")]
+    assert cli.main(words) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith("concrete 180\n  A-weighted level ")
+    assert "ISO 717-2" not in printed
+    case = thud.construction("concrete 180").case(thud.read_case(tyre))
+    assert thud.predict_level(thud.solve(case)).rated_text in printed
 
 
 def test_bad_input_is_one_sentence(tmp_path: Path, errors_of: ErrorsOf) -> None:

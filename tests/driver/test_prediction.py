@@ -188,6 +188,10 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
             naming("wall_lengths", "18.5 m"),
         ),
         (
+            ROOM_CASE.replace("volume = 40", "wall_lengths = 5, 4, 4\n wall_density = 900, 1800"),
+            naming("&room: wall_density", "2 values", "3 wall_lengths"),
+        ),
+        (
             ROOM_CASE.replace("volume = 40", "volume = 10, ceiling_mass = 9, ceiling_depth = 0.6"),
             naming("ceiling_depth", "0.6 m"),
         ),
@@ -609,6 +613,30 @@ def test_paths_share_the_energy_that_enters_the_room(
     assert pytest.approx(found.path_shares[:, :3], abs=1e-9) == np.array(columns).T
 
 
+def test_walls_have_one_construction_or_one_each(shell: thud.Impact) -> None:
+    room = thud.Room(wall_lengths=(5, 4, 5, 4), wall_junction="index")
+    one = thud.predict_level(shell, thud.Plate(), room)
+    values = {
+        "wall_thickness": 0.2, "wall_density": 2300.0, "wall_wave_speed": 3500.0,
+        "wall_loss_factor": 0.005, "junction_index": 10.0,
+    }  # fmt: skip
+    lists: dict[str, Any] = {key: (value,) * 4 for key, value in values.items()}
+    each = thud.predict_level(shell, thud.Plate(), replace(room, **lists))
+    assert each.level == pytest.approx(one.level, abs=1e-9)
+    assert each.path_shares == pytest.approx(one.path_shares, rel=1e-9)
+    # The third wall alone is changed.
+    heavy = replace(room, wall_junction="cross", wall_density=(2300.0, 2300.0, 4600.0, 2300.0))
+    same = replace(room, wall_junction="cross")
+    shares = thud.predict_level(shell, thud.Plate(), heavy).path_shares
+    before = thud.predict_level(shell, thud.Plate(), same).path_shares
+    assert (shares[:, 3] < before[:, 3]).all()
+    assert (shares[:, 1] > shares[:, 3]).all()
+    soft = thud.predict_level(
+        shell, thud.Plate(), replace(room, junction_index=(10.0, 10.0, 10.0, 30.0))
+    )
+    assert (soft.path_shares[:, 4] < 0.03 * one.path_shares[:, 4]).all()
+
+
 def test_covering_lowers_both_predictions_by_its_improvement(shell: thud.Impact) -> None:
     bare = thud.predict_level(shell, thud.Plate(), thud.Room())
     octaves = (1.0, 3.0, 6.0, 10.0)
@@ -667,6 +695,17 @@ def test_edges_of_floating_plates_do_not_silence_high_bands(edges: str) -> None:
     simple = thud.predict_level(floor=deck, room=room).level
     other = thud.predict_level(floor=replace(deck, screed_edges=edges), room=room).level
     assert np.abs(other - simple).max() < 1.0
+
+
+def test_losses_of_edge_strips_lower_the_levels_by_modes() -> None:
+    floor = thud.Plate(screed_thickness=0.05, screed_edges="strip")
+    levels = [
+        thud.predict_level(floor=replace(floor, strip_loss_factor=value), room=thud.Room())
+        for value in (0.0, 0.1, 0.5)
+    ]
+    none, some, much = (level.modal_level[:3] for level in levels)
+    assert (none > some).all()
+    assert (some > much).all()
 
 
 @pytest.mark.parametrize(

@@ -303,20 +303,22 @@ class Room(Group):
         <= 100.
     wall_height : float
         Height of the walls, m; 0.5 <= wall_height <= 20.
-    wall_thickness : float
-        Thickness of the walls, m; 0.005 <= wall_thickness <= 2.
-    wall_density : float
-        Density of the walls, kg/m3; 10 <= wall_density <= 20000.
-    wall_wave_speed : float
-        Speed of longitudinal waves in the walls, m/s; 100 <= wall_wave_speed <= 10000.
-    wall_loss_factor : float
-        Internal loss factor of the walls; 0 <= wall_loss_factor <= 1.
+    wall_thickness : float | sequence of float
+        Thickness of the walls: one, or one for each of wall_lengths, m; 0.005 <= wall_thickness <=
+        2.
+    wall_density : float | sequence of float
+        Density of the walls: one, or one for each, kg/m3; 10 <= wall_density <= 20000.
+    wall_wave_speed : float | sequence of float
+        Speed of longitudinal waves in the walls: one, or one for each, m/s; 100 <= wall_wave_speed
+        <= 10000.
+    wall_loss_factor : float | sequence of float
+        Internal loss factor of the walls: one, or one for each; 0 <= wall_loss_factor <= 1.
     wall_junction : str
         Junction of floor and walls: rigid cross or T, or described by junction_index; "cross",
         "t", "index".
-    junction_index : float
-        Vibration reduction index from floor to wall, for wall_junction index, dB; -10 <=
-        junction_index <= 80.
+    junction_index : float | sequence of float
+        Vibration reduction index from floor to wall, for wall_junction index: one, or one for each
+        wall, dB; -10 <= junction_index <= 80.
     ceiling_mass : float
         Mass per unit area of a suspended ceiling; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
     ceiling_depth : float
@@ -349,12 +351,12 @@ class Room(Group):
     sound_speed: float = 343.0
     wall_lengths: Sequence[float] = ()
     wall_height: float = 2.5
-    wall_thickness: float = 0.2
-    wall_density: float = 2300.0
-    wall_wave_speed: float = 3500.0
-    wall_loss_factor: float = 0.005
+    wall_thickness: float | Sequence[float] = (0.2,)
+    wall_density: float | Sequence[float] = (2300.0,)
+    wall_wave_speed: float | Sequence[float] = (3500.0,)
+    wall_loss_factor: float | Sequence[float] = (0.005,)
     wall_junction: RoomWallJunction = "cross"
-    junction_index: float = 10.0
+    junction_index: float | Sequence[float] = (10.0,)
     ceiling_mass: float = 0.0
     ceiling_depth: float = 0.1
     ceiling_loss_factor: float = 0.3
@@ -642,6 +644,8 @@ class RectangularFloor(Group):
     strip_stiffness : float
         Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
         strip_stiffness <= 1e+12.
+    strip_loss_factor : float
+        Loss factor of these strips; default: an estimate; 0 <= strip_loss_factor <= 1.
     bridge_x : sequence of float
         Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
     bridge_y : sequence of float
@@ -701,6 +705,7 @@ class RectangularFloor(Group):
     layer_loss_factor: float = 0.1
     screed_edges: RectangularFloorScreedEdges = "simple"
     strip_stiffness: float = 1000000.0
+    strip_loss_factor: float = 0.1
     bridge_x: Sequence[float] = ()
     bridge_y: Sequence[float] = ()
     bridge_stiffness: float = 100000000.0
@@ -1370,6 +1375,7 @@ KEYS = (
     Key("plate", "plate", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("plate", "plate", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
     Key("plate", "plate", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
     Key("plate", "plate", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("plate", "plate", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
@@ -1420,6 +1426,7 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
     Key("laminate_floor", "laminate_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("laminate_floor", "laminate_floor", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
@@ -1476,6 +1483,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
     Key("joist_floor", "joist_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
@@ -1530,12 +1538,12 @@ KEYS = (
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
     Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),
     Key("room", "room", "wall_height", "real", "m", "height of the walls", (), 0.5, 20.0),
-    Key("room", "room", "wall_thickness", "real", "m", "thickness of the walls", (), 0.005, 2.0),
-    Key("room", "room", "wall_density", "real", "kg/m3", "density of the walls", (), 10.0, 20000.0),
-    Key("room", "room", "wall_wave_speed", "real", "m/s", "speed of longitudinal waves in the walls", (), 100.0, 10000.0),
-    Key("room", "room", "wall_loss_factor", "real", "", "internal loss factor of the walls", (), 0.0, 1.0),
+    Key("room", "room", "wall_thickness", "list", "m", "thickness of the walls: one, or one for each of wall_lengths", (), 0.005, 2.0),
+    Key("room", "room", "wall_density", "list", "kg/m3", "density of the walls: one, or one for each", (), 10.0, 20000.0),
+    Key("room", "room", "wall_wave_speed", "list", "m/s", "speed of longitudinal waves in the walls: one, or one for each", (), 100.0, 10000.0),
+    Key("room", "room", "wall_loss_factor", "list", "", "internal loss factor of the walls: one, or one for each", (), 0.0, 1.0),
     Key("room", "room", "wall_junction", "choice", "", "junction of floor and walls: rigid cross or T, or described by junction_index", ('cross', 't', 'index')),
-    Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, for wall_junction index", (), -10.0, 80.0),
+    Key("room", "room", "junction_index", "list", "dB", "vibration reduction index from floor to wall, for wall_junction index: one, or one for each wall", (), -10.0, 80.0),
     Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass per unit area of a suspended ceiling; 0: none", (), 0.0, 200.0),
     Key("room", "room", "ceiling_depth", "real", "m", "depth of the air cavity above the ceiling", (), 0.01, 2.0),
     Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),

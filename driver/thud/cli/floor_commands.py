@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections import Counter
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,6 +74,11 @@ def predict(options: argparse.Namespace) -> int:
     from thud.report.floor_files import contents, file_names, screen_text
     from thud.report.predicted_floor import PredictedFloor
 
+    stated = (("Project", options.project), ("Client", options.client))
+    details = tuple((name, text.strip()) for name, text in stated if text and text.strip())
+    if details and not options.report:
+        refuse("project and client are part of a report", "--report with them")
+    details += (("Date", datetime.now().astimezone().date().isoformat()),)
     files = [name for name in options.construction if name.endswith(".toml")]
     results = results_of(options, "prediction", [*options.cases, *files])
     cases, chosen = _floor_cases(options.cases, options.construction)
@@ -84,7 +90,7 @@ def predict(options: argparse.Namespace) -> int:
     results.require(file_names(names.values(), report=options.report))
     comparison = _compare(cases, options)
     floors = [
-        PredictedFloor(name.replace("_", " "), names[name], prediction, chosen.get(name))
+        PredictedFloor(name.replace("_", " "), names[name], prediction, chosen.get(name), details)
         for name, prediction in comparison.predictions.items()
     ]
     written = contents(floors, results.folder, report=options.report)
@@ -241,6 +247,8 @@ PREDICT = Command(
             action="store_true",
             help="also two pages for each floor (PDF, HTML), and what would change its rating",
         ),
+        argument("--project", metavar="TEXT", help="project, on the first page of the report"),
+        argument("--client", metavar="TEXT", help="client, on the first page of the report"),
         *output("the results (default: outputs/prediction)"),
         QUIET,
     ),

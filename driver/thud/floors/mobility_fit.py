@@ -76,6 +76,9 @@ _MIN_ERROR = 1e-8
 # Maximum error of the fit without a warning, and maximum factor by which passivity increases it.
 _MAX_ERROR = 0.1
 _MAX_INCREASE = 1.5
+# Range of geometric means of mobilities of floors, m/(N s): 0.5 m of concrete has 2e-7, one board
+# on timber joists 8e-4.
+_PLAUSIBLE = (1e-7, 1e-3)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,7 +149,7 @@ class MobilityFit(Displayed):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on possible faults of the fit."""
-        result = []
+        result = _unit_warnings(self.measured)
         negative = np.mean(self.measured.real < 0)
         if negative > 0:
             result.append(
@@ -262,8 +265,22 @@ def fit_mobility(
             return _best_fit(name, frequency, values)
         return _fit(name, frequency, values, order)
     except ThudError as error:
-        message = f"{label}: {error}"
+        message = "; ".join([f"{label}: {error}", *_unit_warnings(values)])
         raise type(error)(message) from error
+
+
+def _unit_warnings(values: NDArray[np.complex128]) -> list[str]:
+    """Return a warning of mobilities, m/(N s), that no floor has; otherwise nothing."""
+    mean = np.exp(np.mean(np.log(np.abs(values))))
+    low, high = _PLAUSIBLE
+    if low <= mean <= high:
+        return []
+    message = (
+        f"the mean mobility, {mean:.2g} m/(N s), is not that of a floor ({low:g} to {high:g} "
+        "m/(N s)): check the units (m and N, not mm or kN), and whether the values are of another "
+        "quantity, or an impedance"
+    )
+    return [message]
 
 
 def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:

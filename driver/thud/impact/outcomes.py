@@ -11,6 +11,7 @@ from thud.base._schema import SampleQuantities
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL, SAMPLE_RESULTS, SCALAR_QUANTITIES
+from thud.impact.sample_messages import NO_ERRORS, STATISTICAL, sample_warnings
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -94,6 +95,18 @@ class Ensemble(SampleQuantities, Displayed):
         is_assessed = np.isfinite(self.margin).any() or (self.status != 0).all()
         verdict = f"{self.conforms.sum()} conform" if is_assessed else "not assessed"
         return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Samples without results and the most frequent reason, and sources without conformity."""
+        # Without levels, nothing is known of the source.
+        conforms = None if self.room_rating is None else self.conforms | np.isnan(self.margin)
+        return sample_warnings(self.status, self.reason, conforms)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """That samples state no numerical errors, and the kind of ratings."""
+        return (NO_ERRORS,) if self.room_rating is None else (NO_ERRORS, STATISTICAL)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""

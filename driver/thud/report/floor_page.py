@@ -30,6 +30,7 @@ BODY = Template("""<header>
 <div class="verdict"><b>$rating</b><br>$box</div>
 <h1>Predicted impact sound</h1>
 <p>$name</p>
+<p class="details">$details</p>
 </header>
 <table class="columns"><tr>
 <td><h2>Construction, to scale</h2>$section</td>
@@ -64,6 +65,7 @@ $warnings
 STYLE = """
 .verdict b { text-transform: none; }
 .whole { white-space: nowrap; }
+.details { font-size: 1em; }
 .sheet { break-after: page; }
 .figure { height: auto; }
 .named td:last-child, .named th:last-child { text-align: left; white-space: normal;
@@ -131,6 +133,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         rating=escaped(floor.prediction.rated_text),
         box="<br>".join(map(symbols, _box(floor))),
         name=escaped(floor.name),
+        details="<br>".join(escaped(f"{name}: {text}") for name, text in floor.details),
         section=_figure(section, "s"),
         about=pair_rows(_about(floor)),
         quantity=symbols(prediction.rated_name),
@@ -181,7 +184,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
 def page_texts(floor: PredictedFloor) -> str:
     """Return the texts of a page that users have stated, in any script."""
     texts = [floor.name, *(layer.material for layer in floor.layers)]
-    texts += [text for row in floor.assumptions for text in row]
+    texts += [text for row in [*floor.details, *floor.assumptions] for text in row]
     return "".join(texts + ([floor.construction.note] if floor.construction else []))
 
 

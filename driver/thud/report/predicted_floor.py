@@ -25,6 +25,7 @@ from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.floors.constructions import Layer
 from thud.floors.prediction import BANDS, predict_level
+from thud.floors.resonances import resonances
 from thud.level.levels import get_bands
 from thud.level.rating import rating
 
@@ -106,12 +107,15 @@ class PredictedFloor:
         Level in the room below.
     construction : Construction or None
         Construction, with sources of its values; None for the floor of a case.
+    details : tuple of (str, str)
+        Names and texts at the head of the page, such as project, client and date.
     """
 
     name: str
     file: str
     prediction: RoomPrediction
     construction: Construction | None = None
+    details: tuple[tuple[str, str], ...] = ()
 
     @property
     def layers(self) -> tuple[Layer, ...]:
@@ -185,9 +189,16 @@ class PredictedFloor:
 
     @property
     def assumptions(self) -> list[tuple[str, str, str]]:
-        """Quantity, value with unit, and source of the main and the stated values."""
+        """Quantity, value with unit, and source of the main and the stated values.
+
+        The resonances that follow from them are the last.
+        """
         rows = [(meaning, value, source) for _, meaning, value, source in self._values() if source]
-        return [("Quantity", "Value", "Source"), *rows]
+        computed = [
+            (f"resonance: {name}", f"{number_text(value)} Hz", "from both masses and the stiffness")
+            for name, value in resonances(self.prediction).items()
+        ]
+        return [("Quantity", "Value", "Source"), *rows, *computed]
 
     @property
     def defaults(self) -> list[str]:

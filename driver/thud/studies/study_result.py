@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections import Counter
 from typing import TYPE_CHECKING
 
 from thud.base.display import Displayed
 from thud.base.tables import format_rows
+from thud.impact.sample_messages import NO_ERRORS, STATISTICAL, sample_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
-
-_NO_ERRORS = "The samples state no numerical errors; a run of a single case states its own."
-_STATISTICAL = (
-    "the ratings of samples are statistical predictions; thud-driver predict also states that by "
-    "modes, and the interval of the rating"
-)
 
 
 class StudyResult(Displayed):
@@ -68,25 +62,14 @@ class SampleResult(StudyResult):
     @property
     def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
         """Samples without results and the most frequent reason, and sources without conformity."""
-        failed = self.dataset["status"].values != 0
-        result = []
-        if failed.any():
-            ((reason, _),) = Counter(self.dataset["reason"].values[failed]).most_common(1)
-            count = f"{failed.sum()} of {failed.size} samples have no results"
-            result.append(f"{count}; most frequent reason: {reason}")
-        if "room_rating" in self.dataset:
-            others = ~failed & ~self.dataset["conforms"].values
-            if others.any():
-                result.append(
-                    f"the sources of {others.sum()} of {failed.size} samples do not conform: their "
-                    "levels in the room are not those of a standard source"
-                )
-        return tuple(result)
+        data = self.dataset
+        conforms = data["conforms"].values if "room_rating" in data else None
+        return sample_warnings(data["status"].values, data["reason"].values, conforms)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Accuracy of the surrogate with its undecided verdicts, and the kind of ratings."""
-        result = [_STATISTICAL] if "room_rating" in self.dataset else []
+        result = [STATISTICAL] if "room_rating" in self.dataset else []
         if "surrogate" in self.dataset.attrs:
             undecided = self.dataset["undecided"]
             share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
@@ -97,7 +80,7 @@ class SampleResult(StudyResult):
         """Return the result as text; it says that the samples of a model state no errors."""
         if "surrogate" in self.dataset.attrs:
             return super().table()
-        return f"{super().table()}\n{_NO_ERRORS}"
+        return f"{super().table()}\n{NO_ERRORS}"
 
     @property
     def succeeded(self) -> bool:

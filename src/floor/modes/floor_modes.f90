@@ -126,7 +126,7 @@ contains
       do i = 1, size(stack%plate)
          associate (plate => stack%plate(i))
             key = [key, plate%along, plate%across, plate%coupling, plate%torsion, plate%shear, plate%mass, plate%inertia, &
-               plate%loss_factor, plate%edge%deflection, plate%edge%rotation]
+               plate%loss_factor, plate%edge%deflection, plate%edge%rotation, plate%edge%loss_factor]
             if (allocated(plate%line_x)) key = [key, 1.0_wp, plate%line_x]
             if (allocated(plate%line_y)) key = [key, 2.0_wp, plate%line_y]
             if (.not. allocated(plate%ribs)) cycle

@@ -27,6 +27,8 @@ module thud_plate_stack
    type :: edge_type
       !> Stiffness against deflection, N/m2, and against rotation, N, per length.
       real(wp) :: deflection = rigid_support, rotation = 0.0_wp
+      !> Loss factor of both springs.
+      real(wp) :: loss_factor = 0.0_wp
    end type edge_type
 
    !> Equal beams below a plate, all along its length or all along its width.
@@ -168,7 +170,8 @@ contains
       do i = 1, size(stack%plate)
          associate (edges => stack%plate(i)%edge(2*direction - 1:2*direction))
             yes = yes .and. abs(edges(1)%deflection - edges(2)%deflection) <= 0.0_wp &
-               .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp
+               .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp &
+               .and. abs(edges(1)%loss_factor - edges(2)%loss_factor) <= 0.0_wp
          end associate
          if (direction == 1 .and. allocated(stack%plate(i)%line_x)) yes = yes .and. size(stack%plate(i)%line_x) == 0
          if (direction == 2 .and. allocated(stack%plate(i)%line_y)) yes = yes .and. size(stack%plate(i)%line_y) == 0

@@ -279,21 +279,21 @@ contains
       integer :: i
 
       do i = 1, 2
-         call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection)
-         associate (rotation => plate%edge(2*i - 1:2*i)%rotation)
+         associate (rotation => plate%edge(2*i - 1:2*i)%rotation, loss_factor => plate%edge(2*i - 1:2*i)%loss_factor)
+            call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection, loss_factor)
             if (motion%a == 0) then
-               call add_ends(system, i, motion%w, motion%deflection, 1, rotation)
+               call add_ends(system, i, motion%w, motion%deflection, 1, rotation, loss_factor)
             else if (i == 1) then
-               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation)
+               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation, loss_factor)
             else
-               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation)
+               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation, loss_factor)
             end if
          end associate
       end do
    end subroutine add_edges
 
    !> Springs along both edges across one direction.
-   subroutine add_ends(system, direction, number, shape, order, spring)
+   subroutine add_ends(system, direction, number, shape, order, spring, loss_factor)
       type(ritz_system_type), intent(inout) :: system
       !> 1: edges x = constant, 2: edges y = constant.
       integer, intent(in) :: direction
@@ -302,22 +302,22 @@ contains
       type(product_type), intent(in) :: shape
       !> Order of the derivative that the springs resist.
       integer, intent(in) :: order
-      !> Stiffness per length.
-      real(wp), intent(in) :: spring(2)
+      !> Stiffness per length, and its loss factor.
+      real(wp), intent(in) :: spring(2), loss_factor(2)
       real(wp) :: ends(2)
       integer :: i, n
 
       ends = [0.0_wp, merge(shape%x%length, shape%y%length, direction == 1)]
-      n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp)
+      n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp .and. abs(loss_factor(1) - loss_factor(2)) <= 0.0_wp)
       do i = 1, 3 - n
          if (.not. spring(i) < rigid_support) cycle
          associate (at => ends(i:i + n - 1))
             if (direction == 1) then
                call add_stiffness(system, number, number, spring(i), get_point_matrix(shape%x, at, order), &
-                  get_overlap(shape%y, 0, shape%y, 0), 0.0_wp)
+                  get_overlap(shape%y, 0, shape%y, 0), loss_factor(i))
             else
                call add_stiffness(system, number, number, spring(i), get_overlap(shape%x, 0, shape%x, 0), &
-                  get_point_matrix(shape%y, at, order), 0.0_wp)
+                  get_point_matrix(shape%y, at, order), loss_factor(i))
             end if
          end associate
       end do

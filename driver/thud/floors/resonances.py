@@ -1,0 +1,40 @@
+"""Mass–spring–mass resonances of the plates of a floor on its layers and cavities."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from thud.base._schema import JoistFloor, RectangularFloor
+
+if TYPE_CHECKING:
+    from thud.floors.prediction import RoomPrediction
+
+
+def resonances(prediction: RoomPrediction) -> dict[str, float]:
+    """Return the resonance of each light plate on the bearing floor, Hz, by its name.
+
+    Each is that of two masses per unit area on the stiffness of what is between them: the resilient
+    layer, or the air of the cavity with the lines that hold a subceiling. Bending, edges and
+    bridges are neglected, and so are further plates.
+    """
+    floor, room = prediction.floor, prediction.room
+    # Stiffness per unit area of a cavity of 1 m, N/m2.
+    air = room.air_density * room.sound_speed**2
+    # Mass, kg/m2, and stiffness, N/m3.
+    plates: dict[str, tuple[float, float]] = {}
+    if isinstance(floor, RectangularFloor):
+        if floor.screed_thickness:
+            mass = floor.screed_thickness * floor.screed_density
+            plates["floating plate on its layer"] = mass, floor.layer_stiffness
+        if floor.subceiling_thickness:
+            spacing = floor.spacing if isinstance(floor, JoistFloor) else floor.channel_spacing
+            mass = floor.subceiling_thickness * floor.subceiling_density
+            stiffness = air / floor.cavity_depth + floor.channel_stiffness / spacing
+            plates["subceiling on cavity and channels"] = mass, stiffness
+    if room.ceiling_mass:
+        plates["ceiling on its cavity"] = room.ceiling_mass, air / room.ceiling_depth
+    return {
+        name: math.sqrt(stiffness * (1 / mass + 1 / prediction.mass_per_area)) / (2 * math.pi)
+        for name, (mass, stiffness) in plates.items()
+    }
