@@ -61,6 +61,12 @@ module thud_ritz_system
    type :: mode_block_type
       !> Angular frequencies, ascending, rad/s, loss factors, and fractions of the energy in the bearing plate: [n_mode].
       real(wp), allocatable :: omega(:), loss_factor(:), bearing_share(:)
+      !> Stiffness times loss factor, and stiffness of the bearing plate, rad2/s2: [n_mode, n_mode]; not allocated if all parts
+      !> have one loss factor, and if all belong to the bearing plate.
+      real(wp), allocatable :: damping(:, :), bearing(:, :)
+      !> Squared angular frequencies with their losses, rad2/s2, of modes with losses as sums of these modes, and the matrix
+      !> of the sums (`thud_mode_mixing`): [n_mode], [n_mode, n_mode]; not allocated if the modes remain as they are.
+      complex(wp), allocatable :: pole(:), mixing(:, :)
       !> Shapes of the displacements; not allocated for static ones: [n_displacement].
       type(shape_type), allocatable :: shape(:)
    end type mode_block_type
@@ -310,8 +316,8 @@ contains
       ! `stiffness` contains the shapes now. Without stiffness and losses, a mode moves as a rigid body.
       block%omega = omega
       associate (terms => system%stiffness)
-         block%loss_factor = get_share(terms%loss_factor)
-         block%bearing_share = get_share(merge(1.0_wp, 0.0_wp, terms%in_bearing))
+         call get_part(terms%loss_factor, block%loss_factor, block%damping)
+         call get_part(merge(1.0_wp, 0.0_wp, terms%in_bearing), block%bearing_share, block%bearing)
       end associate
       i = 0
       do p = 1, n
@@ -330,21 +336,25 @@ contains
          matrix = get_transposed_product(transformation, get_product(matrix, transformation))
       end subroutine condense
 
-      !> Weighted sum of the energies of the stiffnesses in each mode, over their sum: [n_mode].
-      function get_share(weight) result(share)
+      !> Weighted sum of the stiffnesses.
+      subroutine get_part(weight, share, part)
          !> Weights of the stiffnesses.
          real(wp), intent(in) :: weight(:)
-         real(wp) :: share(size(omega))
+         !> Its energy in each mode, over that of all stiffnesses: [n_mode].
+         real(wp), allocatable, intent(out) :: share(:)
+         !> The sum: [n_mode, n_mode]; not allocated if all weights are equal.
+         real(wp), allocatable, intent(out) :: part(:, :)
          real(wp), allocatable :: matrix(:, :)
 
-         share = weight(1)
+         share = spread(weight(1), 1, size(omega))
          if (any(abs(weight - weight(1)) > 0.0_wp)) then
             call assemble(system%stiffness, weight, block, first, matrix)
             if (size(static) > 0) call condense(matrix)
-            share = sum(stiffness*get_product(matrix, stiffness), dim=1)/max(omega**2, tiny(omega))
+            part = get_transposed_product(stiffness, get_product(matrix, stiffness))
+            share = [(part(i, i), i=1, size(omega))]/max(omega**2, tiny(omega))
          end if
          where (omega <= 0.0_wp) share = 0.0_wp
-      end function get_share
+      end subroutine get_part
    end subroutine solve_block
 
    !> Matrix of a block.
