@@ -540,12 +540,12 @@ contains
          integer, intent(in) :: number
          real(wp) :: product(size(pole))
          complex(wp) :: unmixed(size(pole), 1)
-         integer :: k, l
+         integer :: i, k, l
 
          unmixed = 0.0_wp
          do k = mixing%first(number), mixing%first(number + 1) - 1
             l = mixing%column(k)
-            unmixed(:, 1) = unmixed(:, 1) + conjg(mixing%weight(k)*get_cross_integrals(l, [(l, l=1, size(pole))])) &
+            unmixed(:, 1) = unmixed(:, 1) + conjg(mixing%weight(k)*get_cross_integrals(l, [(i, i=1, size(pole))])) &
                *matmul(gain, conjg(gain(l, :)))
          end do
          product = real(reshape(get_mixed(mixing, unmixed), [size(pole)]), wp)
@@ -676,7 +676,7 @@ contains
          return
       end if
       ! With the matrix W: W (product * (W' G W)) W', where ' is the conjugate transpose.
-      product = product*get_hermitian(get_unmixed(mixing, get_hermitian(get_unmixed(mixing, cmplx(drive, kind=wp)))))
+      product = product*get_unmixed(mixing, get_hermitian(get_unmixed(mixing, cmplx(drive, kind=wp))))
       response = real(get_mixed(mixing, get_hermitian(get_mixed(mixing, product))), wp)
    end function get_responses
 
