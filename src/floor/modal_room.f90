@@ -9,7 +9,7 @@ module thud_modal_room
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_kinds, only: wp
    use thud_matrix_product, only: get_product, get_transposed_product
-   use thud_mode_mixing, only: get_mixed, get_mixing, get_unmixed, mixing_type
+   use thud_mode_mixing, only: get_mixed, get_mixing, get_unmixed, is_identity, mixing_type
    use thud_plate, only: air_type
    use thud_ritz_system, only: get_mode_values, get_ranges
    use thud_transform, only: get_signal
@@ -248,7 +248,9 @@ contains
       !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
       complex(wp), allocatable, intent(out) :: sound(:, :, :)
       type(modal_room_type), intent(inout) :: room
-      complex(wp), dimension(size(pole), size(drive, 2)) :: gain, unmixed, velocity
+      complex(wp), dimension(size(pole), size(drive, 2)) :: gain, stressed, velocity
+      complex(wp), dimension(size(pole)) :: input, response
+      real(wp) :: square(size(pole))
       ! Real parts, then imaginary parts, for each ball or microphone.
       real(wp) :: flow(size(answers%input, 1), 2*size(drive, 2))
       real(wp), allocatable :: amplitude(:, :), pressure(:, :)
@@ -257,19 +259,32 @@ contains
       n_ball = size(drive, 2)
       n_microphone = size(answers%pressure, 2)/2
       allocate (sound(size(frequency), n_microphone, n_ball))
-      room%floor_input = 0.0_wp
       room%floor_loss = 0.0_wp
       room%room_input = 0.0_wp
       room%room_loss = 0.0_wp
       gain = get_unmixed(mixing, cmplx(drive, kind=wp))
+      input = 0.0_wp
+      square = 0.0_wp
       do i = 1, size(frequency)
          associate (w => 2*pi*frequency(i))
-            unmixed = gain*spread(spectrum(i)*cmplx(0.0_wp, w, wp)/(pole - w**2), 2, n_ball)
-            velocity = get_mixed(mixing, unmixed)
-            room%floor_input = room%floor_input + real(sum(conjg(spectrum(i))*drive*velocity, dim=1), wp)
-            ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
-            room%floor_loss = room%floor_loss &
-               + aimag(sum(conjg(velocity)*get_mixed(mixing, spread(pole, 2, n_ball)*unmixed), dim=1))/w
+            response = spectrum(i)*cmplx(0.0_wp, w, wp)/(pole - w**2)
+            do j = 1, n_ball
+               velocity(:, j) = gain(:, j)*response
+            end do
+            input = input + conjg(spectrum(i))*response
+            if (is_identity(mixing)) then
+               square = square + (response%re**2 + response%im**2)/w
+            else
+               ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
+               do j = 1, n_ball
+                  stressed(:, j) = pole*velocity(:, j)
+               end do
+               velocity = get_mixed(mixing, velocity)
+               stressed = get_mixed(mixing, stressed)
+               do j = 1, n_ball
+                  room%floor_loss(j) = room%floor_loss(j) + aimag(dot_product(velocity(:, j), stressed(:, j)))/w
+               end do
+            end if
          end associate
          ! Volume flow into the shapes of the room, m3/s per Hz.
          do k = 1, size(groups)
@@ -292,8 +307,8 @@ contains
             pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
       end do
       associate (step => frequency(1))
-         room%floor_input = 2*step*room%floor_input
-         room%floor_loss = 2*step*room%floor_loss
+         room%floor_input = 2*step*real(matmul(input, gain**2), wp)
+         room%floor_loss = 2*step*(room%floor_loss + matmul(pole%im*square, drive**2))
          room%room_input = 2*step*room%room_input
          room%room_loss = 2*step*room%room_loss
       end associate
