@@ -81,7 +81,7 @@ contains
          end if
       end do
       modes%stack = stack
-      call get_stack_modes(stack, wanted, modes%modes, resolved, failed)
+      call get_stack_modes(stack, wanted, modes%modes, resolved, failed, mode_limit)
       if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
          return

@@ -1,6 +1,7 @@
 !> Modes of plates above each other, with ribs and resilient layers, as a Ritz system. The rotations of plates that are not
 !> rigid in shear (Mindlin) are static displacements.
 module thud_stack_modes
+   use thud_constants, only: pi
    use thud_function_set, only: amplitudes, cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
@@ -25,7 +26,7 @@ module thud_stack_modes
 contains
 
    !> Modes of a stack. The displacements of the plates are the first ones of the modes, in the same order.
-   subroutine get_stack_modes(stack, max_frequency, modes, resolved, failed)
+   subroutine get_stack_modes(stack, max_frequency, modes, resolved, failed, lower_limit)
       type(plate_stack_type), intent(in) :: stack
       !> Frequency up to which the modes are wanted, Hz.
       real(wp), intent(in) :: max_frequency
@@ -34,6 +35,9 @@ contains
       real(wp), intent(out) :: resolved
       !> The system has no solution.
       logical, intent(out) :: failed
+      !> Frequency of the highest modes whose losses may couple them, Hz (default: none).
+      real(wp), intent(in), optional :: lower_limit
+      real(wp) :: limit
       type(ritz_system_type) :: system
       type(plate_motion_type) :: motion(size(stack%plate))
       integer :: i
@@ -64,7 +68,9 @@ contains
       do i = 1, size(stack%plate) - 1
          call add_layer(system, stack%layer(i), stack%plate(i), motion(i), motion(i + 1))
       end do
-      call solve_ritz_system(system, modes, failed)
+      limit = 0.0_wp
+      if (present(lower_limit)) limit = 2*pi*lower_limit
+      call solve_ritz_system(system, modes, failed, limit)
    end subroutine get_stack_modes
 
    !> Whether springs fasten the first ribs of a plate.
