@@ -250,7 +250,7 @@ contains
       type(modal_room_type), intent(inout) :: room
       complex(wp), dimension(size(pole), size(drive, 2)) :: gain, stressed, velocity
       complex(wp), dimension(size(pole)) :: input, response
-      real(wp) :: square(size(pole))
+      real(wp), dimension(size(pole)) :: decay, loss, square
       ! Real parts, then imaginary parts, for each ball or microphone.
       real(wp) :: flow(size(answers%input, 1), 2*size(drive, 2))
       real(wp), allocatable :: amplitude(:, :), pressure(:, :)
@@ -262,18 +262,22 @@ contains
       room%floor_loss = 0.0_wp
       room%room_input = 0.0_wp
       room%room_loss = 0.0_wp
+      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
       gain = get_unmixed(mixing, cmplx(drive, kind=wp))
       input = 0.0_wp
       square = 0.0_wp
       do i = 1, size(frequency)
          associate (w => 2*pi*frequency(i))
-            response = spectrum(i)*cmplx(0.0_wp, w, wp)/(pole - w**2)
+            ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes them.
+            loss = pole%im
+            if (is_identity(mixing)) loss = w*decay
+            response = spectrum(i)*cmplx(0.0_wp, w, wp)/cmplx(pole%re - w**2, loss, wp)
             do j = 1, n_ball
                velocity(:, j) = gain(:, j)*response
             end do
             input = input + conjg(spectrum(i))*response
             if (is_identity(mixing)) then
-               square = square + (response%re**2 + response%im**2)/w
+               square = square + response%re**2 + response%im**2
             else
                ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
                do j = 1, n_ball
@@ -308,7 +312,7 @@ contains
       end do
       associate (step => frequency(1))
          room%floor_input = 2*step*real(matmul(input, gain**2), wp)
-         room%floor_loss = 2*step*(room%floor_loss + matmul(pole%im*square, drive**2))
+         room%floor_loss = 2*step*(room%floor_loss + matmul(decay*square, drive**2))
          room%room_input = 2*step*room%room_input
          room%room_loss = 2*step*room%room_loss
       end associate

@@ -24,7 +24,7 @@ module thud_mode_mixing
    integer, parameter :: max_sweeps = 20
 
    !> Entries of W below this are left out.
-   real(wp), parameter :: smallest_weight = 1.0e-4_wp
+   real(wp), parameter :: smallest_weight = 1.0e-3_wp
 
    !> The matrix W of some modes, by rows.
    type :: mixing_type
