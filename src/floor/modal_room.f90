@@ -5,10 +5,11 @@
 module thud_modal_room
    use thud_band, only: band_type
    use thud_constants, only: pi
-   use thud_floor_modes, only: floor_modes_type
+   use thud_floor_modes, only: floor_modes_type, get_poles
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_kinds, only: wp
    use thud_matrix_product, only: get_product, get_transposed_product
+   use thud_mode_mixing, only: get_mixed, get_mixing, get_unmixed, is_identity, mixing_type
    use thud_plate, only: air_type
    use thud_ritz_system, only: get_mode_values, get_ranges
    use thud_transform, only: get_signal
@@ -79,8 +80,6 @@ module thud_modal_room
       integer, allocatable :: pair(:), mode(:)
       !> Their coupling, m2/sqrt(kg): [n_pair, n_mode].
       real(wp), allocatable :: coupling(:, :)
-      !> Shapes of the modes at the balls, 1/sqrt(kg): [n_mode, n_ball].
-      real(wp), allocatable :: drive(:, :)
    end type group_type
 
    !> Answers of the room to the volume flow into a pair of half waves along length and width, at some frequencies.
@@ -145,7 +144,7 @@ contains
       !> Highest mid frequency of a band, Hz (default: the crossover).
       real(wp), intent(in), optional :: max_frequency
       real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), frequency(:)
-      complex(wp), allocatable :: spectrum(:), sound(:, :, :)
+      complex(wp), allocatable :: pole(:), spectrum(:), sound(:, :, :)
       integer, allocatable :: lx(:), ly(:), kept(:), moving(:)
       type(answers_type) :: answers
       real(wp) :: highest, duration, slowest
@@ -164,8 +163,9 @@ contains
             room%n_band = 0
             exit
          end if
-         omega = modes%omega(kept)
-         decay = omega*modes%loss_factor(kept)
+         pole = get_poles(modes, kept)
+         omega = sqrt(max(pole%re, tiny(1.0_wp)))
+         decay = pole%im/omega
          slowest = max(minval(decay), 1.0_wp)
          ! Modes far below the bands ring longest, but the filters of the bands remove them.
          if (.not. with_pressure) slowest = max(minval(decay, omega > pi*box%bands(1)%lower), slowest)
@@ -186,10 +186,11 @@ contains
       call get_pairs(box, highest, lx, ly)
       call get_coupling(modes, box, kept, lx, ly, coupling)
       call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive, kept)
-      room%floor_modes = size(omega)
+      room%floor_modes = size(pole)
       call get_answers(box, lx, ly, highest, frequency, microphone, answers)
       room%room_modes = answers%n_mode
-      call get_sound(omega, decay, drive, get_groups(lx, ly, coupling, drive), frequency, spectrum, answers, sound, room)
+      call get_sound(pole, get_mixing(modes%modes, kept), drive, get_groups(lx, ly, coupling), frequency, spectrum, answers, &
+         sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
       if (with_pressure) then
          allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
@@ -215,13 +216,11 @@ contains
    end subroutine get_modal_room
 
    !> Modes of floor and room that are coupled: by the parities of the half waves.
-   pure function get_groups(lx, ly, coupling, drive) result(group)
+   pure function get_groups(lx, ly, coupling) result(group)
       !> Half waves along length and width: [n_pair].
       integer, intent(in) :: lx(:), ly(:)
       !> Coupling of pairs and modes, m2/sqrt(kg): [n_pair, n_mode].
       real(wp), intent(in) :: coupling(:, :)
-      !> Shapes at the balls, 1/sqrt(kg): [n_mode, n_ball].
-      real(wp), intent(in) :: drive(:, :)
       type(group_type) :: group(4)
       integer :: i, k
 
@@ -230,15 +229,16 @@ contains
          group(i)%mode = pack([(k, k=1, size(coupling, 2))], &
             maxval(abs(coupling(group(i)%pair, :)), dim=1) > 1.0e-12_wp*maxval(abs(coupling)))
          group(i)%coupling = coupling(group(i)%pair, group(i)%mode)
-         group(i)%drive = drive(group(i)%mode, :)
       end do
    end function get_groups
 
    !> Spectra of the sound at the microphones, and energies of floor and room (Parseval).
-   subroutine get_sound(omega, decay, drive, groups, frequency, spectrum, answers, sound, room)
-      !> Angular frequencies, rad/s, and decay rates, 1/s, of the floor's modes: [n_mode].
-      real(wp), intent(in) :: omega(:), decay(:)
-      !> Their shapes at the balls, 1/sqrt(kg): [n_mode, n_ball].
+   subroutine get_sound(pole, mixing, drive, groups, frequency, spectrum, answers, sound, room)
+      !> Squared angular frequencies of the floor's modes with their losses, rad2/s2: [n_mode].
+      complex(wp), intent(in) :: pole(:)
+      !> Their sums of the modes without losses.
+      type(mixing_type), intent(in) :: mixing
+      !> Shapes of the modes without losses at the balls, 1/sqrt(kg): [n_mode, n_ball].
       real(wp), intent(in) :: drive(:, :)
       type(group_type), intent(in) :: groups(:)
       !> Frequencies in equal steps, Hz, and Fourier transform of the force, N s: [n_line].
@@ -248,8 +248,9 @@ contains
       !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
       complex(wp), allocatable, intent(out) :: sound(:, :, :)
       type(modal_room_type), intent(inout) :: room
-      complex(wp) :: velocity(size(omega))
-      real(wp), dimension(size(omega)) :: input, square
+      complex(wp), dimension(size(pole), size(drive, 2)) :: gain, stressed, velocity
+      complex(wp), dimension(size(pole)) :: input, response
+      real(wp), dimension(size(pole)) :: decay, loss, square
       ! Real parts, then imaginary parts, for each ball or microphone.
       real(wp) :: flow(size(answers%input, 1), 2*size(drive, 2))
       real(wp), allocatable :: amplitude(:, :), pressure(:, :)
@@ -258,23 +259,44 @@ contains
       n_ball = size(drive, 2)
       n_microphone = size(answers%pressure, 2)/2
       allocate (sound(size(frequency), n_microphone, n_ball))
-      input = 0.0_wp
-      square = 0.0_wp
+      room%floor_loss = 0.0_wp
       room%room_input = 0.0_wp
       room%room_loss = 0.0_wp
+      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
+      gain = get_unmixed(mixing, cmplx(drive, kind=wp))
+      input = 0.0_wp
+      square = 0.0_wp
       do i = 1, size(frequency)
          associate (w => 2*pi*frequency(i))
-            velocity = spectrum(i)*cmplx(0.0_wp, w, wp)/cmplx(omega**2 - w**2, w*decay, wp)
+            ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes them.
+            loss = pole%im
+            if (is_identity(mixing)) loss = w*decay
+            response = spectrum(i)*cmplx(0.0_wp, w, wp)/cmplx(pole%re - w**2, loss, wp)
+            do j = 1, n_ball
+               velocity(:, j) = gain(:, j)*response
+            end do
+            input = input + conjg(spectrum(i))*response
+            if (is_identity(mixing)) then
+               square = square + response%re**2 + response%im**2
+            else
+               ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
+               do j = 1, n_ball
+                  stressed(:, j) = pole*velocity(:, j)
+               end do
+               velocity = get_mixed(mixing, velocity)
+               stressed = get_mixed(mixing, stressed)
+               do j = 1, n_ball
+                  room%floor_loss(j) = room%floor_loss(j) + aimag(dot_product(velocity(:, j), stressed(:, j)))/w
+               end do
+            end if
          end associate
-         input = input + real(velocity*conjg(spectrum(i)), wp)
-         square = square + velocity%re**2 + velocity%im**2
          ! Volume flow into the shapes of the room, m3/s per Hz.
          do k = 1, size(groups)
-            associate (group => groups(k), in_group => velocity(groups(k)%mode))
+            associate (group => groups(k))
                allocate (amplitude(size(group%mode), 2*n_ball))
                do j = 1, n_ball
-                  amplitude(:, j) = in_group%re*group%drive(:, j)
-                  amplitude(:, n_ball + j) = in_group%im*group%drive(:, j)
+                  amplitude(:, j) = velocity(group%mode, j)%re
+                  amplitude(:, n_ball + j) = velocity(group%mode, j)%im
                end do
                flow(group%pair, :) = get_product(group%coupling, amplitude)
                deallocate (amplitude)
@@ -289,8 +311,8 @@ contains
             pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
       end do
       associate (step => frequency(1))
-         room%floor_input = 2*step*matmul(input, drive**2)
-         room%floor_loss = 2*step*matmul(decay*square, drive**2)
+         room%floor_input = 2*step*real(matmul(input, gain**2), wp)
+         room%floor_loss = 2*step*(room%floor_loss + matmul(decay*square, drive**2))
          room%room_input = 2*step*room%room_input
          room%room_loss = 2*step*room%room_loss
       end associate

@@ -5,16 +5,17 @@ module thud_floor_modes
    use thud_function_set, only: get_highest_wavenumber
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
+   use thud_mode_mixing, only: diagonalize
    use thud_plate, only: air_type, get_total_loss, plate_type
    use thud_plate_stack, only: is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
-   use thud_ritz_system, only: get_mode_values, modes_type
+   use thud_ritz_system, only: get_mode_values, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
    use thud_truncated_compliance, only: get_truncated_compliance
    implicit none (type, external)
    private
 
-   public :: floor_modes_type, get_floor_modes, new_floor_receiver
+   public :: floor_modes_type, get_floor_modes, get_poles, new_floor_receiver
 
    !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
    !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
@@ -65,7 +66,7 @@ contains
       !> Frequency up to which modes are wanted, Hz (default: `mode_limit`, and beyond for the static compliance).
       real(wp), intent(in), optional :: max_frequency
       type(plate_stack_type) :: held
-      real(wp), allocatable :: share(:), frequency(:), key(:)
+      real(wp), allocatable :: key(:)
       real(wp) :: wanted, resolved
       integer :: i
       logical :: failed
@@ -84,25 +85,83 @@ contains
          end if
       end do
       modes%stack = held
-      call get_stack_modes(held, wanted, modes%modes, resolved, failed)
+      call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
       if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
          return
       end if
       modes%sum_limit = 2*pi*resolved
       modes%limit = 2*pi*min(mode_limit, resolved/resolution)
+      do i = 1, size(modes%modes%block)
+         call add_bearing_losses(modes%modes%block(i), bearing, modes%limit)
+      end do
       associate (block => modes%modes%block)
          modes%omega = [(block(i)%omega, i=1, size(block))]
          modes%loss_factor = [(block(i)%loss_factor, i=1, size(block))]
-         share = [(block(i)%bearing_share, i=1, size(block))]
       end associate
-      frequency = max(modes%omega/(2*pi), 1.0_wp)
-      where (share > 0.0_wp) modes%loss_factor = modes%loss_factor + share*(get_total_loss(bearing, air_type(), frequency) &
-         - bearing%loss_factor)
       cached(oldest)%modes = modes
       call move_alloc(key, cached(oldest)%key)
       oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
+
+   !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
+   subroutine add_bearing_losses(block, bearing, limit)
+      type(mode_block_type), intent(inout) :: block
+      !> The bearing plate, with its total losses.
+      type(plate_type), intent(in) :: bearing
+      !> Angular frequency, rad/s.
+      real(wp), intent(in) :: limit
+      real(wp) :: added(size(block%omega))
+      complex(wp), allocatable :: matrix(:, :)
+      integer :: i, j, n
+
+      added = get_total_loss(bearing, air_type(), max(block%omega/(2*pi), 1.0_wp)) - bearing%loss_factor
+      n = count(block%omega < limit)
+      if (n > 1 .and. (allocated(block%damping) .or. allocated(block%bearing))) then
+         allocate (matrix(n, n), source=(0.0_wp, 0.0_wp))
+         if (allocated(block%damping)) matrix%im = block%damping(:n, :n)
+         do j = 1, n
+            if (.not. allocated(block%damping)) matrix(j, j)%im = block%loss_factor(j)*block%omega(j)**2
+            matrix(j, j)%re = block%omega(j)**2
+            ! The losses of two modes differ little, unless these are far apart.
+            if (allocated(block%bearing)) then
+               matrix(:, j)%im = matrix(:, j)%im + (added(:n) + added(j))/2*block%bearing(:n, j)
+            else
+               matrix(j, j)%im = matrix(j, j)%im + added(j)*block%bearing_share(j)*block%omega(j)**2
+            end if
+         end do
+         block%pole = block%omega**2*cmplx(1.0_wp, block%loss_factor + block%bearing_share*added, wp)
+         allocate (block%mixing(size(block%omega), size(block%omega)), source=(0.0_wp, 0.0_wp))
+         do i = n + 1, size(block%omega)
+            block%mixing(i, i) = 1.0_wp
+         end do
+         call diagonalize(matrix, block%mixing(:n, :n))
+         block%pole(:n) = [(matrix(i, i), i=1, n)]
+      end if
+      if (allocated(block%damping)) deallocate (block%damping)
+      if (allocated(block%bearing)) deallocate (block%bearing)
+      block%loss_factor = block%loss_factor + block%bearing_share*added
+   end subroutine add_bearing_losses
+
+   !> Squared angular frequencies with their losses, omega**2 (1 + i eta), of mixed modes, rad2/s2: [n_mode].
+   pure function get_poles(modes, kept) result(pole)
+      type(floor_modes_type), intent(in) :: modes
+      !> Numbers of the modes as in `get_ranges`.
+      integer, intent(in) :: kept(:)
+      complex(wp) :: pole(size(kept))
+      complex(wp), allocatable :: all_poles(:)
+      integer :: i, n
+
+      all_poles = modes%omega**2*cmplx(1.0_wp, modes%loss_factor, wp)
+      n = 0
+      do i = 1, size(modes%modes%block)
+         associate (block => modes%modes%block(i))
+            if (allocated(block%pole)) all_poles(n + 1:n + size(block%pole)) = block%pole
+            n = n + size(block%omega)
+         end associate
+      end do
+      pole = all_poles(kept)
+   end function get_poles
 
    !> Whether a plate yields in shear: its waves are short, and many functions gain little.
    pure function has_shear(stack) result(yes)

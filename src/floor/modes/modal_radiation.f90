@@ -9,10 +9,11 @@
 module thud_modal_radiation
    use thud_band, only: band_type
    use thud_constants, only: pi
-   use thud_floor_modes, only: floor_modes_type
+   use thud_floor_modes, only: floor_modes_type, get_poles
    use thud_function_set, only: function_set_type, get_functions, get_overlap, get_quadrature
    use thud_kinds, only: wp
    use thud_matrix_product, only: get_product, get_transposed_product
+   use thud_mode_mixing, only: get_mixed, get_mixing, get_part, get_unmixed, is_identity, mixing_type
    use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
    use thud_ritz_system, only: get_mode_values, get_ranges, product_type
    implicit none (type, external)
@@ -101,10 +102,11 @@ module thud_modal_radiation
       integer, allocatable :: mode(:)
       !> Shapes of the radiating plate.
       type(block_shapes_type) :: radiator
-      !> Means G over the strike points, and G times the integrals over the bearing plate and its part above the room, of
-      !> products of shapes: [n_mode, n_mode].
+      !> Means G over the strike points, and integrals over the bearing plate and its part above the room, of products of
+      !> shapes: [n_mode, n_mode].
       real(wp), allocatable :: drive(:, :), velocity(:, :), above(:, :)
-      !> Means of products of different shapes vanish.
+      type(mixing_type) :: mixing
+      !> Means of products of different shapes vanish, and losses mix no modes.
       logical :: is_orthogonal = .false.
    end type coupled_modes_type
 
@@ -153,6 +155,7 @@ contains
       type(sums_type) :: sums
       real(wp), allocatable :: drive(:, :)
       complex(wp), allocatable :: pole(:)
+      type(mixing_type) :: mixing
       integer, allocatable :: kept(:)
       real(wp) :: highest
       logical :: couples_all
@@ -174,15 +177,18 @@ contains
          ! Of so many modes, those far from the band matter little.
          if (size(kept) > merge(max_coupled, max_modes, couples_all)) kept = pack(kept, &
             modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
-         pole = max(modes%omega(kept), min_omega)**2*cmplx(1.0_wp, max(modes%loss_factor(kept), min_loss_factor), wp)
+         pole = get_poles(modes, kept)
+         pole%re = max(pole%re, min_omega**2)
+         pole%im = max(pole%im, min_loss_factor*pole%re)
+         mixing = get_mixing(modes%modes, kept)
          radiator = get_shapes(modes, modes%stack%radiator, kept)
          if (present(stated_strike)) then
             call get_mode_values(modes%modes, 1, modes%stack%length*stated_strike(1, :), &
                modes%stack%width*stated_strike(2, :), drive, kept)
-            call add_strikes(radiator, get_shapes(modes, modes%stack%bearing, kept), part, pole, drive, air, bands(i), &
+            call add_strikes(radiator, get_shapes(modes, modes%stack%bearing, kept), part, pole, mixing, drive, air, bands(i), &
                get_some(along, radiator%x), get_some(across, radiator%y), sums)
          else
-            call add_modes(get_coupled_modes(modes, part, radiator, kept), pole, air, bands(i), &
+            call add_modes(get_coupled_modes(modes, part, radiator, kept, mixing), pole, air, bands(i), &
                get_some(along, radiator%x), get_some(across, radiator%y), sums)
          end if
          if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
@@ -271,13 +277,14 @@ contains
    end function get_shapes
 
    !> Modes that take part, in sets whose shapes have products with a mean at the strike points.
-   function get_coupled_modes(modes, part, radiator, kept) result(coupled)
+   function get_coupled_modes(modes, part, radiator, kept, mixing) result(coupled)
       type(floor_modes_type), intent(in) :: modes
       type(part_type), intent(in) :: part
       !> Shapes of the radiating plate.
       type(shapes_type), intent(in) :: radiator
       !> Numbers of the modes: [n_mode].
       integer, intent(in) :: kept(:)
+      type(mixing_type), intent(in) :: mixing
       type(coupled_modes_type), allocatable :: coupled(:)
       type(shapes_type) :: struck, bearing
       integer, allocatable :: set(:), members(:), last(:)
@@ -297,11 +304,12 @@ contains
             these%mode = [([(j, j=last(members(k) - 1) + 1, last(members(k)))], k=1, size(members))]
             these%radiator = get_merged(radiator, members)
             these%drive = get_integrals(get_merged(struck, members), struck, part%struck)/part%area
-            these%velocity = these%drive*get_integrals(get_merged(bearing, members), bearing, overlap_type())
+            these%mixing = get_part(mixing, these%mode)
+            these%velocity = get_integrals(get_merged(bearing, members), bearing, overlap_type())
             these%above = these%velocity
-            if (allocated(part%bearing%x)) these%above = these%drive*get_integrals(get_merged(bearing, members), bearing, &
+            if (allocated(part%bearing%x)) these%above = get_integrals(get_merged(bearing, members), bearing, &
                part%bearing)
-            these%is_orthogonal = are_orthogonal(these%drive)
+            these%is_orthogonal = are_orthogonal(these%drive) .and. is_identity(these%mixing)
          end associate
       end do
    end function get_coupled_modes
@@ -435,12 +443,13 @@ contains
    end function get_weighted
 
    !> Integrals over the frequencies of a band and means over strike points, with the cross terms of the modes.
-   subroutine add_strikes(radiator, bearing, part, pole, drive, air, band, along, across, sums)
+   subroutine add_strikes(radiator, bearing, part, pole, mixing, drive, air, band, along, across, sums)
       !> Shapes of the radiating and of the bearing plate.
       type(shapes_type), intent(in) :: radiator, bearing
       type(part_type), intent(in) :: part
       !> Squared angular frequencies with their losses, omega**2 (1 + i eta), rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
+      type(mixing_type), intent(in) :: mixing
       !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
       real(wp), intent(in) :: drive(:, :)
       type(air_type), intent(in) :: air
@@ -456,7 +465,7 @@ contains
       weight = reshape([get_squares(radiator), get_squares(bearing)], [size(pole), 2])
       do j = 1, n_wavenumber
          edge = get_interval(band, j)
-         call get_amplitudes(pole, drive, weight, 2*pi*edge, amplitude)
+         call get_amplitudes(pole, mixing, drive, weight, 2*pi*edge, amplitude)
          sums%width = sums%width + 2*pi*(edge(2) - edge(1))*size(drive, 2)
          ! The functions are orthonormal.
          call get_coefficients(bearing, amplitude, coefficient)
@@ -475,9 +484,10 @@ contains
    !> With r_k = omega/(pole_k - omega**2), the integral of r_k conjg(r_l) is (F_k - conjg(F_l))/(conjg(pole_l) - pole_k), F
    !> being that of pole/(pole - omega**2). The amplitudes are the columns of a Cholesky factor of these integrals, the
    !> largest rest first, until the rest matters no more: far from their resonances, modes move alike at all frequencies.
-   subroutine get_amplitudes(pole, drive, weight, edge, amplitude)
+   subroutine get_amplitudes(pole, mixing, drive, weight, edge, amplitude)
       !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
+      type(mixing_type), intent(in) :: mixing
       !> Shapes under the forces, 1/sqrt(kg): [n_mode, n_force].
       real(wp), intent(in) :: drive(:, :)
       !> Weights of the squared amplitudes in the sums that are wanted: [n_mode, n_sum].
@@ -486,13 +496,14 @@ contains
       real(wp), intent(in) :: edge(2)
       !> The amplitudes, (rad/s)**(1/2) m/(N s) sqrt(kg): [n_mode, n].
       real(wp), allocatable, intent(out) :: amplitude(:, :)
-      complex(wp), dimension(size(pole)) :: integral
+      complex(wp) :: integral(size(pole)), gain(size(pole), size(drive, 2))
       real(wp), dimension(size(pole)) :: rest, share
       real(wp), allocatable :: factor(:, :)
       integer :: j, k, n
 
       integral = get_integral(pole, edge(1), edge(2))
-      rest = -integral%im/pole%im*sum(drive**2, dim=2)
+      gain = get_unmixed(mixing, cmplx(drive, kind=wp))
+      rest = [(get_square(j), j=1, size(pole))]
       share = 0.0_wp
       do k = 1, size(weight, 2)
          share = share + weight(:, k)/max(sum(weight(:, k)*rest), tiny(1.0_wp))
@@ -502,13 +513,52 @@ contains
       do while (n < size(pole))
          if (sum(share*rest) <= mean_error) exit
          j = maxloc(share*rest, dim=1)
-         factor(:, n + 1) = (real((integral - conjg(integral(j)))/(conjg(pole(j)) - pole), wp)*matmul(drive, drive(j, :)) &
-            - matmul(factor(:, :n), factor(j, :n)))/sqrt(rest(j))
+         factor(:, n + 1) = (get_products(j) - matmul(factor(:, :n), factor(j, :n)))/sqrt(rest(j))
          n = n + 1
          rest = max(rest - factor(:, n)**2, 0.0_wp)
          rest(j) = 0.0_wp
       end do
       amplitude = factor(:, :n)
+   contains
+
+      !> Integral of the squared response of a mode.
+      pure function get_square(number) result(square)
+         integer, intent(in) :: number
+         real(wp) :: square
+         integer :: k
+
+         associate (entry => [(k, k=mixing%first(number), mixing%first(number + 1) - 1)])
+            associate (of => mixing%column(entry))
+               square = real(sum([(mixing%weight(entry(k))*sum(get_cross_integrals(of(k), of)*conjg(mixing%weight(entry)) &
+                  *matmul(conjg(gain(of, :)), gain(of(k), :))), k=1, size(of))]), wp)
+            end associate
+         end associate
+      end function get_square
+
+      !> Integrals of the products of the responses of all modes with that of one: [n_mode].
+      pure function get_products(number) result(product)
+         integer, intent(in) :: number
+         real(wp) :: product(size(pole))
+         complex(wp) :: unmixed(size(pole), 1)
+         integer :: i, k, l
+
+         unmixed = 0.0_wp
+         do k = mixing%first(number), mixing%first(number + 1) - 1
+            l = mixing%column(k)
+            unmixed(:, 1) = unmixed(:, 1) + conjg(mixing%weight(k)*get_cross_integrals(l, [(i, i=1, size(pole))])) &
+               *matmul(gain, conjg(gain(l, :)))
+         end do
+         product = real(reshape(get_mixed(mixing, unmixed), [size(pole)]), wp)
+      end function get_products
+
+      !> Integrals of r_k conjg(r_l) of one mode k and others l.
+      pure function get_cross_integrals(one, others) result(cross)
+         integer, intent(in) :: one
+         integer, intent(in) :: others(:)
+         complex(wp) :: cross(size(others))
+
+         cross = (integral(one) - conjg(integral(others)))/(conjg(pole(others)) - pole(one))
+      end function get_cross_integrals
    end subroutine get_amplitudes
 
    !> Integral of pole/(pole - omega**2) over angular frequencies.
@@ -589,36 +639,54 @@ contains
          transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
          do i = 1, size(coupled)
             associate (these => coupled(i))
-               response = get_responses(pole(these%mode), 2*pi*edge)
+               response = get_responses(pole(these%mode), these%mixing, these%drive, 2*pi*edge)
                sums%velocity = sums%velocity + sum(response*these%velocity)
                sums%above = sums%above + sum(response*these%above)
                if (these%is_orthogonal) then
-                  sums%power = sums%power + sum(get_diagonal(response*these%drive) &
+                  sums%power = sums%power + sum(get_diagonal(response) &
                      *get_powers(transforms, these%radiator%x, these%radiator%y, these%radiator%coefficient))
                else
-                  sums%power = sums%power + sum(response*these%drive*get_pair_powers(transforms, these%radiator))
+                  sums%power = sums%power + sum(response*get_pair_powers(transforms, these%radiator))
                end if
             end associate
          end do
       end do
    end subroutine add_modes
 
-   !> Integrals over frequencies of the real parts of r_k conjg(r_l), as in `get_amplitudes`, s:
+   !> Integrals over frequencies and means over strike points of products of the responses of modes, rad/s (m/(N s))**2 kg:
    !> [n_mode, n_mode].
-   pure function get_responses(pole, edge) result(response)
+   pure function get_responses(pole, mixing, drive, edge) result(response)
       !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
+      type(mixing_type), intent(in) :: mixing
+      !> Means of products of shapes over the strike points, 1/kg: [n_mode, n_mode].
+      real(wp), intent(in) :: drive(:, :)
       !> Lowest and highest angular frequency, rad/s.
       real(wp), intent(in) :: edge(2)
       real(wp) :: response(size(pole), size(pole))
-      complex(wp) :: integral(size(pole))
+      complex(wp) :: integral(size(pole)), product(size(pole), size(pole))
       integer :: i
 
       integral = get_integral(pole, edge(1), edge(2))
       do i = 1, size(pole)
-         response(:, i) = real((integral - conjg(integral(i)))/(conjg(pole(i)) - pole), wp)
+         product(:, i) = (integral - conjg(integral(i)))/(conjg(pole(i)) - pole)
       end do
+      if (is_identity(mixing)) then
+         response = drive*real(product, wp)
+         return
+      end if
+      ! With the matrix W: W (product * (W' G W)) W', where ' is the conjugate transpose.
+      product = product*get_unmixed(mixing, get_hermitian(get_unmixed(mixing, cmplx(drive, kind=wp))))
+      response = real(get_mixed(mixing, get_hermitian(get_mixed(mixing, product))), wp)
    end function get_responses
+
+   !> Conjugate transpose of a matrix.
+   pure function get_hermitian(matrix) result(transposed)
+      complex(wp), intent(in) :: matrix(:, :)
+      complex(wp) :: transposed(size(matrix, 2), size(matrix, 1))
+
+      transposed = conjg(transpose(matrix))
+   end function get_hermitian
 
    !> Diagonal of a matrix.
    pure function get_diagonal(matrix) result(diagonal)

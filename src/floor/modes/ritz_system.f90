@@ -61,6 +61,12 @@ module thud_ritz_system
    type :: mode_block_type
       !> Angular frequencies, ascending, rad/s, loss factors, and fractions of the energy in the bearing plate: [n_mode].
       real(wp), allocatable :: omega(:), loss_factor(:), bearing_share(:)
+      !> Stiffness times loss factor, and stiffness of the bearing plate, rad2/s2, of the lower modes: [n, n]; not allocated
+      !> if all parts have one loss factor, and if all belong to the bearing plate.
+      real(wp), allocatable :: damping(:, :), bearing(:, :)
+      !> Squared angular frequencies with their losses, rad2/s2, of modes with losses as sums of these modes, and the matrix
+      !> of the sums (`thud_mode_mixing`): [n_mode], [n_mode, n_mode]; not allocated if the modes remain as they are.
+      complex(wp), allocatable :: pole(:), mixing(:, :)
       !> Shapes of the displacements; not allocated for static ones: [n_displacement].
       type(shape_type), allocatable :: shape(:)
    end type mode_block_type
@@ -112,11 +118,13 @@ contains
    end subroutine add_mass
 
    !> Solves a system for all its modes.
-   subroutine solve_ritz_system(system, modes, failed)
+   subroutine solve_ritz_system(system, modes, failed, lower_limit)
       type(ritz_system_type), intent(in) :: system
       type(modes_type), intent(out) :: modes
       !> A mass or the stiffness of a static displacement is not positive.
       logical, intent(out) :: failed
+      !> Angular frequency of the highest of the lower modes, rad/s.
+      real(wp), intent(in) :: lower_limit
       integer, allocatable :: group_x(:), group_y(:)
       type(members_type), allocatable :: x(:, :), y(:, :)
       integer :: i, j, n
@@ -133,7 +141,7 @@ contains
          do j = 1, size(y, 2)
             if (.not. has_mass(x(:, i), y(:, j))) cycle
             n = n + 1
-            call solve_block(system, x(:, i), y(:, j), modes%block(n), failed)
+            call solve_block(system, x(:, i), y(:, j), modes%block(n), failed, lower_limit)
             if (failed) return
          end do
       end do
@@ -266,12 +274,14 @@ contains
    end function get_first
 
    !> Modes of the functions of one group in x and one in y.
-   subroutine solve_block(system, x, y, block, failed)
+   subroutine solve_block(system, x, y, block, failed, lower_limit)
       type(ritz_system_type), intent(in) :: system
       !> Functions of x and of y in the block: [n_displacement].
       type(members_type), intent(in) :: x(:), y(:)
       type(mode_block_type), intent(out) :: block
       logical, intent(out) :: failed
+      !> Angular frequency of the highest of the lower modes, rad/s.
+      real(wp), intent(in) :: lower_limit
       real(wp), allocatable :: stiffness(:, :), mass(:, :), omega(:), transformation(:, :)
       integer, allocatable :: first(:), dynamic(:), static(:)
       integer :: i, p, n
@@ -310,8 +320,8 @@ contains
       ! `stiffness` contains the shapes now. Without stiffness and losses, a mode moves as a rigid body.
       block%omega = omega
       associate (terms => system%stiffness)
-         block%loss_factor = get_share(terms%loss_factor)
-         block%bearing_share = get_share(merge(1.0_wp, 0.0_wp, terms%in_bearing))
+         call get_part(terms%loss_factor, block%loss_factor, block%damping)
+         call get_part(merge(1.0_wp, 0.0_wp, terms%in_bearing), block%bearing_share, block%bearing)
       end associate
       i = 0
       do p = 1, n
@@ -330,21 +340,28 @@ contains
          matrix = get_transposed_product(transformation, get_product(matrix, transformation))
       end subroutine condense
 
-      !> Weighted sum of the energies of the stiffnesses in each mode, over their sum: [n_mode].
-      function get_share(weight) result(share)
+      !> Weighted sum of the stiffnesses.
+      subroutine get_part(weight, share, part)
          !> Weights of the stiffnesses.
          real(wp), intent(in) :: weight(:)
-         real(wp) :: share(size(omega))
+         !> Its energy in each mode, over that of all stiffnesses: [n_mode].
+         real(wp), allocatable, intent(out) :: share(:)
+         !> The sum: [n, n]; not allocated if all weights are equal, or if there are no two modes to couple.
+         real(wp), allocatable, intent(out) :: part(:, :)
          real(wp), allocatable :: matrix(:, :)
+         integer :: n
 
-         share = weight(1)
+         share = spread(weight(1), 1, size(omega))
          if (any(abs(weight - weight(1)) > 0.0_wp)) then
             call assemble(system%stiffness, weight, block, first, matrix)
             if (size(static) > 0) call condense(matrix)
-            share = sum(stiffness*get_product(matrix, stiffness), dim=1)/max(omega**2, tiny(omega))
+            matrix = get_product(matrix, stiffness)
+            share = sum(stiffness*matrix, dim=1)/max(omega**2, tiny(omega))
+            n = count(omega < lower_limit)
+            if (n > 1) part = get_transposed_product(stiffness(:, :n), matrix(:, :n))
          end if
          where (omega <= 0.0_wp) share = 0.0_wp
-      end function get_share
+      end subroutine get_part
    end subroutine solve_block
 
    !> Matrix of a block.

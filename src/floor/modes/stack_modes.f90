@@ -27,7 +27,7 @@ module thud_stack_modes
 contains
 
    !> Modes of a stack. The displacements of the plates are the first ones of the modes, in the same order.
-   subroutine get_stack_modes(stack, max_frequency, modes, resolved, failed)
+   subroutine get_stack_modes(stack, max_frequency, modes, resolved, failed, lower_limit)
       type(plate_stack_type), intent(in) :: stack
       !> Frequency up to which the modes are wanted, Hz.
       real(wp), intent(in) :: max_frequency
@@ -36,6 +36,9 @@ contains
       real(wp), intent(out) :: resolved
       !> The system has no solution.
       logical, intent(out) :: failed
+      !> Frequency of the highest modes whose losses may couple them, Hz (default: none).
+      real(wp), intent(in), optional :: lower_limit
+      real(wp) :: limit
       type(ritz_system_type) :: system
       type(plate_motion_type) :: motion(size(stack%plate))
       integer :: i
@@ -66,7 +69,9 @@ contains
       do i = 1, size(stack%plate) - 1
          call add_layer(system, stack%layer(i), stack%plate(i), motion(i), motion(i + 1))
       end do
-      call solve_ritz_system(system, modes, failed)
+      limit = 0.0_wp
+      if (present(lower_limit)) limit = 2*pi*lower_limit
+      call solve_ritz_system(system, modes, failed, limit)
    end subroutine get_stack_modes
 
    !> Whether springs fasten the first ribs of a plate.
