@@ -191,7 +191,7 @@ contains
             continue
          else if (has_all) then
             compliance = compliance + get_truncated_compliance(modes%stack%plate(1), &
-               get_highest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
+               get_highest_wavenumber([set%x, set%y]), [length, width], length*source(1), width*source(2))
          else
             compliance = compliance + 2/(pi*resistance*modes%sum_limit)
          end if

@@ -212,6 +212,7 @@ contains
          end associate
          half = min(half, many)
          if (has_sines(plate, i)) then
+            ! With ribs that resist rotation, these are modes of a beam.
             n(i) = 4 + int(2*half/pi)
          else if (maxval(plate%shear) > 0.0_wp) then
             n(i) = get_degree(half)

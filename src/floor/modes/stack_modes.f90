@@ -9,7 +9,7 @@ module thud_stack_modes
       layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
       solve_ritz_system
-   use thud_truncated_compliance, only: rib_ratio
+   use thud_truncated_compliance, only: rib_half_waves
    implicit none (type, external)
    private
 
@@ -121,7 +121,7 @@ contains
          end if
          degree(i) = n(i)
          ! What ribs add consists of shorter waves, too.
-         if (is_thin) degree(i) = get_degree((merge(1.0_wp, rib_ratio, n_rib == 0)*(n(i) - n_rib) + 2)*pi/2)
+         if (is_thin) degree(i) = get_degree((n(i) - n_rib + merge(2, rib_half_waves, n_rib == 0))*pi/2)
          lines = spread(0.0_wp, 1, 0)
          if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
          if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
