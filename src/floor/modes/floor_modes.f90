@@ -2,7 +2,7 @@
 module thud_floor_modes
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_function_set, only: get_highest_wavenumber
+   use thud_function_set, only: get_finest_wavenumber, get_highest_wavenumber
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_total_loss, plate_type
@@ -191,7 +191,8 @@ contains
             continue
          else if (has_all) then
             compliance = compliance + get_truncated_compliance(modes%stack%plate(1), &
-               get_highest_wavenumber([set%x, set%y]), [length, width], length*source(1), width*source(2))
+               get_highest_wavenumber([set%x, set%y]), &
+               get_finest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
          else
             compliance = compliance + 2/(pi*resistance*modes%sum_limit)
          end if

@@ -12,10 +12,7 @@ module thud_truncated_compliance
    implicit none (type, external)
    private
 
-   public :: get_truncated_compliance, rib_half_waves
-
-   !> Number of half waves by which functions resolve the moments of ribs beyond those that are complete.
-   integer, parameter :: rib_half_waves = 40
+   public :: get_truncated_compliance
 
    !> Number of ribs next to the point that take part.
    integer, parameter :: max_ribs = 4
@@ -32,16 +29,16 @@ contains
 
    !> The compliance at a point, m/N. With ribs in both directions, those in the other one of a pair only stiffen: it is the
    !> lesser of both.
-   function get_truncated_compliance(plate, wavenumber, sides, x, y) result(compliance)
+   function get_truncated_compliance(plate, wavenumber, finest, x, y) result(compliance)
       !> A plate that is rigid in shear.
       type(orthotropic_type), intent(in) :: plate
       !> Wavenumbers along length and width up to which the functions are complete, 1/m: [2].
       real(wp), intent(in) :: wavenumber(2)
-      !> Length and width, m.
-      real(wp), intent(in) :: sides(2)
+      !> Wavenumbers up to which the moments of ribs are resolved, 1/m: [2].
+      real(wp), intent(in) :: finest(2)
       !> The point, m.
       real(wp), intent(in) :: x, y
-      real(wp) :: compliance, finest(2)
+      real(wp) :: compliance
       integer :: i
 
       if (.not. allocated(plate%ribs)) then
@@ -49,7 +46,6 @@ contains
             ribs_type(position=[real(wp) ::]), y)
          return
       end if
-      finest = wavenumber + rib_half_waves*pi/sides
       compliance = huge(compliance)
       do i = 1, size(plate%ribs)
          associate (ribs => plate%ribs(i))
