@@ -6,7 +6,7 @@ module thud_floor_modes
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_plate, only: air_type, get_total_loss, plate_type
-   use thud_plate_stack, only: is_uncoupled, plate_stack_type, with_rigid_edges
+   use thud_plate_stack, only: get_resolved_frequency, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
    use thud_ritz_system, only: get_mode_values, modes_type
    use thud_stack_modes, only: get_stack_modes
@@ -14,7 +14,7 @@ module thud_floor_modes
    implicit none (type, external)
    private
 
-   public :: floor_modes_type, get_floor_modes, new_floor_receiver
+   public :: floor_modes_type, get_floor_modes, get_mode_limit, new_floor_receiver
 
    !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
    !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
@@ -106,6 +106,14 @@ contains
       call move_alloc(key, cached(oldest)%key)
       oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
+
+   !> Frequency up to which the modes of a stack are treated individually, Hz.
+   pure function get_mode_limit(stack) result(limit)
+      type(plate_stack_type), intent(in) :: stack
+      real(wp) :: limit
+
+      limit = get_resolved_frequency(with_rigid_edges(stack), mode_limit*resolution)/resolution
+   end function get_mode_limit
 
    !> Whether a stack is one plate without ribs.
    pure function is_single_plate(stack) result(yes)
