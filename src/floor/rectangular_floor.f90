@@ -5,7 +5,7 @@ module thud_rectangular_floor
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
    use thud_floor_model, only: floor_model_type, reason_length, uncoupled_support
-   use thud_floor_modes, only: floor_modes_type, get_floor_modes, new_floor_receiver
+   use thud_floor_modes, only: floor_modes_type, get_floor_modes, get_mode_limit, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: get_resistance, get_thin_limit, plate_type
@@ -333,14 +333,27 @@ contains
       character(len=*), intent(in), optional :: support
       !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
       real(wp), intent(in), optional :: max_frequency
+      type(base_floor_type) :: base
+
+      base = options%get_base()
+      group = base%group
+      plate = base%plate
+      call get_floor_modes(trim(group), get_stack(options, base, support), plate, modes, error, max_frequency)
+   end subroutine get_modes
+
+   !> The plates above each other.
+   function get_stack(options, floor, support) result(stack)
+      class(rectangular_floor_type), intent(in) :: options
+      !> The floor without supports, floating plate and subceiling.
+      type(base_floor_type), intent(in) :: floor
+      !> Support of the edges (default: its own).
+      character(len=*), intent(in), optional :: support
       type(plate_stack_type) :: stack
       logical :: is_uncoupled
       type(base_floor_type) :: base
 
       is_uncoupled = .false.
-      base = options%get_base()
-      group = base%group
-      plate = base%plate
+      base = floor
       associate (lower => base%stiffness)
          if (present(support)) then
             lower%edge = get_edges(options, support)
@@ -355,28 +368,29 @@ contains
             lower%ribs = pack(lower%ribs, .not. lower%ribs%along_width)
          end if
       end associate
-      stack%length = plate%length
-      stack%width = plate%width
-      if (options%screed%thickness > 0.0_wp) then
-         stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base%stiffness]
-         stack%plate(1)%edge = get_screed_edge(options%screed)
-         stack%layer = [get_screed_layer(options%screed)]
-         if (is_uncoupled) then
-            stack%plate(1)%edge = edge_type(rigid_support, 0.0_wp)
-            if (allocated(stack%layer(1)%point)) deallocate (stack%layer(1)%point)
+      associate (plate => base%plate)
+         stack%length = plate%length
+         stack%width = plate%width
+         if (options%screed%thickness > 0.0_wp) then
+            stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base%stiffness]
+            stack%plate(1)%edge = get_screed_edge(options%screed)
+            stack%layer = [get_screed_layer(options%screed)]
+            if (is_uncoupled) then
+               stack%plate(1)%edge = edge_type(rigid_support, 0.0_wp)
+               if (allocated(stack%layer(1)%point)) deallocate (stack%layer(1)%point)
+            end if
+         else
+            stack%plate = [base%stiffness]
+            allocate (stack%layer(0))
          end if
-      else
-         stack%plate = [base%stiffness]
-         allocate (stack%layer(0))
-      end if
-      stack%bearing = size(stack%plate)
-      if (options%has_subceiling()) then
-         stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(options%subceiling, plate))]
-         stack%layer = [stack%layer, get_subceiling_layer(options%subceiling, get_channels(options, base))]
-      end if
-      stack%radiator = size(stack%plate)
-      call get_floor_modes(trim(group), stack, plate, modes, error, max_frequency)
-   end subroutine get_modes
+         stack%bearing = size(stack%plate)
+         if (options%has_subceiling()) then
+            stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(options%subceiling, plate))]
+            stack%layer = [stack%layer, get_subceiling_layer(options%subceiling, get_channels(options, base))]
+         end if
+         stack%radiator = size(stack%plate)
+      end associate
+   end function get_stack
 
    !> Whether a subceiling radiates into the room.
    pure function has_subceiling(options) result(yes)
@@ -535,8 +549,8 @@ contains
       call options%limit_by_surroundings(base%plate, highest, reason)
    end subroutine get_validity
 
-   !> Lowers a limit of validity to that of the walls at the edges, the subceiling and its cavity.
-   pure subroutine limit_by_surroundings(options, above, highest, reason)
+   !> Lowers a limit of validity to that of the modes, the walls at the edges, the subceiling and its cavity.
+   subroutine limit_by_surroundings(options, above, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
       !> The plate above the subceiling.
       type(plate_type), intent(in) :: above
@@ -547,6 +561,12 @@ contains
          highest = get_wall_limit(options%edge_walls)
          reason = 'the walls at the edges resonate, and are no mere springs'
       end if
+      associate (modes => get_mode_limit(get_stack(options, options%get_base())))
+         if (modes < highest) then
+            highest = modes
+            reason = 'the modes of the floor are not resolved, and the mean mobility of the construction takes their place'
+         end if
+      end associate
       if (.not. options%has_subceiling()) return
       associate (cavity => get_cavity_limit(options%subceiling), &
          thin => get_thin_limit(get_subceiling_plate(options%subceiling, above)))

@@ -2,12 +2,12 @@
 module thud_floor_modes
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_function_set, only: get_highest_wavenumber
+   use thud_function_set, only: get_finest_wavenumber, get_highest_wavenumber
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_mode_mixing, only: diagonalize
    use thud_plate, only: air_type, get_total_loss, plate_type
-   use thud_plate_stack, only: is_uncoupled, plate_stack_type, with_rigid_edges
+   use thud_plate_stack, only: get_resolved_frequency, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
    use thud_ritz_system, only: get_mode_values, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
@@ -15,7 +15,7 @@ module thud_floor_modes
    implicit none (type, external)
    private
 
-   public :: floor_modes_type, get_floor_modes, get_poles, new_floor_receiver
+   public :: floor_modes_type, get_floor_modes, get_mode_limit, get_poles, new_floor_receiver
 
    !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
    !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
@@ -103,6 +103,14 @@ contains
       call move_alloc(key, cached(oldest)%key)
       oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
+
+   !> Frequency up to which the modes of a stack are treated individually, Hz.
+   pure function get_mode_limit(stack) result(limit)
+      type(plate_stack_type), intent(in) :: stack
+      real(wp) :: limit
+
+      limit = get_resolved_frequency(with_rigid_edges(stack), mode_limit*resolution)/resolution
+   end function get_mode_limit
 
    !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
    subroutine add_bearing_losses(block, bearing, limit)
@@ -238,7 +246,8 @@ contains
             continue
          else if (has_all) then
             compliance = compliance + get_truncated_compliance(modes%stack%plate(1), &
-               get_highest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
+               get_highest_wavenumber([set%x, set%y]), &
+               get_finest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
          else
             compliance = compliance + 2/(pi*resistance*modes%sum_limit)
          end if

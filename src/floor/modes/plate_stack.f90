@@ -23,6 +23,9 @@ module thud_plate_stack
    !> Ratio of the number of modes of a beam to that of the half waves which they resolve.
    real(wp), parameter :: beam_ratio = 1.2_wp
 
+   !> Number of sines per rib, and in all, that resolve the curvature at ribs by themselves.
+   integer, parameter :: min_sines(2) = [5, 50]
+
    !> Springs along an edge of a plate.
    type :: edge_type
       !> Stiffness against deflection, N/m2, and against rotation, N, per length.
@@ -126,9 +129,20 @@ contains
       ! Rotations take about as long as two plates.
       if (any([(maxval(stack%plate(i)%shear) > 0.0_wp, i=1, size(stack%plate))])) limit = limit/2
       frequency = max_frequency
-      do while (sum([(product(real(get_counts(stack, stack%plate(i), frequency), wp)), i=1, size(stack%plate))]) > limit)
+      do while (sum([(product(real(get_all_counts(stack%plate(i)), wp)), i=1, size(stack%plate))]) > limit)
          frequency = 0.95_wp*frequency
       end do
+   contains
+
+      !> Number of functions of x and of y of a plate, with those for ribs: [2].
+      pure function get_all_counts(plate) result(n)
+         type(orthotropic_type), intent(in) :: plate
+         integer :: n(2)
+         integer :: direction
+
+         n = get_counts(stack, plate, frequency)
+         n = n + [(size(get_twisting_ribs(plate, direction, n(direction))), direction=1, 2)]
+      end function get_all_counts
    end function get_resolved_frequency
 
    !> Whether each mode of a stack has one number of half waves along the length and one along the width.
@@ -222,15 +236,17 @@ contains
             ! Modes of a beam lack the coupling of both curvatures at free edges: some more.
             n(i) = 4 + int(beam_ratio*2*half/pi)
          end if
-         n(i) = n(i) + size(get_twisting_ribs(plate, i))
       end do
    end function get_counts
 
-   !> Positions of ribs across a direction that resist rotation, of a plate that is rigid in shear, m: [n_rib].
-   pure function get_twisting_ribs(plate, direction) result(position)
+   !> Positions of ribs across a direction that resist rotation, m: [n_rib]. There are none if the plate yields in shear, or if
+   !> sines are much shorter than the distance of the ribs.
+   pure function get_twisting_ribs(plate, direction, n) result(position)
       type(orthotropic_type), intent(in) :: plate
       !> 1: along the length, 2: along the width.
       integer, intent(in) :: direction
+      !> Number of functions.
+      integer, intent(in) :: n
       real(wp), allocatable :: position(:)
       integer :: i
 
@@ -242,6 +258,8 @@ contains
             if (max(ribs%torsion, ribs%inertia) > 0.0_wp) position = [position, ribs%position]
          end associate
       end do
+      if (has_sines(plate, direction) .and. n >= max(min_sines(1)*size(position), min_sines(2))) &
+          position = position(:0)
    end function get_twisting_ribs
 
    !> Degree of the polynomials that resolve a wave: its Legendre coefficients end about there.

@@ -9,11 +9,13 @@ module thud_stack_modes
       layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
       solve_ritz_system
-   use thud_truncated_compliance, only: rib_ratio
    implicit none (type, external)
    private
 
    public :: get_stack_modes
+
+   !> Number of half waves by which functions resolve the moments of ribs beyond those that are complete.
+   integer, parameter :: rib_half_waves = 40
 
    !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
    type :: plate_motion_type
@@ -117,7 +119,7 @@ contains
       is_thin = .not. maxval(plate%shear) > 0.0_wp
       sides = [stack%length, stack%width]
       do i = 1, 2
-         twisting = get_twisting_ribs(plate, i)
+         twisting = get_twisting_ribs(plate, i, n(i))
          n_rib = size(twisting)
          if (has_sines(plate, i) .and. n_rib == 0) then
             deflection(i) = function_set_type(sines, sides(i), n(i))
@@ -126,7 +128,7 @@ contains
          end if
          degree(i) = n(i)
          ! What ribs add consists of shorter waves, too.
-         if (is_thin) degree(i) = get_degree((merge(1.0_wp, rib_ratio, n_rib == 0)*(n(i) - n_rib) + 2)*pi/2)
+         if (is_thin) degree(i) = get_degree((n(i) + merge(2, rib_half_waves, n_rib == 0))*pi/2)
          lines = spread(0.0_wp, 1, 0)
          if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
          if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
@@ -138,7 +140,7 @@ contains
                rotation(i) = new_polynomials(sides(i), degree(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
             end associate
             if (is_thin) call keep_beam_modes(deflection(i), edge, merge(plate%along, plate%across, i == 1), &
-               n(i) - n_rib, twisting)
+               n(i), twisting)
          end associate
       end do
       motion%deflection = product_type(deflection(1), deflection(2))
@@ -174,9 +176,10 @@ contains
       call add_stiffness(system, 1, 1, bending, get_overlap(set, 2, set, 2), unit, 0.0_wp)
       call add_mass(system, 1, 1, bending, get_overlap(set, 0, set, 0), unit)
       do order = 0, 1
-         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0))
+         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0), &
+            [0.0_wp, 0.0_wp])
       end do
-      call solve_ritz_system(system, modes, failed)
+      call solve_ritz_system(system, modes, failed, 0.0_wp)
       if (failed) return
       allocate (shape(set%count, set%count), source=0.0_wp)
       allocate (omega(0))
@@ -193,6 +196,8 @@ contains
          kept(j) = .true.
       end do
       set%complete = sqrt(maxval(omega, mask=kept)) + pi/(2*set%length)
+      set%finest = set%complete
+      if (size(rib) > 0) set%finest = set%complete + rib_half_waves*pi/set%length
       chosen = pack([(i, i=1, set%count)], kept)
       added = reshape([real(wp) ::], [set%count, 0])
       do order = 0, 1

@@ -12,10 +12,7 @@ module thud_truncated_compliance
    implicit none (type, external)
    private
 
-   public :: get_truncated_compliance, rib_ratio
-
-   !> Ratio of the shortest waves by which functions resolve the moments of ribs to those that are complete.
-   real(wp), parameter :: rib_ratio = 2.5_wp
+   public :: get_truncated_compliance
 
    !> Number of ribs next to the point that take part.
    integer, parameter :: max_ribs = 4
@@ -32,27 +29,31 @@ contains
 
    !> The compliance at a point, m/N. With ribs in both directions, those in the other one of a pair only stiffen: it is the
    !> lesser of both.
-   function get_truncated_compliance(plate, wavenumber, x, y) result(compliance)
+   function get_truncated_compliance(plate, wavenumber, finest, x, y) result(compliance)
       !> A plate that is rigid in shear.
       type(orthotropic_type), intent(in) :: plate
       !> Wavenumbers along length and width up to which the functions are complete, 1/m: [2].
       real(wp), intent(in) :: wavenumber(2)
+      !> Wavenumbers up to which the moments of ribs are resolved, 1/m: [2].
+      real(wp), intent(in) :: finest(2)
       !> The point, m.
       real(wp), intent(in) :: x, y
       real(wp) :: compliance
       integer :: i
 
       if (.not. allocated(plate%ribs)) then
-         compliance = get_compliance(new_strip(plate, .false.), wavenumber, ribs_type(position=[real(wp) ::]), y)
+         compliance = get_compliance(new_strip(plate, .false.), wavenumber, 1.0_wp, &
+            ribs_type(position=[real(wp) ::]), y)
          return
       end if
       compliance = huge(compliance)
       do i = 1, size(plate%ribs)
          associate (ribs => plate%ribs(i))
             if (ribs%along_width) then
-               compliance = min(compliance, get_compliance(new_strip(plate, .true.), wavenumber(2:1:-1), ribs, x))
+               compliance = min(compliance, get_compliance(new_strip(plate, .true.), wavenumber(2:1:-1), finest(1), &
+                  ribs, x))
             else
-               compliance = min(compliance, get_compliance(new_strip(plate, .false.), wavenumber, ribs, y))
+               compliance = min(compliance, get_compliance(new_strip(plate, .false.), wavenumber, finest(2), ribs, y))
             end if
          end associate
       end do
@@ -70,10 +71,12 @@ contains
    end function new_strip
 
    !> The compliance with ribs of one direction, m/N.
-   function get_compliance(strip, wavenumber, ribs, point) result(compliance)
+   function get_compliance(strip, wavenumber, finest, ribs, point) result(compliance)
       type(strip_type), intent(in) :: strip
       !> Complete wavenumbers along and across the ribs, 1/m: [2].
       real(wp), intent(in) :: wavenumber(2)
+      !> Wavenumber across them up to which the moments of ribs are resolved, 1/m.
+      real(wp), intent(in) :: finest
       type(ribs_type), intent(in) :: ribs
       !> Coordinate of the point across the ribs, m.
       real(wp), intent(in) :: point
@@ -95,7 +98,7 @@ contains
          call get_line_loads(strip, ribs, along(i), distance, load, moment)
          compliance = compliance + weight(i)/pi*(dot_product(load, &
             matmul(get_short_deflection(strip, along(i), wavenumber(2), distance), load)) &
-            + sum(moment**2)/(pi*strip%across*rib_ratio*wavenumber(2)))
+            + sum(moment**2)/(pi*strip%across*finest))
       end do
       ! Shorter ones: k = wavenumber/t.
       call get_quadrature(n_point, 0.0_wp, 1.0_wp, along, weight)
