@@ -104,12 +104,13 @@ contains
       oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
 
-   !> Frequency up to which the modes of a stack are treated individually, Hz.
+   !> Frequency up to which the modes of a stack are treated individually because higher ones are not resolved, Hz.
    pure function get_mode_limit(stack) result(limit)
       type(plate_stack_type), intent(in) :: stack
       real(wp) :: limit
 
       limit = get_resolved_frequency(with_rigid_edges(stack), mode_limit*resolution)/resolution
+      if (limit > 0.99_wp*mode_limit) limit = huge(limit)
    end function get_mode_limit
 
    !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
@@ -230,10 +231,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: value(:, :), gain(:)
       logical, allocatable :: individual(:)
-      real(wp) :: compliance
+      real(wp) :: compliance, lacking(2), corner
       logical :: has_all
 
       ! Sums of functions are stopped at a frequency, or have the compliance of all their modes.
+      corner = pi/(2*sqrt(2.0_wp))*modes%limit
       has_all = .not. (is_uncoupled(modes%stack) .or. has_shear(modes%stack))
       associate (length => modes%stack%length, width => modes%stack%width, omega => modes%omega, &
          set => modes%modes%displacement(1))
@@ -245,9 +247,11 @@ contains
          if (any(abs(source - point) >= epsilon(1.0_wp))) then
             continue
          else if (has_all) then
-            compliance = compliance + get_truncated_compliance(modes%stack%plate(1), &
+            lacking = get_truncated_compliance(modes%stack%plate(1), &
                get_highest_wavenumber([set%x, set%y]), &
                get_finest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
+            compliance = compliance + lacking(1)
+            corner = corner*(1 - lacking(2)/compliance)
          else
             compliance = compliance + 2/(pi*resistance*modes%sum_limit)
          end if
@@ -256,7 +260,7 @@ contains
       ! compliance 2/(pi Z limit), averaged over positions; with this corner their conductance is 1/Z at high frequencies.
       ! On a joist the compliance, and so the conductance, is that of joist and plate.
       call new_modal_receiver(group, pack(gain, individual), pack(modes%omega, individual), &
-         pack(modes%loss_factor, individual), [compliance, pi/(2*sqrt(2.0_wp))*modes%limit], receiver, error)
+         pack(modes%loss_factor, individual), [compliance, corner], receiver, error)
    end subroutine new_floor_receiver
 
 end module thud_floor_modes

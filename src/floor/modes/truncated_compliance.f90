@@ -27,8 +27,8 @@ module thud_truncated_compliance
 
 contains
 
-   !> The compliance at a point, m/N. With ribs in both directions, those in the other one of a pair only stiffen: it is the
-   !> lesser of both.
+   !> The compliance at a point, and the part of it by moments of ribs, m/N: [2]. Longer waves have this part, which no short
+   !> wave carries away. With ribs in both directions, those in the other one of a pair only stiffen: it is the lesser of both.
    function get_truncated_compliance(plate, wavenumber, finest, x, y) result(compliance)
       !> A plate that is rigid in shear.
       type(orthotropic_type), intent(in) :: plate
@@ -38,7 +38,7 @@ contains
       real(wp), intent(in) :: finest(2)
       !> The point, m.
       real(wp), intent(in) :: x, y
-      real(wp) :: compliance
+      real(wp) :: compliance(2), one(2)
       integer :: i
 
       if (.not. allocated(plate%ribs)) then
@@ -50,12 +50,12 @@ contains
       do i = 1, size(plate%ribs)
          associate (ribs => plate%ribs(i))
             if (ribs%along_width) then
-               compliance = min(compliance, get_compliance(new_strip(plate, .true.), wavenumber(2:1:-1), finest(1), &
-                  ribs, x))
+               one = get_compliance(new_strip(plate, .true.), wavenumber(2:1:-1), finest(1), ribs, x)
             else
-               compliance = min(compliance, get_compliance(new_strip(plate, .false.), wavenumber, finest(2), ribs, y))
+               one = get_compliance(new_strip(plate, .false.), wavenumber, finest(2), ribs, y)
             end if
          end associate
+         if (one(1) < compliance(1)) compliance = one
       end do
    end function get_truncated_compliance
 
@@ -70,7 +70,7 @@ contains
       if (along_width) strip = strip_type(plate%across, strip%mixed, plate%along)
    end function new_strip
 
-   !> The compliance with ribs of one direction, m/N.
+   !> The compliance with ribs of one direction, and the part of it by moments of ribs, m/N: [2].
    function get_compliance(strip, wavenumber, finest, ribs, point) result(compliance)
       type(strip_type), intent(in) :: strip
       !> Complete wavenumbers along and across the ribs, 1/m: [2].
@@ -80,7 +80,7 @@ contains
       type(ribs_type), intent(in) :: ribs
       !> Coordinate of the point across the ribs, m.
       real(wp), intent(in) :: point
-      real(wp) :: compliance
+      real(wp) :: compliance(2)
       real(wp), allocatable :: along(:), weight(:), load(:), moment(:), position(:), distance(:, :)
       logical :: near(size(ribs%position))
       integer :: i
@@ -96,19 +96,21 @@ contains
       call get_quadrature(n_point, 0.0_wp, wavenumber(1), along, weight)
       do i = 1, n_point
          call get_line_loads(strip, ribs, along(i), distance, load, moment)
-         compliance = compliance + weight(i)/pi*(dot_product(load, &
-            matmul(get_short_deflection(strip, along(i), wavenumber(2), distance), load)) &
-            + sum(moment**2)/(pi*strip%across*finest))
+         compliance = compliance + weight(i)/pi*[dot_product(load, &
+            matmul(get_short_deflection(strip, along(i), wavenumber(2), distance), load)), &
+            sum(moment**2)/(pi*strip%across*finest)]
       end do
       ! Shorter ones: k = wavenumber/t.
       call get_quadrature(n_point, 0.0_wp, 1.0_wp, along, weight)
       do i = 1, n_point
          associate (k => wavenumber(1)/along(i))
             call get_line_loads(strip, ribs, k, distance, load, moment)
-            compliance = compliance + weight(i)*k/along(i)/pi*(dot_product(load, get_deflection(strip, k, distance(:, 1), 0)) &
+            compliance(1) = compliance(1) + weight(i)*k/along(i)/pi &
+               *(dot_product(load, get_deflection(strip, k, distance(:, 1), 0)) &
                + dot_product(moment, get_deflection(strip, k, distance(2:, 1), 1)))
          end associate
       end do
+      compliance(1) = sum(compliance)
    end function get_compliance
 
    !> Loads on the plate: a unit force, and the reactions of the ribs.
