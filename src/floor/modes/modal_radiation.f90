@@ -232,8 +232,8 @@ contains
          type(product_type), intent(in) :: set
          type(overlap_type) :: overlap
 
-         overlap%x = get_overlap(set%x, 0, set%x, 0, area(1), area(2))
-         overlap%y = get_overlap(set%y, 0, set%y, 0, area(3), area(4))
+         allocate (overlap%x, source=get_overlap(set%x, 0, set%x, 0, area(1), area(2)))
+         allocate (overlap%y, source=get_overlap(set%y, 0, set%y, 0, area(3), area(4)))
       end function new_overlap
    end function new_part
 
