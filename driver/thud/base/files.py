@@ -257,15 +257,6 @@ def read_input(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def is_portable_name(name: object) -> bool:
-    """Whether a value is a name for files that any system can hold."""
-    if not isinstance(name, str) or not name.strip() or not name.isprintable():
-        return False
-    # Names of devices of Windows, whatever their extension is.
-    device = re.match(r"(con|prn|aux|nul|(com|lpt)[1-9]) *(\.|$)", name, re.IGNORECASE)
-    return not device and not re.search(r"""[/\\:*?"<>|]|[. ]$""", name)
-
-
 def read_toml(path: Path) -> tuple[dict[str, Any], str]:
     """Return the tables and the text of a TOML file.
 

@@ -40,6 +40,7 @@ from thud.base.checks import (
     shown,
 )
 from thud.base.display import Displayed
+from thud.base.errors import InputError
 from thud.base.files import replace_file
 from thud.base.key import Group, require_keywords
 
@@ -310,6 +311,17 @@ def read_case(path: str | os.PathLike[str]) -> Case:
 def check_case(case: Case) -> None:
     """Raise InputError with the message of the library if a case is invalid."""
     ask("check", case=case_text(case))
+
+
+def is_portable_name(name: object) -> bool:
+    """Whether a value is a name for files that any system can hold, as the library knows them."""
+    if not isinstance(name, str) or not name.isprintable() or name != name.strip():
+        return False
+    try:
+        check_case(Case(name=name))
+    except InputError:
+        return False
+    return True
 
 
 def write_case(case: Case, path: str | os.PathLike[str]) -> None:

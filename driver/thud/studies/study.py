@@ -18,8 +18,16 @@ from thud.base._schema import MODELS
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown
 from thud.base.errors import InputError
-from thud.base.files import is_portable_name, read_toml
-from thud.case.case import Case, check_case, impact_only, new_model, read_case, tables_case
+from thud.base.files import read_toml
+from thud.case.case import (
+    Case,
+    check_case,
+    impact_only,
+    is_portable_name,
+    new_model,
+    read_case,
+    tables_case,
+)
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
 from thud.studies.parameter import Parameter, read_quantity, read_value
 
@@ -171,7 +179,7 @@ def read_common(
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     name = content["name"]
     if not is_portable_name(name):
-        refuse_value("name", name, "a name for files on any system, without folders")
+        refuse_value("name", name, "a short name for files on any system, without folders")
     case, density = fix_keys(_case(content.get("case"), folder, fixed), fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
