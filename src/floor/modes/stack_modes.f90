@@ -174,9 +174,10 @@ contains
       call add_stiffness(system, 1, 1, bending, get_overlap(set, 2, set, 2), unit, 0.0_wp)
       call add_mass(system, 1, 1, bending, get_overlap(set, 0, set, 0), unit)
       do order = 0, 1
-         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0))
+         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0), &
+            [0.0_wp, 0.0_wp])
       end do
-      call solve_ritz_system(system, modes, failed)
+      call solve_ritz_system(system, modes, failed, 0.0_wp)
       if (failed) return
       allocate (shape(set%count, set%count), source=0.0_wp)
       allocate (omega(0))
