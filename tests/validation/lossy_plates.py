@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-    Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
 
 
@@ -41,19 +40,20 @@ class LossyPlates:
     layer_loss: float
     sides: tuple[float, float] = (5.0, 4.0)
 
-    def answers(self, half_waves: Array, frequency: Array) -> ComplexArray:
+    def answers(self, half_waves: ArrayLike, frequency: ArrayLike) -> ComplexArray:
         """Return velocities of the lower plate by unit pressures on the upper one, m/(Pa s).
 
         Both have the shape sin sin of `half_waves`, shape (n_pair, 2). Frequencies are in Hz, shape
         (n_frequency,); the result has the shape (n_pair, n_frequency).
         """
-        wave = (half_waves * np.pi / self.sides) ** 2
-        omega = 2 * np.pi * frequency
+        wave = (np.asarray(half_waves) * np.pi / self.sides) ** 2
+        hertz = np.asarray(frequency, float)
+        omega = 2 * np.pi * hertz
         layer = self.layer * (1 + 1j * self.layer_loss)
         upper, lower = (
             part.stiffness
             * wave.sum(1)[:, None] ** 2
-            * (1 + 1j * (part.loss_factor + part.falling / np.sqrt(frequency)))
+            * (1 + 1j * (part.loss_factor + part.falling / np.sqrt(hertz)))
             + layer
             - part.mass * omega**2
             for part in (self.upper, self.lower)
