@@ -23,7 +23,7 @@ module thud_compute
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, is_inconclusive, source_limits_type
    use thud_system, only: is_forked
-   use thud_warnings, only: add_source_warning, get_warnings, warning_length
+   use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings, warning_length
    implicit none (type, external)
    private
 
@@ -106,6 +106,7 @@ contains
       if (case%has_impact .and. case%has_room .and. scope%room .and. scope%levels .and. .not. allocated(error)) then
          associate (criteria => results%impact%assessment%criteria(:, findloc(force_names == 'floor', .true., dim=1)))
             results%room%source_conforms = all(conforms(criteria(:octave_count)))
+            call add_modes_warning(results%room, results%warning)
             call add_source_warning(criteria, results%warning)
          end associate
       end if

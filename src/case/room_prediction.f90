@@ -11,7 +11,7 @@ module thud_room_prediction
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_modal_radiation, only: get_modal_radiation, get_strike_points, modal_radiation_type
-   use thud_modal_room, only: box_type, get_highest_frequency, get_modal_room, &
+   use thud_modal_room, only: box_type, get_crossover, get_highest_frequency, get_modal_room, &
       get_standard_positions, modal_room_type, n_standard
    use thud_plate, only: get_plate_radiation, plate_type
    use thud_rating, only: get_a_weighted_level
@@ -198,6 +198,8 @@ contains
       if (floor%has_room_modes()) then
          call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., modal)
          prediction%n_modal = modal%n_band
+         prediction%n_left_out = modal%n_left_out
+         prediction%crossover = get_crossover(box)
          prediction%mean_spread(:modal%n_band) = modal%mean_spread
          prediction%modal_level(:modal%n_band) = modal%mean + change(:modal%n_band)
          prediction%modal_spread(:modal%n_band) = modal%spread

@@ -12,7 +12,7 @@ module thud_warnings
    use thud_numerical_error, only: finer_quantities, get_resolution_keys
    use thud_plate, only: plate_type
    use thud_registry, only: floor_names, model_names
-   use thud_room, only: get_completed_room, room_type
+   use thud_room, only: get_completed_room, room_level_type, room_type
    use thud_sampling, only: get_rate_limit
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
@@ -20,7 +20,7 @@ module thud_warnings
    implicit none (type, external)
    private
 
-   public :: add_floor_warning, add_height_warning, add_source_warning, get_warnings, warning_length
+   public :: add_floor_warning, add_height_warning, add_modes_warning, add_source_warning, get_warnings, warning_length
 
    !> Maximum length of a warning.
    integer, parameter :: warning_length = 240
@@ -216,6 +216,18 @@ contains
       if (octaves /= '') call add(warnings, '&room: the source does not conform ('//octaves(3:) &
          //' from the nominal levels): the level in the room is not that of a standard source')
    end subroutine add_source_warning
+
+   !> Adds a warning on bands that are left out of the prediction by modes.
+   subroutine add_modes_warning(prediction, warnings)
+      type(room_level_type), intent(in) :: prediction
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+
+      if (prediction%n_left_out == 0) return
+      call add(warnings, '&room: reverberation_time: the prediction by modes ends at ' &
+         //trim(get_band_name(prediction%bands(prediction%n_modal)))//' Hz, below the frequency at which three modes of the ' &
+         //'room overlap, '//fixed(prediction%crossover, 0)//' Hz')
+   end subroutine add_modes_warning
 
    !> Adds warnings on a room of unusual height and a room that is not as large as the floor.
    subroutine add_height_warning(case, warnings)

@@ -32,8 +32,11 @@ module thud_modal_room
    !> Samples per second over the frequency of the highest modes.
    real(wp), parameter :: sample_ratio = 2.56_wp
 
-   !> Maximum number of modes of the room times frequencies: memory and time.
-   real(wp), parameter :: max_values = 1.0e7_wp
+   !> Maximum number of modes of the room times frequencies: time.
+   real(wp), parameter :: max_values = 1.0e8_wp
+
+   !> Number of frequencies whose answers of the room are in memory at once.
+   integer, parameter :: chunk_size = 64
 
    !> Time constant of the Fast detector, s; reference sound pressure, Pa.
    real(wp), parameter :: time_constant = 0.125_wp, reference_pressure = 2.0e-5_wp
@@ -58,8 +61,9 @@ module thud_modal_room
 
    !> Levels at positions.
    type :: modal_room_type
-      !> Number of bands, from the lowest, in which the sound is modal.
-      integer :: n_band = 0
+      !> Number of bands, from the lowest, in which the sound is modal, and of those above that are left out because they
+      !> would take too long.
+      integer :: n_band = 0, n_left_out = 0
       !> Maximum Fast levels, dB re 20 uPa: [n_band, n_microphone, n_ball].
       real(wp), allocatable :: level(:, :, :)
       !> Energy mean over the positions, dB, standard deviation of the levels, and that of their mean, dB, without balls on
@@ -146,7 +150,6 @@ contains
       real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), frequency(:)
       complex(wp), allocatable :: pole(:), spectrum(:), sound(:, :, :)
       integer, allocatable :: lx(:), ly(:), kept(:), moving(:)
-      type(answers_type) :: answers
       real(wp) :: highest, duration, slowest
       integer :: i, j, n_sample, n_line
 
@@ -173,6 +176,7 @@ contains
          n_line = int(highest*duration)
          if (get_room_mode_count(box, highest)*n_line <= max_values) exit
          room%n_band = room%n_band - 1
+         room%n_left_out = room%n_left_out + 1
       end do
       allocate (room%level(room%n_band, size(microphone, 2), size(ball, 2)))
       allocate (room%mean(room%n_band), room%spread(room%n_band), room%mean_spread(room%n_band))
@@ -187,10 +191,8 @@ contains
       call get_coupling(modes, box, kept, lx, ly, coupling)
       call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive, kept)
       room%floor_modes = size(pole)
-      call get_answers(box, lx, ly, highest, frequency, microphone, answers)
-      room%room_modes = answers%n_mode
-      call get_sound(pole, get_mixing(modes%modes, kept), drive, get_groups(lx, ly, coupling), frequency, spectrum, answers, &
-         sound, room)
+      call get_sound(pole, get_mixing(modes%modes, kept), drive, get_groups(lx, ly, coupling), frequency, spectrum, box, lx, ly, &
+         highest, microphone, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
       if (with_pressure) then
          allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
@@ -233,7 +235,7 @@ contains
    end function get_groups
 
    !> Spectra of the sound at the microphones, and energies of floor and room (Parseval).
-   subroutine get_sound(pole, mixing, drive, groups, frequency, spectrum, answers, sound, room)
+   subroutine get_sound(pole, mixing, drive, groups, frequency, spectrum, box, lx, ly, highest, microphone, sound, room)
       !> Squared angular frequencies of the floor's modes with their losses, rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
       !> Their sums of the modes without losses.
@@ -244,7 +246,13 @@ contains
       !> Frequencies in equal steps, Hz, and Fourier transform of the force, N s: [n_line].
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: spectrum(:)
-      type(answers_type), intent(in) :: answers
+      type(box_type), intent(in) :: box
+      !> Half waves along length and width: [n_pair].
+      integer, intent(in) :: lx(:), ly(:)
+      !> Frequency of the highest modes of the room, Hz.
+      real(wp), intent(in) :: highest
+      !> Positions of the microphones, m: [3, n_microphone].
+      real(wp), intent(in) :: microphone(:, :)
       !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
       complex(wp), allocatable, intent(out) :: sound(:, :, :)
       type(modal_room_type), intent(inout) :: room
@@ -252,12 +260,13 @@ contains
       complex(wp), dimension(size(pole)) :: input, response
       real(wp), dimension(size(pole)) :: decay, loss, square
       ! Real parts, then imaginary parts, for each ball or microphone.
-      real(wp) :: flow(size(answers%input, 1), 2*size(drive, 2))
+      real(wp) :: flow(size(lx), 2*size(drive, 2))
       real(wp), allocatable :: amplitude(:, :), pressure(:, :)
-      integer :: i, j, k, n_ball, n_microphone
+      type(answers_type) :: answers
+      integer :: i, j, k, n_ball, n_microphone, line
 
       n_ball = size(drive, 2)
-      n_microphone = size(answers%pressure, 2)/2
+      n_microphone = size(microphone, 2)
       allocate (sound(size(frequency), n_microphone, n_ball))
       room%floor_loss = 0.0_wp
       room%room_input = 0.0_wp
@@ -267,6 +276,9 @@ contains
       input = 0.0_wp
       square = 0.0_wp
       do i = 1, size(frequency)
+         line = 1 + mod(i - 1, chunk_size)
+         if (line == 1) call get_answers(box, lx, ly, highest, frequency(i:min(i + chunk_size - 1, size(frequency))), &
+            microphone, answers)
          associate (w => 2*pi*frequency(i))
             ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes them.
             loss = pole%im
@@ -303,13 +315,14 @@ contains
             end associate
          end do
          associate (energy => flow(:, :n_ball)**2 + flow(:, n_ball + 1:)**2)
-            room%room_input = room%room_input + matmul(answers%input(:, i), energy)
-            room%room_loss = room%room_loss + matmul(answers%loss(:, i), energy)
+            room%room_input = room%room_input + matmul(answers%input(:, line), energy)
+            room%room_loss = room%room_loss + matmul(answers%loss(:, line), energy)
          end associate
-         pressure = get_transposed_product(answers%pressure(:, :, i), flow)
+         pressure = get_transposed_product(answers%pressure(:, :, line), flow)
          sound(i, :, :) = cmplx(pressure(:n_microphone, :n_ball) - pressure(n_microphone + 1:, n_ball + 1:), &
             pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
       end do
+      room%room_modes = answers%n_mode
       associate (step => frequency(1))
          room%floor_input = 2*step*real(matmul(input, gain**2), wp)
          room%floor_loss = 2*step*(room%floor_loss + matmul(decay*square, drive**2))
@@ -468,17 +481,18 @@ contains
       real(wp), intent(in) :: microphone(:, :)
       type(answers_type), intent(out) :: answers
       real(wp), allocatable :: shape(:, :), height(:)
-      complex(wp) :: amplitude(size(frequency))
+      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(microphone, 2))
       real(wp) :: natural, decay
       integer :: i, j, k, n
 
       n = size(microphone, 2)
-      allocate (answers%pressure(size(lx), 2*n, size(frequency)), source=0.0_wp)
+      allocate (answers%pressure(size(lx), 2*n, size(frequency)))
       allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
       shape = get_cosines(lx, microphone(1, :)/box%sides(1))*get_cosines(ly, microphone(2, :)/box%sides(2))
       height = microphone(3, :)/box%sides(3)
       do i = 1, size(lx)
          k = 0
+         pressure = 0.0_wp
          do
             natural = get_mode_frequency(box, lx(i), ly(i), k)
             if (natural > highest) exit
@@ -491,13 +505,12 @@ contains
             end associate
             ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
             do j = 1, n
-               associate (at_microphone => (-1)**k*cos(k*pi*height(j))*shape(i, j))
-                  answers%pressure(i, j, :) = answers%pressure(i, j, :) + at_microphone*amplitude%re
-                  answers%pressure(i, n + j, :) = answers%pressure(i, n + j, :) + at_microphone*amplitude%im
-               end associate
+               pressure(:, j) = pressure(:, j) + (-1)**k*cos(k*pi*height(j))*shape(i, j)*amplitude
             end do
             k = k + 1
          end do
+         answers%pressure(i, :n, :) = transpose(pressure%re)
+         answers%pressure(i, n + 1:, :) = transpose(pressure%im)
       end do
    end subroutine get_answers
 

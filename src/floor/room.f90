@@ -133,6 +133,10 @@ module thud_room
       !> modes. From band `n_modal` + 1 on, they are statistical.
       integer :: n_modal = 0
       real(wp), allocatable :: modal_level(:), modal_spread(:)
+      !> Frequency at which three modes of the room overlap, Hz, and number of bands below it that have no modal level because
+      !> it would take too long.
+      real(wp) :: crossover = 0.0_wp
+      integer :: n_left_out = 0
       !> Standard deviation of the mean over positions, dB: [n_band].
       real(wp), allocatable :: mean_spread(:)
       !> The same for simply supported and for clamped edges: [n_band, 2].

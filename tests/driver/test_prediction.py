@@ -447,6 +447,29 @@ def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
     assert conforming.source_warnings == ()
 
 
+def test_modal_bands_that_take_too_long_are_named(
+    run: Run, case_file: CaseFile, shell: thud.Impact
+) -> None:
+    """The prediction by modes of a room with a long reverberation time ended without a warning."""
+
+    def predict(time: float) -> thud.RoomPrediction:
+        room = thud.Room(volume=40.0, reverberation_time=(time,))
+        return thud.predict_level(shell, thud.Plate(thickness=0.2), room)
+
+    def limit(time: float) -> float:
+        return float(np.sqrt(3 * 343**3 * time / (2.2 * 4 * np.pi * 40)))
+
+    long, short = predict(20.0), predict(3.0)
+    (warning,) = [text for text in long.warnings if "three modes" in text]
+    assert f"ends at {long.frequency[long.n_modal - 1]:g} Hz" in warning
+    assert f"overlap, {limit(20.0):.0f} Hz" in warning
+    assert not any("three modes" in text for text in short.warnings)
+    assert short.n_modal == np.count_nonzero(limit(3.0) >= BAND_CENTERS)
+    assert 8 < long.n_modal < np.count_nonzero(limit(20.0) >= BAND_CENTERS)
+    done = run(case_file(ROOM_CASE.replace("40", "40\n reverberation_time = 20")), "-o", "out")
+    assert warning in done.stderr
+
+
 @pytest.mark.parametrize(
     ("volume", "height"), [(39.0, "1.95"), (41.0, ""), (119.0, ""), (121.0, "6.05")]
 )

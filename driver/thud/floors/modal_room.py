@@ -143,7 +143,8 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     microphones : array_like, shape (n_microphone, 3), optional
         Positions of the microphone, m; the third coordinate is the height.
     max_frequency : float, optional
-        Highest mid frequency of a band, Hz; by default the crossover.
+        Highest mid frequency of a band, Hz; by default the crossover. Bands that would take too
+        long are left out.
 
     Returns
     -------

@@ -11,7 +11,7 @@ module thud_result_bundle
    use thud_room, only: few_modes, room_level_type
    use thud_room_prediction, only: contribution_names
    use thud_text, only: to_text
-   use thud_warnings, only: add_floor_warning, add_height_warning, warning_length
+   use thud_warnings, only: add_floor_warning, add_height_warning, add_modes_warning, warning_length
    implicit none (type, external)
    private
 
@@ -140,6 +140,7 @@ contains
       allocate (warnings(0))
       call add_floor_warning(case, warnings)
       call add_height_warning(case, warnings)
+      call add_modes_warning(room, warnings)
       call add_warnings(bundle, 'room_warnings.', warnings)
    end subroutine add_room_level
 
