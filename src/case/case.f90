@@ -21,7 +21,7 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: keep_impact_only, new_case, set_room_source
+   public :: keep_impact_only, new_case, set_floor_air, set_room_source
 
    !> Input of one run.
    type :: case_type
@@ -96,6 +96,16 @@ contains
          if (fields(i)%key == 'loss_factor') call fields(i)%set_from_text('0.3', error)
       end do
    end subroutine set_room_source
+
+   !> Surrounds the floors with the air of the room, after keys of the case have been set.
+   pure subroutine set_floor_air(case)
+      type(case_type), intent(inout) :: case
+      integer :: i
+
+      do i = 1, size(case%floors)
+         case%floors(i)%model%air = case%room%air
+      end do
+   end subroutine set_floor_air
 
    !> Leaves out free modes, compression and unknowns, which an impact does not use.
    pure subroutine keep_impact_only(case)

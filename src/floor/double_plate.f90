@@ -18,6 +18,8 @@ module thud_double_plate
       !> Number of bridges, and stiffness of one, N/m.
       integer :: bridge_count = 0
       real(wp) :: bridge_stiffness = 0.0_wp
+      !> Air that the lower plate radiates into.
+      type(air_type) :: air
    end type double_plate_type
 
 contains
@@ -41,7 +43,7 @@ contains
 
       omega = 2*pi*frequency
       b1 = get_bending_stiffness(floor%upper)*cmplx(1.0_wp, floor%upper%loss_factor, wp)
-      b2 = get_bending_stiffness(floor%lower)*cmplx(1.0_wp, get_total_loss(floor%lower, air_type(), frequency), wp)
+      b2 = get_bending_stiffness(floor%lower)*cmplx(1.0_wp, get_total_loss(floor%lower, floor%air, frequency), wp)
       s = floor%layer_stiffness*cmplx(1.0_wp, floor%layer_loss, wp)
       c1 = (s - get_surface_mass(floor%upper)*omega**2)/b1
       c2 = (s - get_surface_mass(floor%lower)*omega**2)/b2
@@ -85,7 +87,7 @@ contains
          ! Powers per mean-square velocity of each plate.
          dissipated(1) = area*(omega*floor%upper%loss_factor*get_surface_mass(floor%upper) &
             + floor%layer_stiffness*floor%layer_loss/omega)
-         dissipated(2) = area*omega*get_total_loss(floor%lower, air_type(), frequency)*get_surface_mass(floor%lower)
+         dissipated(2) = area*omega*get_total_loss(floor%lower, floor%air, frequency)*get_surface_mass(floor%lower)
          transmitted = floor%bridge_count/z2/((1/z1 + 1/z2)**2 + (omega/k)**2)
          returned = transmitted*get_mode_density(floor%upper)/get_mode_density(floor%lower) &
             *get_surface_mass(floor%lower)/get_surface_mass(floor%upper)

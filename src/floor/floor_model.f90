@@ -9,7 +9,7 @@ module thud_floor_model
    use thud_floor_modes, only: floor_modes_type
    use thud_kinds, only: wp
    use thud_new_field, only: list_field
-   use thud_plate, only: plate_type
+   use thud_plate, only: air_type, plate_type
    use thud_receiver, only: receiver_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -27,6 +27,8 @@ module thud_floor_model
    type, abstract :: floor_model_type
       !> Coordinates along length and width of further points whose velocity is output (rectangular floors), m.
       type(list_type) :: point_x, point_y
+      !> Air around the floor: that of the room below (`set_floor_air`).
+      type(air_type) :: air
    contains
       procedure, pass(options) :: get_point_fields
       procedure, pass(options) :: check_points

@@ -156,8 +156,11 @@ contains
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
+      type(plate_floor_type) :: radiator
 
-      call options%radiator%get_radiating_modes(plate, modes, error)
+      radiator = options%radiator
+      radiator%air = options%air
+      call radiator%get_radiating_modes(plate, modes, error)
    end subroutine get_radiating_modes
 
    !> The mobility of one point contains no shapes of modes.

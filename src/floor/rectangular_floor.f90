@@ -338,7 +338,7 @@ contains
       base = options%get_base()
       group = base%group
       plate = base%plate
-      call get_floor_modes(trim(group), get_stack(options, base, support), plate, modes, error, max_frequency)
+      call get_floor_modes(trim(group), get_stack(options, base, support), plate, options%air, modes, error, max_frequency)
    end subroutine get_modes
 
    !> The plates above each other.
@@ -386,7 +386,8 @@ contains
          stack%bearing = size(stack%plate)
          if (options%has_subceiling()) then
             stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(options%subceiling, plate))]
-            stack%layer = [stack%layer, get_subceiling_layer(options%subceiling, get_channels(options, base))]
+            stack%layer = [stack%layer, get_subceiling_layer(options%subceiling, options%air, &
+               get_channels(options, base))]
          end if
          stack%radiator = size(stack%plate)
       end associate
@@ -515,7 +516,7 @@ contains
 
       associate (screed => options%screed)
          plates = double_plate_type(get_screed_plate(screed, lower), lower, screed%layer_stiffness, &
-            screed%layer_loss_factor, screed%bridge_x%count, screed%bridge_stiffness)
+            screed%layer_loss_factor, screed%bridge_x%count, screed%bridge_stiffness, options%air)
       end associate
    end function get_double_plate
 
@@ -568,7 +569,7 @@ contains
          end if
       end associate
       if (.not. options%has_subceiling()) return
-      associate (cavity => get_cavity_limit(options%subceiling), &
+      associate (cavity => get_cavity_limit(options%subceiling, options%air), &
          thin => get_thin_limit(get_subceiling_plate(options%subceiling, above)))
          if (min(cavity, thin) >= highest) return
          highest = min(cavity, thin)

@@ -65,12 +65,12 @@ contains
 
    !> The connection of the subceiling with the plate above it: lines of springs, and the stiffness rho0 c0**2/depth of the
    !> air, which does not move sideways.
-   pure function get_subceiling_layer(subceiling, lines) result(layer)
+   pure function get_subceiling_layer(subceiling, air, lines) result(layer)
       type(subceiling_type), intent(in) :: subceiling
+      type(air_type), intent(in) :: air
       !> Positions of the lines along the width, m: [n_line].
       real(wp), intent(in) :: lines(:)
       type(layer_type) :: layer
-      type(air_type) :: air
 
       layer%stiffness = air%density*air%sound_speed**2/subceiling%cavity_depth
       layer%loss_factor = subceiling%cavity_loss_factor
@@ -92,10 +92,10 @@ contains
    end function get_spaced_positions
 
    !> Frequency at which the cavity is a quarter of a wavelength deep, Hz; above it, the air is no mere stiffness.
-   pure function get_cavity_limit(subceiling) result(frequency)
+   pure function get_cavity_limit(subceiling, air) result(frequency)
       type(subceiling_type), intent(in) :: subceiling
+      type(air_type), intent(in) :: air
       real(wp) :: frequency
-      type(air_type) :: air
 
       frequency = air%sound_speed/(4*subceiling%cavity_depth)
    end function get_cavity_limit

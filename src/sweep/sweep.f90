@@ -7,7 +7,7 @@ module thud_sweep
    use thud_batch_samples, only: fill_samples, suits_batch
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_blocked_drop, only: blocked_type, solve_blocked
-   use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only
+   use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
    use thud_column, only: column_type
    use thud_compute, only: assess_floor, drop_on_floor, get_assessed_force, get_cost, scope_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
@@ -285,6 +285,7 @@ contains
       do i = 1, size(columns)
          if (.not. allocated(error)) call fields(columns(i)%field)%set_number(values(i), columns(i)%entry, error)
       end do
+      call set_floor_air(case)
       if (.not. allocated(error)) call check_case(case, error)
       if (.not. allocated(error)) call solve_blocked(case, fields, scope, blocked, error)
       if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, on_floor, error)

@@ -54,6 +54,17 @@ def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelOpti
         assert many.peak_force[i] == pytest.approx(blocked.peak_force)
 
 
+def test_each_air_has_the_numbers_of_a_single_prediction() -> None:
+    floor = thud.Plate(
+        thickness=0.03, density=500.0, wave_speed=2500.0, subceiling_thickness=0.0125
+    )
+    many = thud.solve_many({"air_density": [0.5, 2.0]}, replace(CASE, floor=floor))
+    assert many.room_level is not None
+    for level, density in zip(many.room_level, [0.5, 2.0], strict=True):
+        found = thud.predict_level(floor=floor, room=thud.Room(air_density=density))
+        assert level == pytest.approx(found.level, abs=1e-9)
+
+
 def test_blocked_drop_is_kept_only_while_it_is_the_same(many: thud.Ensemble) -> None:
     """It is kept from drop to drop and from call to call; no number depends on what came before."""
     order = [3, 0, 2, 1]

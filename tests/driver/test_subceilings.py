@@ -31,9 +31,11 @@ AIR = 1.2 * 343**2
 STRIKES = {"x": np.array([0.23, 0.41, 0.65]), "y": np.array([0.37, 0.29, 0.44])}
 
 
-def frequencies_of(floor: thud.FloorOptions, highest: float) -> Array:
+def frequencies_of(
+    floor: thud.FloorOptions, highest: float, room: thud.Room | None = None
+) -> Array:
     """Return natural frequencies, Hz."""
-    case = thud.Case(floor=floor)
+    case = thud.Case(floor=floor, room=room)
     return np.asarray(ask("floor_modes", case=case_text(case), highest=highest)["frequency"])
 
 
@@ -185,6 +187,44 @@ def test_rooms_that_contradict_a_subceiling_are_refused(room: dict[str, Any], wo
     with pytest.raises(thud.InputError, match=words) as refused:
         thud.solve(model="hollow_sphere", floor=HUNG, room=thud.Room(**room))
     assert "\n" not in str(refused.value)
+
+
+def test_air_of_the_room_is_the_spring_of_a_subceiling() -> None:
+    """The air above a subceiling was that of the default room, whatever the room stated."""
+    dense = thud.Room(air_density=2.0, sound_speed=343.0)
+    light = thud.Room(air_density=1.0, sound_speed=343.0)
+    floor = replace(HUNG, channel_stiffness=0.0)
+    shallow = replace(floor, cavity_depth=0.1)
+    assert frequencies_of(floor, 150.0, dense) == pytest.approx(
+        frequencies_of(shallow, 150.0, light), rel=1e-12
+    )
+    resonance = np.sqrt(2.0 * 343**2 / 0.2 * (1 / MASS + 1 / BOARD)) / (2 * np.pi)
+    found = frequencies_of(floor, 150.0, dense)
+    assert abs(found / resonance - 1).min() < 0.01
+    assert abs(frequencies_of(floor, 150.0, light) / resonance - 1).min() > 0.01
+    fast = replace(dense, sound_speed=400.0)
+    deep = thud.solve(model="hollow_sphere", floor=replace(HUNG, cavity_depth=0.5), room=fast)
+    assert any("above 200 Hz the cavity" in warning for warning in deep.warnings)
+
+
+def test_air_of_the_room_damps_the_floor_and_changes_the_force() -> None:
+    thin = thud.Plate(
+        thickness=0.012, density=500.0, wave_speed=2500.0, loss_factor=0.001, edges="absorption",
+        subceiling_thickness=0.0125, cavity_depth=0.02,
+    )  # fmt: skip
+    dense, light = thud.Room(air_density=2.0), thud.Room(air_density=0.5)
+    losses = [
+        ask("floor_modes", case=case_text(thud.Case(floor=thin, room=room)), highest=200.0)
+        for room in (dense, light)
+    ]
+    assert losses[0]["loss_factor"][0] > losses[1]["loss_factor"][0]
+    impact = thud.solve(floor=thin, room=light)
+    moved = thud.predict_level(impact, thin, dense).source
+    expected = thud.solve(floor=thin, room=dense).on_floor
+    assert expected is not None
+    assert moved.peak("floor") == pytest.approx(expected.peak("floor"))
+    assert impact.on_floor is not None
+    assert moved.peak("floor") != pytest.approx(impact.on_floor.peak("floor"), rel=1e-4)
 
 
 def test_limits_of_cavity_and_board_are_warned_of() -> None:

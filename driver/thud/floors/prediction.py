@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from thud.base._schema import Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import FloorOptions, Room, RoomRequiredRating
+    from thud.base._schema import FloorOptions, RoomRequiredRating
 
     Array = NDArray[np.float64]
 
@@ -401,11 +402,18 @@ def _source_warnings(source: ImpactResult) -> tuple[str, ...]:
 def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
     """Return the impact on the floor of a case; None if only the blocked force is known."""
     existing = source if isinstance(source, FloorImpact) else source.on_floor
-    if source.case.model is None or source.case.floor == case.floor:
+    known = source.case
+    if known.model is None or (known.floor, _air(known)) == (case.floor, _air(case)):
         return existing
     plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
     return new_floor_impact(case, ask("floor_impact", case=case_text(plain)), blocked)
+
+
+def _air(case: Case) -> tuple[float, float]:
+    """Return density, kg/m3, and speed of sound, m/s, of the air around the floor of a case."""
+    room = case.room or Room()
+    return room.air_density, room.sound_speed
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

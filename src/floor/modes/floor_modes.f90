@@ -54,12 +54,14 @@ contains
 
    !> Modes of a stack of plates. To the losses of its parts those of the bearing plate at its edges and by radiation are
    !> added, in proportion to its part of the energy.
-   subroutine get_floor_modes(group, stack, bearing, modes, error, max_frequency)
+   subroutine get_floor_modes(group, stack, bearing, air, modes, error, max_frequency)
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       type(plate_stack_type), intent(in) :: stack
       !> The bearing plate, with its total losses.
       type(plate_type), intent(in) :: bearing
+      !> Air that it radiates into.
+      type(air_type), intent(in) :: air
       type(floor_modes_type), intent(out) :: modes
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
@@ -75,7 +77,7 @@ contains
       wanted = mode_limit*resolution
       if (is_uncoupled(held) .and. .not. has_shear(held)) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
-      allocate (key, source=[wanted, get_key(held, bearing)])
+      allocate (key, source=[wanted, air%density, air%sound_speed, get_key(held, bearing)])
       do i = 1, size(cached)
          if (.not. allocated(cached(i)%key)) exit
          if (size(key) /= size(cached(i)%key)) cycle
@@ -93,7 +95,7 @@ contains
       modes%sum_limit = 2*pi*resolved
       modes%limit = 2*pi*min(mode_limit, resolved/resolution)
       do i = 1, size(modes%modes%block)
-         call add_bearing_losses(modes%modes%block(i), bearing, modes%limit)
+         call add_bearing_losses(modes%modes%block(i), bearing, air, modes%limit)
       end do
       associate (block => modes%modes%block)
          modes%omega = [(block(i)%omega, i=1, size(block))]
@@ -114,17 +116,18 @@ contains
    end function get_mode_limit
 
    !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
-   subroutine add_bearing_losses(block, bearing, limit)
+   subroutine add_bearing_losses(block, bearing, air, limit)
       type(mode_block_type), intent(inout) :: block
       !> The bearing plate, with its total losses.
       type(plate_type), intent(in) :: bearing
+      type(air_type), intent(in) :: air
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: limit
       real(wp) :: added(size(block%omega))
       complex(wp), allocatable :: matrix(:, :)
       integer :: i, j, n
 
-      added = get_total_loss(bearing, air_type(), max(block%omega/(2*pi), 1.0_wp)) - bearing%loss_factor
+      added = get_total_loss(bearing, air, max(block%omega/(2*pi), 1.0_wp)) - bearing%loss_factor
       n = count(block%omega < limit)
       if (n > 1 .and. (allocated(block%damping) .or. allocated(block%bearing))) then
          allocate (matrix(n, n), source=(0.0_wp, 0.0_wp))

@@ -1,7 +1,8 @@
 !> Cases as namelist files: reading, writing, and the description of all keys.
 module thud_case_text
    use, intrinsic :: iso_fortran_env, only: int64
-   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case, set_room_source
+   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case, set_floor_air, &
+      set_room_source
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
@@ -65,6 +66,7 @@ contains
       end do
       if (present(directory) .and. .not. allocated(error)) call resolve_paths(fields, directory, error)
       if (allocated(error)) return
+      call set_floor_air(case)
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
