@@ -225,8 +225,8 @@ contains
 
       if (prediction%n_left_out == 0) return
       call add(warnings, '&room: reverberation_time: the prediction by modes ends at ' &
-         //trim(get_band_name(prediction%bands(prediction%n_modal)))//' Hz, below the frequency at which three modes of the ' &
-         //'room overlap, '//fixed(prediction%crossover, 0)//' Hz')
+         //trim(get_band_name(prediction%bands(prediction%n_modal)))//' Hz, below the frequency at which three modes of ' &
+         //'the room overlap, '//fixed(prediction%crossover, 0)//' Hz')
    end subroutine add_modes_warning
 
    !> Adds warnings on a room of unusual height and a room that is not as large as the floor.

@@ -31,7 +31,9 @@ def test_lines_that_coincide_are_refused() -> None:
     """Equal lines counted as two supports, and gave wrong modes."""
     with pytest.raises(thud.InputError, match=r"&plate: line_x = 2\.0 m is stated twice"):
         thud.mobility(thud.Plate(line_x=(2.0, 3.0, 2.0), source_x=0.2), [50.0])
-    with pytest.raises(thud.InputError, match="line_y = 1.505 m is stated twice, or within 10.0 mm"):
+    with pytest.raises(
+        thud.InputError, match=r"line_y = 1\.505 m is stated twice, or within 10\.0 mm"
+    ):
         thud.mobility(thud.Plate(line_y=(1.5, 1.505)), [50.0])
 
 

@@ -6,7 +6,7 @@ import math
 import re
 from contextvars import ContextVar
 from dataclasses import fields
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
@@ -67,7 +67,7 @@ def fields_by_key() -> dict[tuple[str, str], dict[str, Any]]:
     return _fields_by_key(has_si_units=SI_UNITS.get())
 
 
-@cache
+@lru_cache(maxsize=2)
 def _fields_by_key(*, has_si_units: bool) -> dict[tuple[str, str], dict[str, Any]]:  # noqa: ARG001 - tells results apart
     return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
 
