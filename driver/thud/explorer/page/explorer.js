@@ -175,6 +175,7 @@ function showAll() {
   byId("keep").hidden = isEmpty;
   byId("next").replaceChildren();
   byId("result").replaceChildren();
+  byId("improvement").replaceChildren(...improveButton(own));
   showAsks(own && door === "recording" ? own.answer.asks : [], onChange);
   if (isEmpty) {
     showNothing(door);
@@ -197,7 +198,6 @@ function showAll() {
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(hasRoom ? variants : [], showError);
   if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
-  if (door === "ball" && own.answer.headline.result !== "conforms") byId("next").append(button("Smallest change that conforms", improve, { id: "improve" }));
   if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted.text));
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
 }
@@ -423,20 +423,30 @@ async function fit() {
   } catch (error) { showError(error); } finally { if (byId("fit")) byId("fit").disabled = false; }
 }
 
-async function improve() {
+/** Return the button that looks for a change with which a source conforms or a required level is met, if there is a need. */
+function improveButton(own) {
+  if (!own?.values || ["conforms", "level"].includes(own.answer.headline.result)) return [];
+  const title = own.answer.room ? `Change that meets ${own.values.room.required} dB` : "Smallest change that conforms";
+  return [button(title, () => improve(title), { id: "improve" })];
+}
+
+async function improve(title) {
   const asked = byId("improve");
+  const { door } = state;
   asked.disabled = true;
   try {
-    const { changes, none, note } = await runTask("Looking for a change that conforms", "improve", JSON.stringify(caseValues("ball")), new AbortController(), { showNow: true });
+    const { changes, none, note } = await runTask(title, "improve", JSON.stringify(caseValues(door)), new AbortController(), { showNow: true });
+    if (!asked.isConnected) return;
     const apply = ({ key, value }) => {
       const [group, name] = key.split(".");
-      const values = caseValues("ball");
+      const values = caseValues(door);
       (values[group] ??= {})[name] = value;
       takeValues(values);
-      openDoor("ball");
+      openDoor(door);
     };
     const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
     byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
+    byId("result").scrollIntoView({ block: "nearest" });
   } catch (error) { showError(error); } finally { asked.disabled = false; }
 }
 

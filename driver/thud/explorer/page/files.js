@@ -2,6 +2,7 @@
 import { button, byId, element, saveFile } from "./page.js";
 import { contentOf, imageOf } from "./plot.js";
 import { ask } from "./request.js";
+import { headlineText } from "./results.js";
 import { inputRows } from "./variants.js";
 
 // Size of saved plots, px.
@@ -107,7 +108,7 @@ export function pageOf(variants, version) {
   const figures = plots.map((host) => element("figure", {}, element("figcaption", {}, contentOf(host).title), element("slot", { name: host.id })));
   const [first] = variants;
   page.body.append(
-    element("h1", { class: first.answer.headline.result }, `${first.label}: ${first.answer.headline.text}`), element("p", {}, first.answer.headline.detail ?? ""),
+    element("h1", { class: first.answer.headline.result }, `${first.label}: ${headlineText(first.answer)}`), element("p", {}, first.answer.headline.detail ?? ""),
     ...(variants.length > 1 ? [element("h2", {}, "Comparison"), table("variants")] : []),
     ...figures,
     ...(byId("criteria_section").offsetParent ? [element("h2", {}, "Criteria"), table("criteria"), element("p", {}, byId("criteria_text").textContent)] : []),

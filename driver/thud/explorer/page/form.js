@@ -145,9 +145,25 @@ export function buildInputs(onChange, onInvalid) {
   const focus = document.activeElement?.id;
   const scroll = byId("inputs").scrollTop;
   const handlers = { onChange, onInvalid, rebuild: () => { buildInputs(onChange, onInvalid); onChange(); } };
-  byId("inputs").replaceChildren(...(state.door === "floor" ? floorInputs(handlers) : ballInputs(handlers)));
+  replaceInputs(state.door === "floor" ? floorInputs(handlers) : ballInputs(handlers));
   byId("inputs").scrollTop = scroll;
   if (focus && document.activeElement?.id !== focus) byId(focus)?.focus();
+}
+
+/** Replace the form but for a choice that has the focus: typing its name goes on. */
+function replaceInputs(children) {
+  const form = byId("inputs");
+  const select = form.querySelector(":scope > .choice select:focus");
+  const at = select ? children.findIndex((child) => child.querySelector?.(`:scope.choice > .field > #${select.id}`)) : -1;
+  if (at < 0) { form.replaceChildren(...children); return; }
+  const kept = select.closest(".choice");
+  for (const child of [...form.childNodes]) if (child !== kept) child.remove();
+  kept.before(...children.slice(0, at));
+  kept.after(...children.slice(at + 1));
+  const { value } = children[at].querySelector("select");
+  if (select.value !== value) select.value = value;
+  for (const help of kept.querySelectorAll(":scope > .help")) help.remove();
+  kept.append(...children[at].querySelectorAll(":scope > .help"));
 }
 
 function ballInputs(handlers) {
@@ -202,7 +218,7 @@ function choiceOf(id, label, options, value, onSelect, ...rest) {
   const select = element("select", { id }, ...options.map(optionOf));
   select.value = value;
   select.addEventListener("change", () => onSelect(select.value));
-  return element("div", {}, element("div", { class: "field" }, element("label", { for: id }, element("b", {}, label)), select), ...rest);
+  return element("div", { class: "choice" }, element("div", { class: "field" }, element("label", { for: id }, element("b", {}, label)), select), ...rest);
 }
 
 const titleOf = (group) => (["model", "floor"].includes(group.part) ? factsOf(group.part, group.name).title : group.title);
@@ -288,7 +304,7 @@ function listInput(field, id, onInput, onInvalid) {
 function numberInput(field, id, onInput, onInvalid) {
   let current = scaled(valueOf(field), -field.power);
   // A zero that is not a number, such as "none", is an empty field.
-  const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;]+)/) ?? [];
+  const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;,]+)/) ?? [];
   const textOf = (value) => (zero && value === 0 ? "" : Number(value.toPrecision(DIGITS)));
   const number = element("input", { id, type: "number", step: "any", value: textOf(current), placeholder: zero, class: zero && "open" });
   const send = (entered) => {
@@ -331,7 +347,10 @@ function rounding(count, step) {
 
 /** Return a slider on a linear or logarithmic scale with round values; `onMove` is called with the selected value. */
 function sliderInput(field, value, step, onMove) {
-  const [low, high] = [rounding(Math.ceil(field.slider.ends[0] / step - 1e-6), step), rounding(Math.floor(field.slider.ends[1] / step + 1e-6), step)];
+  const [first, last] = field.slider.ends;
+  // A model or a construction may have brought a value near the end for the default.
+  const ends = field.slider.log && value > 0 ? [Math.max(Math.min(first, value / 2), field.lower ?? 0), Math.min(Math.max(last, 2 * value), field.upper ?? Infinity)] : [first, last];
+  const [low, high] = [rounding(Math.ceil(ends[0] / step - 1e-6), step), rounding(Math.floor(ends[1] / step + 1e-6), step)];
   const [toSlider, fromSlider] = field.slider.log && low > 0 ? [Math.log, Math.exp] : [(x) => x, (x) => x];
   const slider = element("input", { type: "range", "aria-label": field.label, min: toSlider(low), max: toSlider(high), step: "any" });
   let current = value;

@@ -68,27 +68,34 @@ export function recordingBody(values) {
   return body;
 }
 
-/** Ask for what the answer lacks, with the values that it found. */
+/** Ask for what the answer lacks, with the values that it found; one button sends all, and what was typed stays. */
 export function showAsks(asks, onChange) {
-  const place = byId("asks");
+  const form = byId("asks");
   const open = (asks ?? []).filter(({ values }) => Object.keys(values).some((name) => !state.recording[name]));
-  place.hidden = !open.length;
-  place.replaceChildren(...open.map(({ reason, values }) => {
+  const focus = form.contains(document.activeElement) ? document.activeElement.id : "";
+  form.hidden = !open.length;
+  const cards = open.map(({ reason, values }) => {
     const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
     const inputs = fields.map(({ name, label }) => {
       const id = `ask_${name}`;
-      const input = element("input", { id, type: "number", step: "any", value: state.recording[name] ?? values[name] });
+      const value = String(state.recording[name] ?? values[name]);
+      const input = element("input", { id, name, type: "number", step: "any", value });
+      const old = byId(id);
+      if (old?.defaultValue === value) input.value = old.value;
       return element("div", { class: "field" }, element("label", { for: id }, label), input);
     });
-    return element("div", {}, element("p", {}, reason), ...inputs, button("Assess with this", () => {
-      for (const { name } of fields) {
-        const { value } = byId(`ask_${name}`);
-        if (value) state.recording[name] = value;
-        byId(`recording_${name}`).value = value;
-      }
-      onChange();
-    }, { class: "strong" }));
-  }));
+    return element("div", {}, element("p", {}, reason), ...inputs);
+  });
+  form.replaceChildren(...cards, ...(cards.length ? [button("Assess with this", () => {}, { class: "strong", type: "submit", id: "assess" })] : []));
+  if (focus) byId(focus)?.focus();
+  form.onsubmit = (event) => {
+    event.preventDefault();
+    for (const [name, value] of new FormData(form)) {
+      if (value) state.recording[name] = value;
+      byId(`recording_${name}`).value = state.recording[name] ?? "";
+    }
+    onChange();
+  };
 }
 
 /** Return the button that saves the calibration report of an answer. */

@@ -3,14 +3,26 @@ import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "
 import { interpolate, plot, swatch } from "./plot.js";
 
 const RESULTS = { conforms: "conforms", inconclusive: "undecided" };
+// Verdicts on the required level of a room.
+const ROOM_VERDICTS = { conforms: "met", fails: "not met", undecided: "undecided" };
 const SIGNS = { conforms: "✓", fails: "✕", undecided: "?", level: "" };
 // Uncertainties that are smaller are not drawn, dB.
 const MIN_UNCERTAINTY = 0.02;
 
+/** Return the headline of an answer: the verdict on a required level, and uncertainties of the values in it. */
+export function headlineText({ headline: { text, result }, room, criteria }) {
+  if (room) return ROOM_VERDICTS[result] ? `${ROOM_VERDICTS[result]}: ${text}` : text;
+  return criteria.filter(({ uncertainty, range }) => uncertainty && !range).reduce((shown, criterion) => shown.replace(
+    new RegExp(`((?:^|: |; )${criterion.name}) -?[\\d.]+(?= ${criterion.unit})`, "i"), `$1 ${valueTextOf(criterion)} ± ${uncertaintyText(criterion)}`), text);
+}
+
+const valueTextOf = (criterion) => criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
+const uncertaintyText = ({ uncertainty, uncertainty_text: text }) => text ?? Number(uncertainty.toPrecision(2));
+
 /** Show the answer to the question; `variant` has a label and an answer. */
 export function showHeadline({ label, answer }) {
-  const { text, result, detail } = answer.headline;
-  const [, first, rest] = text.match(/^([^:(]+)(.*)$/s);
+  const { result, detail } = answer.headline;
+  const [, first, rest] = headlineText(answer).match(answer.room ? /^([^(]+)(.*)$/s : /^([^:(]+)(.*)$/s);
   byId("verdict").className = result;
   byId("verdict").replaceChildren(
     ...(SIGNS[result] ? [element("span", { class: "sign", "aria-hidden": "true" }, SIGNS[result])] : []),
@@ -133,12 +145,8 @@ function missedSide(criterion) {
 /** Show the criteria of the standards; their names explain themselves. */
 export function showCriteria(variants) {
   const cell = (criterion) => {
-    const text = criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
-    const value = element("td", { class: `value ${resultOf(criterion)}` }, text);
-    if (criterion.uncertainty && !criterion.range) {
-      const uncertainty = criterion.uncertainty_text ?? Number(criterion.uncertainty.toPrecision(2));
-      value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertainty}`));
-    }
+    const value = element("td", { class: `value ${resultOf(criterion)}` }, valueTextOf(criterion));
+    if (criterion.uncertainty && !criterion.range) value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertaintyText(criterion)}`));
     if (criterion.range) value.append(" ", element("small", {}, `(${criterion.range})`));
     return value;
   };

@@ -1,10 +1,11 @@
 // Variants: what they are called, by what differs, and their table.
 import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
 import { STYLES, swatch } from "./plot.js";
+import { headlineText } from "./results.js";
 import { about, factsOf, findField, sorted } from "./form.js";
 
 // Words of keys in names, if shorter than their labels.
-const WORDS = { youngs_modulus: "E", wall_thickness: "wall", outer_radius: "radius", height: "drop", thickness: "slab", reverberation_time: "T" };
+const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
 // Number of differences in a name.
 const MAX_DIFFERENCES = 3;
 const SOURCE_GROUPS = ["sampling", "levels", "limits", "drop", "ball"];
@@ -25,7 +26,7 @@ export function nameVariants(variants) {
     .filter((key) => models.length === 1 || new Set(models.map(({ values }) => valueText(values, key))).size > 1);
   for (const [i, variant] of models.entries()) {
     const { base, changes } = described[i];
-    const words = keys.filter((key) => isShared || changes.has(key)).map((key) => wordsOf(key, valueText(variant.values, key)));
+    const words = keys.filter((key) => isShared || changes.has(key)).map((key) => wordsOf(key, variant.values));
     const shown = [...(isShared && words.length ? [] : [base]), ...words.slice(0, MAX_DIFFERENCES), ...(words.length > MAX_DIFFERENCES ? ["…"] : [])];
     variant.label = variant.title ?? capitalize(shown.join(", "));
   }
@@ -77,9 +78,13 @@ function valueText(values, key) {
   return field?.choices?.[value] ?? [value].flat().join(" ");
 }
 
-function wordsOf(key, text) {
+/** Return name and value of a key; with a floor, fields with the same label have the name of their group. */
+function wordsOf(key, values) {
   const [group, name] = key.split(".");
-  return `${WORDS[name] ?? findField(group, name)?.label.toLowerCase() ?? name} ${text}`;
+  const label = findField(group, name)?.label;
+  const parts = new Set(about.form.filter(({ fields }) => fields.some((field) => field.label === label)).map(({ part }) => part));
+  const owner = values.floor && parts.size > 1 ? `${about.form.find((entry) => entry.name === group)?.title.toLowerCase() ?? group} ` : "";
+  return `${WORDS[key] ?? `${owner}${label?.toLowerCase() ?? name}`} ${valueText(values, key)}`;
 }
 
 /** Return values as rows: group, label and text, for pages. */
@@ -114,7 +119,7 @@ export function showVariants(variants, { remove, rename }) {
     name.addEventListener("click", () => renameIn(name, variant, rename));
     const result = variant.answer.headline.result;
     return element("tr", {}, element("th", { scope: "row" }, element("span", { class: "named" }, swatch(variant.style), name)),
-      element("td", { class: result }, isRoom ? variant.answer.room.interval : { conforms: "conforms", fails: "does not conform", undecided: "undecided", level: variant.answer.verdict }[result]),
+      element("td", { class: result }, isRoom ? headlineText(variant.answer) : { conforms: "conforms", fails: "does not conform", undecided: "undecided", level: variant.answer.verdict }[result]),
       ...columns.map((column) => cell(variant, column)),
       element("td", {}, i ? button("×", () => remove(variant), { class: "remove", "aria-label": `Remove ${variant.label}` }) : ""));
   });
