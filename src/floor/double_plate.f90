@@ -2,8 +2,8 @@
 module thud_double_plate
    use thud_constants, only: pi
    use thud_kinds, only: wp
-   use thud_plate, only: air_type, get_bending_stiffness, get_mode_density, get_resistance, get_surface_mass, get_total_loss, &
-      plate_type
+   use thud_plate, only: air_type, get_bending_stiffness, get_mode_density, get_resistance, get_surface_mass, &
+      get_total_loss, plate_type
    implicit none (type, external)
    private
 
@@ -63,11 +63,11 @@ contains
 
    !> Power into the lower plate through bridges per mean-square force on the upper plate (Cremer, Heckl and Petersson).
    !>
-   !> Bridges that are farther apart than half a bending wave of the upper plate act one by one. It receives 1/Z1, which it and
-   !> the layer dissipate and the bridges transmit: with its velocity v, a bridge exerts the force v/(1/Z1 + 1/Z2 + i w/k) on
-   !> the lower plate. Plates are infinite in Z1 and Z2, the sound field of the upper plate is diffuse, and as much energy flows
-   !> back as makes that of all modes equal if nothing is dissipated. Below the resonance f0 of the plates on the layer both
-   !> move together: the factor 1/(1 + (f0/f)**4).
+   !> Bridges that are farther apart than half a bending wave of the upper plate act one by one. It receives 1/Z1, which it
+   !> and the layer dissipate and the bridges transmit: with its velocity v, a bridge exerts the force v/(1/Z1 + 1/Z2 +
+   !> i w/k) on the lower plate. Plates are infinite in Z1 and Z2, the sound field of the upper plate is diffuse, and as much
+   !> energy flows back as makes that of all modes equal if nothing is dissipated. Below the resonance f0 of the plates on
+   !> the layer both move together: the factor 1/(1 + (f0/f)**4).
    !>
    !> Closer ones act together, like a layer of their stiffness per area: stiff ones make one plate of both.
    elemental function get_bridge_conductance(floor, frequency) result(conductance)
@@ -76,7 +76,8 @@ contains
       real(wp), intent(in) :: frequency
       !> The conductance, m/(N s).
       real(wp) :: conductance
-      real(wp) :: omega, dissipated(2), transmitted, returned, resonance, separate, ratio
+      real(wp) :: omega, transmitted, returned, resonance, separate, ratio
+      real(wp) :: dissipated(2)
       type(double_plate_type) :: joined
 
       conductance = 0.0_wp

@@ -191,8 +191,8 @@ contains
       call get_coupling(modes, box, kept, lx, ly, coupling)
       call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive, kept)
       room%floor_modes = size(pole)
-      call get_sound(pole, get_mixing(modes%modes, kept), drive, get_groups(lx, ly, coupling), frequency, spectrum, box, lx, ly, &
-         highest, microphone, sound, room)
+      call get_sound(pole, get_mixing(modes%modes, kept), drive, get_groups(lx, ly, coupling), frequency, spectrum, box, &
+         lx, ly, highest, microphone, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
       if (with_pressure) then
          allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
@@ -280,7 +280,8 @@ contains
          if (line == 1) call get_answers(box, lx, ly, highest, frequency(i:min(i + chunk_size - 1, size(frequency))), &
             microphone, answers)
          associate (w => 2*pi*frequency(i))
-            ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes them.
+            ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes
+            ! them.
             loss = pole%im
             if (is_identity(mixing)) loss = w*decay
             response = spectrum(i)*cmplx(0.0_wp, w, wp)/cmplx(pole%re - w**2, loss, wp)

@@ -683,16 +683,16 @@ def test_soft_covering_is_a_spring_under_the_source() -> None:
     assert added == pytest.approx(2j * np.pi * 50 / (2e5 * (1 + 0.3j)), rel=1e-9)
 
 
-@pytest.mark.parametrize(("floor", "n_modal"), [(thud.JoistFloor(), 7), (thud.LaminateFloor(), 7)])
+@pytest.mark.parametrize("floor", [thud.JoistFloor(), thud.LaminateFloor()])
 def test_bands_beyond_the_modes_are_those_of_the_simply_supported_floor(
-    shell: thud.Impact, floor: thud.JoistFloor | thud.LaminateFloor, n_modal: int
+    shell: thud.Impact, floor: thud.JoistFloor | thud.LaminateFloor
 ) -> None:
     """Polynomials resolve few waves of light floors: levels fell by up to 27 dB without a word."""
     room = thud.Room(volume=50.0)
     simple = thud.predict_level(shell, floor, room)
     clamped = thud.predict_level(shell, replace(floor, support="clamped"), room)
     assert clamped.level[-4:] == pytest.approx(simple.level[-4:], abs=1.0)
-    assert (simple.n_modal, clamped.n_modal) == (7, n_modal)
+    assert (simple.n_modal, clamped.n_modal) == (7, 7)
     assert abs(clamped.level[0] - simple.level[0]) > 1
 
 

@@ -258,8 +258,9 @@ contains
             if (max(ribs%torsion, ribs%inertia) > 0.0_wp) position = [position, ribs%position]
          end associate
       end do
-      if (has_sines(plate, direction) .and. n >= max(min_sines(1)*size(position), min_sines(2))) &
-          position = position(:0)
+      if (has_sines(plate, direction) .and. n >= max(min_sines(1)*size(position), min_sines(2))) then
+        position = position(:0)
+      end if
    end function get_twisting_ribs
 
    !> Degree of the polynomials that resolve a wave: its Legendre coefficients end about there.
