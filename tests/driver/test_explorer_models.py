@@ -171,6 +171,11 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
     for required, result in ((40.0, "fails"), (58.0, "undecided"), (80.0, "conforms")):
         values = {**slab, "room": {"required": required, "required_rating": "thirds"}}
         assert answer_case(new_case(values))["headline"]["result"] == result
+    # A source that does not conform, and another rating than that of the standard headline.
+    values = {**slab, "model": {"name": "hollow_sphere"}, "room": {"required": 49.0}}
+    headline = answer_case(new_case(values))["headline"]
+    assert headline["result"] == "undecided"
+    assert headline["detail"].startswith(f"L_iA,Fmax of octaves (KS F 2863-2): {headline['text']}")
 
 
 def test_every_criterion_names_standard_and_limits_and_explains_itself() -> None:

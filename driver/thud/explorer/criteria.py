@@ -87,15 +87,18 @@ def source_headline(verdict: Verdict, model: ModelVerdict | None) -> dict[str, s
 
 
 def room_headline(prediction: RoomPrediction) -> dict[str, str]:
-    """Return text, result and detail of the level in a room."""
+    """Return text, result and detail of the level in a room; with a requirement, of its rating."""
     required = prediction.requirement
-    parts = [f"{prediction.rated_name}{prediction.standards[0]} with its range"]
+    name = f"{prediction.rated_name}{prediction.standards[0]}"
+    if required:
+        # A source that does not conform is named after the verdict.
+        result = RESULTS[required.verdict.partition(":")[0]]
+        text, parts = required.shown, [str(required), f"{name} {prediction.rated_text}"]
+    else:
+        result, text, parts = "level", prediction.rated_text, [f"{name} with its range"]
     if prediction.class_text:
         parts.append(f"KS F 2863-2: {prediction.class_text}")
-    if required:
-        parts.append(str(required))
-    result = RESULTS[required.verdict] if required else "level"
-    return {"text": prediction.rated_text, "result": result, "detail": "; ".join(parts)}
+    return {"text": text, "result": result, "detail": "; ".join(parts)}
 
 
 def _listed(causes: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ module thud_plate_stack
    real(wp), parameter :: beam_ratio = 1.2_wp
 
    !> Number of sines per rib, and in all, that resolve the curvature at ribs by themselves.
-   integer, parameter :: min_sines(2) = [5, 50]
+   integer, parameter :: min_sines(2) = [8, 50]
 
    !> Springs along an edge of a plate.
    type :: edge_type
