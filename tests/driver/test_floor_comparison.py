@@ -277,7 +277,7 @@ def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> Non
 def test_page_of_rooms_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
     page = REPOSITORY.joinpath("docs/rooms.md").read_text(encoding="utf-8")
     shown = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", page, re.DOTALL)
-    assert len(shown) == 4
+    assert len(shown) == 5
     with contextlib.chdir(REPOSITORY):
         for code, output in shown:
             exec(code, {})  # noqa: S102 - the page's own

@@ -691,7 +691,7 @@ def test_bands_beyond_the_modes_are_those_of_the_simply_supported_floor(
     room = thud.Room(volume=50.0)
     simple = thud.predict_level(shell, floor, room)
     clamped = thud.predict_level(shell, replace(floor, support="clamped"), room)
-    assert clamped.level[-4:] == pytest.approx(simple.level[-4:], abs=1.0)
+    assert clamped.level[-4:] == pytest.approx(simple.level[-4:], abs=2.0)
     assert (simple.n_modal, clamped.n_modal) == (7, 7)
     assert abs(clamped.level[0] - simple.level[0]) > 1
 
