@@ -133,8 +133,8 @@ module thud_room
       !> modes. From band `n_modal` + 1 on, they are statistical.
       integer :: n_modal = 0
       real(wp), allocatable :: modal_level(:), modal_spread(:)
-      !> Frequency at which three modes of the room overlap, Hz, and number of bands below it that have no modal level because
-      !> it would take too long.
+      !> Frequency at which three modes of the room overlap, Hz, and number of bands below it that have no modal level
+      !> because it would take too long.
       real(wp) :: crossover = 0.0_wp
       integer :: n_left_out = 0
       !> Standard deviation of the mean over positions, dB: [n_band].
@@ -451,8 +451,9 @@ contains
 
    !> Energies of a band: floor, walls, room, ceiling cavity and the floor beyond the room, with the flows between them.
    !>
-   !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room, and to the other side by the factor there.
-   !> The room loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a bare one.
+   !> A plate loses omega eta in total; it radiates rho0 c0 sigma/m'' into the room, and to the other side by the factor
+   !> there. The room loses 6 ln 10/T, which contains the flow back into the plates in a finished room and excludes it in a
+   !> bare one.
    !>
    !> Energy flows from the floor above the room to the floor beyond it at the rate that gives, with the losses of both and a
    !> steady force, their energies by the modes.

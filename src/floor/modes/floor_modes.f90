@@ -234,7 +234,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: value(:, :), gain(:)
       logical, allocatable :: individual(:)
-      real(wp) :: compliance, lacking(2), corner
+      real(wp) :: compliance, corner
+      real(wp) :: lacking(2)
       logical :: has_all
 
       ! Sums of functions are stopped at a frequency, or have the compliance of all their modes.

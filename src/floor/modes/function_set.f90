@@ -33,8 +33,8 @@ module thud_function_set
       !> Nodes of splines, m: [count], and second derivatives there of the splines that are 1 at one node, 1/m2:
       !> [count, count].
       real(wp), allocatable :: node(:), curvature(:, :)
-      !> Wavenumber up to which polynomials that are modes of a beam are complete, and up to which they resolve the moments of
-      !> ribs, 1/m.
+      !> Wavenumber up to which polynomials that are modes of a beam are complete, and up to which they resolve the moments
+      !> of ribs, 1/m.
       real(wp) :: complete = 0.0_wp, finest = 0.0_wp
    end type function_set_type
 

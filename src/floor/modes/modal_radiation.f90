@@ -4,8 +4,8 @@
 !> the wavenumbers below that of sound, k0 (Williams, *Fourier Acoustics*). It contains the cross terms of all modes.
 !>
 !> The mean over all strike points of an area is exact: with the velocities r of the modes per unit of their force, and G the
-!> means of the products of their shapes at the strike points, the power is the double sum of r_k conj(r_l) G_kl R_kl, where R
-!> holds the powers of pairs of modes.
+!> means of the products of their shapes at the strike points, the power is the double sum of r_k conj(r_l) G_kl R_kl, where
+!> R holds the powers of pairs of modes.
 module thud_modal_radiation
    use thud_band, only: band_type
    use thud_constants, only: pi
@@ -76,8 +76,8 @@ module thud_modal_radiation
       type(overlap_type) :: struck, bearing
    end type part_type
 
-   !> Integrals over angular frequencies: radiated power over rho0 c0, squared velocity times area of the bearing plate and of
-   !> its part above the room, m4/s2 rad/s, and 1, rad/s.
+   !> Integrals over angular frequencies: radiated power over rho0 c0, squared velocity times area of the bearing plate and
+   !> of its part above the room, m4/s2 rad/s, and 1, rad/s.
    type :: sums_type
       real(wp) :: power = 0.0_wp, velocity = 0.0_wp, above = 0.0_wp, width = 0.0_wp
    end type sums_type
@@ -185,8 +185,8 @@ contains
          if (present(stated_strike)) then
             call get_mode_values(modes%modes, 1, modes%stack%length*stated_strike(1, :), &
                modes%stack%width*stated_strike(2, :), drive, kept)
-            call add_strikes(radiator, get_shapes(modes, modes%stack%bearing, kept), part, pole, mixing, drive, air, bands(i), &
-               get_some(along, radiator%x), get_some(across, radiator%y), sums)
+            call add_strikes(radiator, get_shapes(modes, modes%stack%bearing, kept), part, pole, mixing, drive, air, &
+               bands(i), get_some(along, radiator%x), get_some(across, radiator%y), sums)
          else
             call add_modes(get_coupled_modes(modes, part, radiator, kept, mixing), pole, air, bands(i), &
                get_some(along, radiator%x), get_some(across, radiator%y), sums)
@@ -328,8 +328,8 @@ contains
       end associate
    end function are_orthogonal
 
-   !> Number of the set of each block: blocks with functions that are not orthogonal belong to one. Over the whole floor, each
-   !> block has its own: [n_block].
+   !> Number of the set of each block: blocks with functions that are not orthogonal belong to one. Over the whole floor,
+   !> each block has its own: [n_block].
    pure function get_sets(shapes, overlap) result(set)
       type(shapes_type), intent(in) :: shapes
       !> Integrals of products of all functions over the strike points.

@@ -69,7 +69,8 @@ contains
       !> Removes the term of a pair.
       subroutine rotate(i, j)
          integer, intent(in) :: i, j
-         complex(wp) :: ratio, root, tangent, cosine, column(size(matrix, 1))
+         complex(wp) :: ratio, root, tangent, cosine
+         complex(wp) :: column(size(matrix, 1))
 
          ratio = (matrix(j, j) - matrix(i, i))/(2*matrix(i, j))
          if (abs(ratio**2 + 1) < smallest_root) then

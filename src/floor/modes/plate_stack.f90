@@ -239,8 +239,8 @@ contains
       end do
    end function get_counts
 
-   !> Positions of ribs across a direction that resist rotation, m: [n_rib]. There are none if the plate yields in shear, or if
-   !> sines are much shorter than the distance of the ribs.
+   !> Positions of ribs across a direction that resist rotation, m: [n_rib]. There are none if the plate yields in shear, or
+   !> if sines are much shorter than the distance of the ribs.
    pure function get_twisting_ribs(plate, direction, n) result(position)
       type(orthotropic_type), intent(in) :: plate
       !> 1: along the length, 2: along the width.

@@ -111,7 +111,8 @@ contains
       type(function_set_type) :: deflection(2), rotation(2)
       real(wp), allocatable :: lines(:), twisting(:)
       real(wp) :: sides(2)
-      integer :: n(2), degree(2), n_rib
+      integer :: n_rib
+      integer :: n(2), degree(2)
       logical :: is_thin
       integer :: i
 
@@ -185,7 +186,8 @@ contains
       allocate (omega(0))
       do i = 1, size(modes%block)
          associate (block => modes%block(i))
-            shape(block%shape(1)%x, size(omega) + 1:size(omega) + size(block%omega)) = sqrt(bending)*block%shape(1)%coefficient
+            shape(block%shape(1)%x, size(omega) + 1:size(omega) + size(block%omega)) = sqrt(bending) &
+               *block%shape(1)%coefficient
             omega = [omega, block%omega]
          end associate
       end do
@@ -199,7 +201,7 @@ contains
       set%finest = set%complete
       if (size(rib) > 0) set%finest = set%complete + rib_half_waves*pi/set%length
       chosen = pack([(i, i=1, set%count)], kept)
-      added = reshape([real(wp) ::], [set%count, 0])
+      allocate (added(set%count, 0))
       do order = 0, 1
          call add_deflections(get_functions(set, [0.0_wp, set%length], order), order)
       end do

@@ -28,7 +28,8 @@ module thud_truncated_compliance
 contains
 
    !> The compliance at a point, and the part of it by moments of ribs, m/N: [2]. Longer waves have this part, which no short
-   !> wave carries away. With ribs in both directions, those in the other one of a pair only stiffen: it is the lesser of both.
+   !> wave carries away. With ribs in both directions, those in the other one of a pair only stiffen: it is the lesser of
+   !> both.
    function get_truncated_compliance(plate, wavenumber, finest, x, y) result(compliance)
       !> A plate that is rigid in shear.
       type(orthotropic_type), intent(in) :: plate
@@ -39,11 +40,11 @@ contains
       !> The point, m.
       real(wp), intent(in) :: x, y
       real(wp) :: compliance(2), one(2)
+      real(wp) :: no_position(0)
       integer :: i
 
       if (.not. allocated(plate%ribs)) then
-         compliance = get_compliance(new_strip(plate, .false.), wavenumber, 1.0_wp, &
-            ribs_type(position=[real(wp) ::]), y)
+         compliance = get_compliance(new_strip(plate, .false.), wavenumber, 1.0_wp, ribs_type(position=no_position), y)
          return
       end if
       compliance = huge(compliance)
@@ -123,7 +124,8 @@ contains
       real(wp), intent(in) :: distance(:, :)
       !> Forces, the unit force first: [1 + n_rib]; moments, m: [n_rib].
       real(wp), allocatable, intent(out) :: load(:), moment(:)
-      real(wp) :: matrix(2*size(distance, 1) - 2, 2*size(distance, 1) - 2), reaction(2*size(distance, 1) - 2, 1), beam
+      real(wp) :: matrix(2*size(distance, 1) - 2, 2*size(distance, 1) - 2), reaction(2*size(distance, 1) - 2, 1)
+      real(wp) :: beam
       integer :: i, n, info
 
       n = size(distance, 1) - 1

@@ -125,7 +125,8 @@ contains
       text = text//newline//'  Means of both predictions, with their intervals:'//newline
       do i = 1, size(rating_names)
          associate (rated => get_rated(prediction, rating_names(i)))
-            text = text//'  '//rating_titles(i)//to_text(get_rounded(rated(1)))//' dB ('//get_range_text(rated(2:))//')'//newline
+            text = text//'  '//rating_titles(i)//to_text(get_rounded(rated(1)))//' dB (' &
+               //get_range_text(rated(2:))//')'//newline
             if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, rated(1))
          end associate
       end do
