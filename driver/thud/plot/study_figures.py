@@ -360,6 +360,11 @@ def draw_design(result: Design) -> Figure:
     return figure
 
 
+def _with_symbol(title: str) -> str:
+    """Return the title of a rating with its symbol as mathematics."""
+    return title.replace("L_iA,Fmax", RATING_SYMBOL)
+
+
 def _draw_rating(
     figure: Figure,
     axes: Axes,
@@ -373,7 +378,7 @@ def _draw_rating(
     filled = axes.contourf(*position, rating, levels=fine, cmap="cividis_r")
     inside = steps[(steps > rating.min()) & (steps < rating.max())]
     bar = figure.colorbar(
-        filled, ax=axes, ticks=steps, label=f"{title},\nstatistical, dB re 20 µPa"
+        filled, ax=axes, ticks=steps, label=f"{_with_symbol(title)},\nstatistical, dB re 20 µPa"
     )
     if inside.size:
         lines = axes.contour(*position, rating, inside, colors="black", linewidths=0.5)
@@ -431,7 +436,7 @@ def _draw_design_curve(result: Design) -> Figure:
             for title, limit in _rating_limits(result)
             if float(rating.min()) - 1 < limit < float(rating.max()) + 1
         ]
-        axes.set_ylabel(f"{RATINGS[result.rating_name]},\nstatistical, dB re 20 µPa")
+        axes.set_ylabel(f"{_with_symbol(RATINGS[result.rating_name])},\nstatistical, dB re 20 µPa")
     axes.plot(x, values.values, **line_style(0), **marker_style(0, 3))
     for i, (title, limit) in enumerate(limits):
         axes.axhline(limit, color=COLORS[1], linewidth=1.4, linestyle=LINES[i], label=title)

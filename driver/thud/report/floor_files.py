@@ -37,7 +37,7 @@ def screen_text(floor: PredictedFloor) -> str:
         floor.name,
         f"  {', '.join([f'{prediction.rated_name} {prediction.rated_text}', *notes])}",
         *(f"    {text:>6}  {title}" for title, _, _, text in others),
-        f"  Statistical, of octaves{korean and f', {korean}'}: {octaves}",
+        f"  Of octaves{korean and f', {korean}'}: {octaves}",
         *([f"  {required}"] if required else []),
         *([f"  A-weighted energy by path: {floor.path_shares}"] if len(floor.paths) > 1 else []),
         "  Contributions to the interval, dB:",

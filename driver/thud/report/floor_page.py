@@ -194,7 +194,7 @@ def _box(floor: PredictedFloor) -> list[str]:
     (_, standard, _, _), *_, (_, korean, _, octaves) = floor.ratings
     lines = [
         f"{prediction.rated_name} in the room below, 50 to 630 Hz{standard and f' ({standard})'}",
-        f"statistical, of octaves{korean and f' ({korean})'}: {octaves}",
+        f"of octaves{korean and f' ({korean})'}: {octaves}",
     ]
     required = prediction.requirement
     if prediction.source_note:
