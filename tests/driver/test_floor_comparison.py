@@ -278,9 +278,10 @@ def test_page_of_rooms_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) 
     page = REPOSITORY.joinpath("docs/rooms.md").read_text(encoding="utf-8")
     shown = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", page, re.DOTALL)
     assert len(shown) == 5
+    names: dict[str, object] = {}
     with contextlib.chdir(REPOSITORY):
         for code, output in shown:
-            exec(code, {})  # noqa: S102 - the page's own
+            exec(code, names)  # noqa: S102 - the page's own
             assert capsys.readouterr().out == output
 
 
