@@ -24,8 +24,8 @@ from thud.level.rating import (
     Rating,
     Requirement,
     class_range,
+    range_text,
     rating,
-    rounded,
     standardized_level,
 )
 
@@ -125,8 +125,7 @@ class RoomPrediction(RoomLevel, Displayed):
         return self._text_of("standardized")
 
     def _text_of(self, name: RoomRequiredRating) -> str:
-        low, high = map(rounded, self.interval_of(name))
-        return f"{rounded(self.rated_of(name))} dB ({low} to {high})"
+        return range_text(self.rated_of(name), self.interval_of(name))
 
     @property
     def class_text(self) -> str:

@@ -117,8 +117,7 @@ class Requirement:
     @property
     def shown(self) -> str:
         """Rating with its interval, such as ``"49 dB (46 to 51)"``."""
-        low, high = map(rounded, self.interval)
-        return f"{rounded(self.level)} dB ({low} to {high})"
+        return range_text(self.level, self.interval)
 
     def __str__(self) -> str:
         """Return rating, requirement and verdict in words."""
@@ -128,6 +127,12 @@ class Requirement:
             f"{title}: {self.shown}, "
             f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.verdict}"
         )
+
+
+def range_text(level: float, interval: tuple[float, float]) -> str:
+    """Return a level with its interval, rounded, such as ``"49 dB (46 to 51)"``."""
+    low, high = map(rounded, interval)
+    return f"{rounded(level)} dB ({low} to {high})"
 
 
 def rounded(level: float) -> int:
