@@ -47,7 +47,7 @@ FLOORS += [hung(d, e) for d in (0.1, 0.2) for e in (0.1, 0.3)]
 
 
 def radiated_power(plates: LossyPlates) -> np.ndarray:
-    """Return powers per mean-square force in one-third octaves, a mean over all strikes, m/(N s)."""
+    """Return powers per mean-square force in one-third octaves, means over all strikes, m/(N s)."""
     length, width = plates.sides
     shapes = SupportedPlate(length, width).shapes(HALF_WAVES, *grid_centers(length, width, 0.1))
     parts = (np.arange(6) + 0.5) / 6
