@@ -247,7 +247,7 @@ contains
       type(shapes_type) :: shapes
       integer :: range(2, size(modes%modes%block))
       integer, allocatable :: position_x(:), position_y(:)
-      integer :: i, k, n
+      integer :: i, n
 
       range = get_ranges(modes%modes, kept)
       associate (displacement => modes%modes%displacement(plate))
@@ -260,10 +260,8 @@ contains
             position_y(shape%y) = 1
          end associate
       end do
-      shapes%x = pack([(k, k=1, size(position_x))], position_x == 1)
-      shapes%y = pack([(k, k=1, size(position_y))], position_y == 1)
-      position_x(shapes%x) = [(k, k=1, size(shapes%x))]
-      position_y(shapes%y) = [(k, k=1, size(shapes%y))]
+      call number_marked(position_x, shapes%x)
+      call number_marked(position_y, shapes%y)
       allocate (shapes%block(count(range(2, :) > 0)))
       n = 0
       do i = 1, size(range, 2)
@@ -275,6 +273,18 @@ contains
          end associate
       end do
    end function get_shapes
+
+   !> Numbers of marked functions, and the position of each among them in place of its mark.
+   pure subroutine number_marked(position, number)
+      !> 1 for a marked function, else 0; then the positions: [n_function].
+      integer, intent(inout) :: position(:)
+      !> The numbers: [n_marked].
+      integer, allocatable, intent(out) :: number(:)
+      integer :: k
+
+      number = pack([(k, k=1, size(position))], position == 1)
+      position(number) = [(k, k=1, size(number))]
+   end subroutine number_marked
 
    !> Modes that take part, in sets whose shapes have products with a mean at the strike points.
    function get_coupled_modes(modes, part, radiator, kept, mixing) result(coupled)
@@ -392,10 +402,8 @@ contains
             n = n + size(block%coefficient, 2)
          end associate
       end do
-      merged%x = pack([(k, k=1, size(at_x))], at_x == 1)
-      merged%y = pack([(k, k=1, size(at_y))], at_y == 1)
-      at_x(merged%x) = [(k, k=1, size(merged%x))]
-      at_y(merged%y) = [(k, k=1, size(merged%y))]
+      call number_marked(at_x, merged%x)
+      call number_marked(at_y, merged%y)
       allocate (merged%coefficient(size(merged%x)*size(merged%y), n), source=0.0_wp)
       n = 0
       do i = 1, size(members)
