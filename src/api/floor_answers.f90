@@ -147,7 +147,7 @@ contains
          if (size(stated_microphone) > 0) microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
       end associate
       call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), ball, microphone, &
-         request%get_number('pressure') > 0.0_wp, room, get_highest(request, box))
+         request%get_number('pressure') > 0.0_wp, .true., room, get_highest(request, box))
       call bundle%add_array('sides', [3], box%sides)
       call bundle%add_array('ball', shape(ball), ball)
       call bundle%add_array('microphone', shape(microphone), microphone)

@@ -196,7 +196,7 @@ contains
       allocate (prediction%modal_spread, source=prediction%spread)
       allocate (prediction%mean_spread, source=prediction%spread/sqrt(real(size(ball, 2), wp)))
       if (floor%has_room_modes()) then
-         call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., modal)
+         call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., .false., modal)
          prediction%n_modal = modal%n_band
          prediction%n_left_out = modal%n_left_out
          prediction%crossover = get_crossover(box)
@@ -210,7 +210,7 @@ contains
          if (floor%get_support() == supports(i)) cycle
          call floor%get_room_modes(supports(i), other_plate, other_modes, error, get_highest_frequency(box))
          if (allocated(error)) return
-         call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., modal)
+         call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., .false., modal)
          prediction%edge_level(:modal%n_band, i) = modal%mean + change(:modal%n_band)
       end do
    end subroutine add_modal_levels

@@ -82,8 +82,8 @@ module thud_modal_room
    type :: group_type
       !> Numbers of the pairs and of the modes: [n_pair], [n_mode].
       integer, allocatable :: pair(:), mode(:)
-      !> Their coupling, m2/sqrt(kg): [n_pair, n_mode].
-      real(wp), allocatable :: coupling(:, :)
+      !> Their coupling, m2/sqrt(kg): [n_mode, n_pair].
+      complex(wp), allocatable :: coupling(:, :)
    end type group_type
 
    !> Answers of the room to the volume flow into a pair of half waves along length and width, at some frequencies.
@@ -134,7 +134,8 @@ contains
    end subroutine get_standard_positions
 
    !> Levels at positions for a force on the floor.
-   subroutine get_modal_room(modes, box, force, sample_rate, ball, microphone, with_pressure, room, max_frequency)
+   subroutine get_modal_room(modes, box, force, sample_rate, ball, microphone, with_pressure, with_energies, room, &
+      max_frequency)
       type(floor_modes_type), intent(in) :: modes
       type(box_type), intent(in) :: box
       !> Force on the floor, N: [n_force], and samples per second, Hz.
@@ -142,8 +143,8 @@ contains
       real(wp), intent(in) :: sample_rate
       !> Positions of the ball on the floor and of the microphone, from the corner of the room, m: [2, n_ball], [3, n_mic].
       real(wp), intent(in) :: ball(:, :), microphone(:, :)
-      !> Also return the sound pressure.
-      logical, intent(in) :: with_pressure
+      !> Also return the sound pressure, and the energies.
+      logical, intent(in) :: with_pressure, with_energies
       type(modal_room_type), intent(out) :: room
       !> Highest mid frequency of a band, Hz (default: the crossover).
       real(wp), intent(in), optional :: max_frequency
@@ -181,7 +182,7 @@ contains
       allocate (room%level(room%n_band, size(microphone, 2), size(ball, 2)))
       allocate (room%mean(room%n_band), room%spread(room%n_band), room%mean_spread(room%n_band))
       allocate (room%floor_input(size(ball, 2)), room%floor_loss(size(ball, 2)), room%room_input(size(ball, 2)), &
-         room%room_loss(size(ball, 2)))
+         room%room_loss(size(ball, 2)), source=0.0_wp)
       if (room%n_band == 0) return
       n_sample = 128*ceiling(sample_ratio*highest*duration/128)
       room%sample_rate = n_sample/duration
@@ -191,8 +192,8 @@ contains
       call get_coupling(modes, box, kept, lx, ly, coupling)
       call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive, kept)
       room%floor_modes = size(pole)
-      call get_sound(pole, get_mixing(modes%modes, kept), drive, get_groups(lx, ly, coupling), frequency, spectrum, box, &
-         lx, ly, highest, microphone, sound, room)
+      call get_sound(pole, get_mixing(modes%modes, kept), drive, coupling, frequency, spectrum, box, lx, ly, highest, &
+         microphone, with_energies, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
       if (with_pressure) then
          allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
@@ -221,28 +222,30 @@ contains
    pure function get_groups(lx, ly, coupling) result(group)
       !> Half waves along length and width: [n_pair].
       integer, intent(in) :: lx(:), ly(:)
-      !> Coupling of pairs and modes, m2/sqrt(kg): [n_pair, n_mode].
-      real(wp), intent(in) :: coupling(:, :)
+      !> Coupling of modes and pairs, m2/sqrt(kg): [n_mode, n_pair].
+      complex(wp), intent(in) :: coupling(:, :)
       type(group_type) :: group(4)
       integer :: i, k
 
       do i = 1, 4
          group(i)%pair = pack([(k, k=1, size(lx))], 2*mod(lx, 2) + mod(ly, 2) == i - 1)
-         group(i)%mode = pack([(k, k=1, size(coupling, 2))], &
-            maxval(abs(coupling(group(i)%pair, :)), dim=1) > 1.0e-12_wp*maxval(abs(coupling)))
-         group(i)%coupling = coupling(group(i)%pair, group(i)%mode)
+         group(i)%mode = pack([(k, k=1, size(coupling, 1))], &
+            maxval(abs(coupling(:, group(i)%pair)), dim=2) > 1.0e-12_wp*maxval(abs(coupling)))
+         group(i)%coupling = coupling(group(i)%mode, group(i)%pair)
       end do
    end function get_groups
 
    !> Spectra of the sound at the microphones, and energies of floor and room (Parseval).
-   subroutine get_sound(pole, mixing, drive, groups, frequency, spectrum, box, lx, ly, highest, microphone, sound, room)
+   subroutine get_sound(pole, mixing, drive, coupling, frequency, spectrum, box, lx, ly, highest, microphone, with_energies, &
+      sound, room)
       !> Squared angular frequencies of the floor's modes with their losses, rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
       !> Their sums of the modes without losses.
       type(mixing_type), intent(in) :: mixing
       !> Shapes of the modes without losses at the balls, 1/sqrt(kg): [n_mode, n_ball].
       real(wp), intent(in) :: drive(:, :)
-      type(group_type), intent(in) :: groups(:)
+      !> Coupling of the pairs of half waves and these modes, m2/sqrt(kg): [n_pair, n_mode].
+      real(wp), intent(in) :: coupling(:, :)
       !> Frequencies in equal steps, Hz, and Fourier transform of the force, N s: [n_line].
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: spectrum(:)
@@ -253,84 +256,158 @@ contains
       real(wp), intent(in) :: highest
       !> Positions of the microphones, m: [3, n_microphone].
       real(wp), intent(in) :: microphone(:, :)
+      !> Also compute the energies.
+      logical, intent(in) :: with_energies
       !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
       complex(wp), allocatable, intent(out) :: sound(:, :, :)
       type(modal_room_type), intent(inout) :: room
-      complex(wp), dimension(size(pole), size(drive, 2)) :: gain, stressed, velocity
-      complex(wp), dimension(size(pole)) :: input, response
-      real(wp), dimension(size(pole)) :: decay, loss, square
-      ! Real parts, then imaginary parts, for each ball or microphone.
-      real(wp) :: flow(size(lx), 2*size(drive, 2))
-      real(wp), allocatable :: amplitude(:, :), pressure(:, :)
+      complex(wp) :: gain(size(pole), size(drive, 2))
+      complex(wp), allocatable :: response(:, :)
+      ! For each frequency real parts, then imaginary parts, for each ball or microphone.
+      real(wp), allocatable :: flow(:, :), pressure(:, :)
+      type(group_type) :: group(4)
       type(answers_type) :: answers
-      integer :: i, j, k, n_ball, n_microphone, line
+      integer :: before, i, k, n, n_ball, n_microphone
 
       n_ball = size(drive, 2)
       n_microphone = size(microphone, 2)
       allocate (sound(size(frequency), n_microphone, n_ball))
-      room%floor_loss = 0.0_wp
-      room%room_input = 0.0_wp
-      room%room_loss = 0.0_wp
-      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
       gain = get_unmixed(mixing, cmplx(drive, kind=wp))
-      input = 0.0_wp
-      square = 0.0_wp
+      group = get_groups(lx, ly, get_unmixed(mixing, cmplx(transpose(coupling), kind=wp)))
+      do before = 0, size(frequency) - 1, chunk_size
+         n = min(chunk_size, size(frequency) - before)
+         associate (lines => frequency(before + 1:before + n), force => spectrum(before + 1:before + n))
+            call get_answers(box, lx, ly, highest, lines, microphone, answers)
+            response = get_responses(pole, .not. is_identity(mixing), lines, force)
+            allocate (flow(size(lx), 2*n_ball*n))
+            do k = 1, size(group)
+               flow(group(k)%pair, :) = get_flow(group(k), gain, response)
+            end do
+            do i = 1, n
+               associate (here => flow(:, 2*n_ball*(i - 1) + 1:2*n_ball*i))
+                  pressure = get_transposed_product(answers%pressure(:, :, i), here)
+                  sound(before + i, :, :) = cmplx( &
+                     pressure(:n_microphone, :n_ball) - pressure(n_microphone + 1:, n_ball + 1:), &
+                     pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
+                  if (.not. with_energies) cycle
+                  associate (energy => 2*frequency(1)*(here(:, :n_ball)**2 + here(:, n_ball + 1:)**2))
+                     room%room_input = room%room_input + matmul(answers%input(:, i), energy)
+                     room%room_loss = room%room_loss + matmul(answers%loss(:, i), energy)
+                  end associate
+               end associate
+            end do
+            if (with_energies) call add_floor_energies(pole, mixing, gain, lines, frequency(1), force, response, room)
+            deallocate (flow)
+         end associate
+      end do
+      room%room_modes = answers%n_mode
+   end subroutine get_sound
+
+   !> Velocities of modes per unit of their shape under the force, m s/(s sqrt(kg)): [n_mode, n_line].
+   pure function get_responses(pole, are_mixed, frequency, force) result(response)
+      !> Squared angular frequencies of the modes with their losses, rad2/s2: [n_mode].
+      complex(wp), intent(in) :: pole(:)
+      !> Whether losses mix the modes.
+      logical, intent(in) :: are_mixed
+      !> Frequencies, Hz, and spectrum of the force there, N s: [n_line].
+      real(wp), intent(in) :: frequency(:)
+      complex(wp), intent(in) :: force(:)
+      complex(wp) :: response(size(pole), size(frequency))
+      real(wp), dimension(size(pole)) :: decay, difference, loss
+      integer :: i
+
+      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
       do i = 1, size(frequency)
-         line = 1 + mod(i - 1, chunk_size)
-         if (line == 1) call get_answers(box, lx, ly, highest, frequency(i:min(i + chunk_size - 1, size(frequency))), &
-            microphone, answers)
          associate (w => 2*pi*frequency(i))
             ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes
             ! them.
-            loss = pole%im
-            if (is_identity(mixing)) loss = w*decay
-            response = spectrum(i)*cmplx(0.0_wp, w, wp)/cmplx(pole%re - w**2, loss, wp)
-            do j = 1, n_ball
-               velocity(:, j) = gain(:, j)*response
-            end do
-            input = input + conjg(spectrum(i))*response
-            if (is_identity(mixing)) then
-               square = square + response%re**2 + response%im**2
-            else
-               ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
-               do j = 1, n_ball
-                  stressed(:, j) = pole*velocity(:, j)
-               end do
-               velocity = get_mixed(mixing, velocity)
-               stressed = get_mixed(mixing, stressed)
-               do j = 1, n_ball
-                  room%floor_loss(j) = room%floor_loss(j) + aimag(dot_product(velocity(:, j), stressed(:, j)))/w
-               end do
-            end if
+            loss = merge(pole%im, w*decay, are_mixed)
+            difference = pole%re - w**2
+            response(:, i) = force(i)*cmplx(0.0_wp, w, wp)*cmplx(difference, -loss, wp)/(difference**2 + loss**2)
          end associate
-         ! Volume flow into the shapes of the room, m3/s per Hz.
-         do k = 1, size(groups)
-            associate (group => groups(k))
-               allocate (amplitude(size(group%mode), 2*n_ball))
-               do j = 1, n_ball
-                  amplitude(:, j) = velocity(group%mode, j)%re
-                  amplitude(:, n_ball + j) = velocity(group%mode, j)%im
-               end do
-               flow(group%pair, :) = get_product(group%coupling, amplitude)
-               deallocate (amplitude)
-            end associate
-         end do
-         associate (energy => flow(:, :n_ball)**2 + flow(:, n_ball + 1:)**2)
-            room%room_input = room%room_input + matmul(answers%input(:, line), energy)
-            room%room_loss = room%room_loss + matmul(answers%loss(:, line), energy)
-         end associate
-         pressure = get_transposed_product(answers%pressure(:, :, line), flow)
-         sound(i, :, :) = cmplx(pressure(:n_microphone, :n_ball) - pressure(n_microphone + 1:, n_ball + 1:), &
-            pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
       end do
-      room%room_modes = answers%n_mode
-      associate (step => frequency(1))
-         room%floor_input = 2*step*real(matmul(input, gain**2), wp)
-         room%floor_loss = 2*step*(room%floor_loss + matmul(decay*square, drive**2))
-         room%room_input = 2*step*room%room_input
-         room%room_loss = 2*step*room%room_loss
-      end associate
-   end subroutine get_sound
+   end function get_responses
+
+   !> Volume flow into the pairs of half waves of a group, m3/s per Hz, for each frequency real parts, then imaginary parts,
+   !> for each ball: [n_pair, 2*n_ball*n_line].
+   pure function get_flow(group, gain, response) result(flow)
+      type(group_type), intent(in) :: group
+      !> Shapes of the modes at the balls: [n_mode, n_ball]; their velocities per unit of it: [n_mode, n_line].
+      complex(wp), intent(in) :: gain(:, :), response(:, :)
+      real(wp), allocatable :: flow(:, :)
+      complex(wp) :: velocity(size(group%mode)), here(size(group%mode), size(gain, 2))
+      real(wp), allocatable :: part(:, :, :, :)
+      integer :: i, j, n
+      logical :: is_real
+
+      n = size(group%mode)
+      here = gain(group%mode, :)
+      is_real = all(abs(aimag(group%coupling)) <= 0.0_wp)
+      allocate (part(n, size(gain, 2), 2, size(response, 2)))
+      do i = 1, size(response, 2)
+         do j = 1, size(gain, 2)
+            velocity = here(:, j)*response(group%mode, i)
+            part(:, j, 1, i) = velocity%re
+            part(:, j, 2, i) = velocity%im
+         end do
+      end do
+      flow = get_product_of(real(group%coupling, wp))
+      if (is_real) return
+      ! i*velocity has the parts (-im, re).
+      do i = 1, size(response, 2)
+         associate (re => part(:, :, 1, i), im => part(:, :, 2, i))
+            part(:, :, :, i) = reshape([-im, re], [n, size(gain, 2), 2])
+         end associate
+      end do
+      flow = flow + get_product_of(aimag(group%coupling))
+   contains
+
+      !> The transpose of a matrix times the parts.
+      pure function get_product_of(matrix) result(product)
+         real(wp), intent(in) :: matrix(:, :)
+         real(wp), allocatable :: product(:, :)
+
+         product = get_transposed_product(matrix, reshape(part, [n, size(part)/max(n, 1)]))
+      end function get_product_of
+   end function get_flow
+
+   !> Adds the energies into the floor and lost by it, J.
+   subroutine add_floor_energies(pole, mixing, gain, frequency, step, force, response, room)
+      complex(wp), intent(in) :: pole(:)
+      type(mixing_type), intent(in) :: mixing
+      !> Shapes of the modes at the balls: [n_mode, n_ball].
+      complex(wp), intent(in) :: gain(:, :)
+      !> Frequencies and their step, Hz, and spectrum of the force there, N s: [n_line].
+      real(wp), intent(in) :: frequency(:)
+      real(wp), intent(in) :: step
+      complex(wp), intent(in) :: force(:)
+      !> Velocities of the modes per unit of `gain`: [n_mode, n_line].
+      complex(wp), intent(in) :: response(:, :)
+      type(modal_room_type), intent(inout) :: room
+      complex(wp), dimension(size(pole), size(gain, 2)) :: stressed, velocity
+      integer :: i, j
+
+      room%floor_input = room%floor_input + 2*step*real(matmul(matmul(response, conjg(force)), gain**2), wp)
+      if (is_identity(mixing)) then
+         associate (decay => pole%im/sqrt(max(pole%re, tiny(1.0_wp))))
+            room%floor_loss = room%floor_loss + 2*step*matmul(decay*sum(response%re**2 + response%im**2, dim=2), gain%re**2)
+         end associate
+         return
+      end if
+      ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
+      do i = 1, size(frequency)
+         do j = 1, size(gain, 2)
+            velocity(:, j) = gain(:, j)*response(:, i)
+            stressed(:, j) = pole*velocity(:, j)
+         end do
+         velocity = get_mixed(mixing, velocity)
+         stressed = get_mixed(mixing, stressed)
+         do j = 1, size(gain, 2)
+            room%floor_loss(j) = room%floor_loss(j) &
+               + 2*step*aimag(dot_product(velocity(:, j), stressed(:, j)))/(2*pi*frequency(i))
+         end do
+      end do
+   end subroutine add_floor_energies
 
    !> Mean-square deviation from the mean.
    pure function get_variance(values) result(variance)

@@ -189,15 +189,18 @@ contains
       type(mixing_type), intent(in) :: mixing
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: mixed(size(values, 1), size(values, 2))
-      integer :: i, j, k
+      ! Columns together, for contiguous sums.
+      complex(wp), dimension(size(values, 2), size(values, 1)) :: row
+      complex(wp) :: total(size(values, 2))
+      integer :: i, k
 
-      do j = 1, size(values, 2)
-         do i = 1, size(values, 1)
-            mixed(i, j) = 0.0_wp
-            do k = mixing%first(i), mixing%first(i + 1) - 1
-               mixed(i, j) = mixed(i, j) + mixing%weight(k)*values(mixing%column(k), j)
-            end do
+      row = transpose(values)
+      do i = 1, size(values, 1)
+         total = 0.0_wp
+         do k = mixing%first(i), mixing%first(i + 1) - 1
+            total = total + mixing%weight(k)*row(:, mixing%column(k))
          end do
+         mixed(i, :) = total
       end do
    end function get_mixed
 
