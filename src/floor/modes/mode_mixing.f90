@@ -209,16 +209,18 @@ contains
       type(mixing_type), intent(in) :: mixing
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: unmixed(size(values, 1), size(values, 2))
-      integer :: i, j, k
+      ! Columns together, for contiguous sums.
+      complex(wp), dimension(size(values, 2), size(values, 1)) :: row, total
+      integer :: i, k
 
-      unmixed = 0.0_wp
-      do j = 1, size(values, 2)
-         do i = 1, size(values, 1)
-            do k = mixing%first(i), mixing%first(i + 1) - 1
-               unmixed(mixing%column(k), j) = unmixed(mixing%column(k), j) + mixing%weight(k)*values(i, j)
-            end do
+      row = transpose(values)
+      total = 0.0_wp
+      do i = 1, size(values, 1)
+         do k = mixing%first(i), mixing%first(i + 1) - 1
+            total(:, mixing%column(k)) = total(:, mixing%column(k)) + mixing%weight(k)*row(:, i)
          end do
       end do
+      unmixed = transpose(total)
    end function get_unmixed
 
 end module thud_mode_mixing
