@@ -236,8 +236,8 @@ contains
    end function get_groups
 
    !> Spectra of the sound at the microphones, and energies of floor and room (Parseval).
-   subroutine get_sound(pole, mixing, drive, coupling, frequency, spectrum, box, lx, ly, highest, microphone, with_energies, &
-      sound, room)
+   subroutine get_sound(pole, mixing, drive, coupling, frequency, spectrum, box, lx, ly, highest, microphone, &
+      with_energies, sound, room)
       !> Squared angular frequencies of the floor's modes with their losses, rad2/s2: [n_mode].
       complex(wp), intent(in) :: pole(:)
       !> Their sums of the modes without losses.
