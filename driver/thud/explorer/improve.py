@@ -259,8 +259,8 @@ def fit_recording(
     Returns
     -------
     dict
-        Values of the case with the fitted ones and what the recording states (``"values"``), and
-        a text with their intervals.
+        Values of the case with the fitted ones and what the recording states (``"values"``), a
+        text with their intervals, and details of the fit.
     """
     recording, _ = read_copies(paths, names, table)
     stated = {"height": recording.config.height, "mass": recording.config.mass}
@@ -288,6 +288,6 @@ def fit_recording(
     for name, value in (known | fitted).items():
         key, _ = find_key(name, key_owners(case))
         values.setdefault(key.group, {})[key.name] = value
-    notes = "".join(f" {note[:1].upper()}{note[1:]}." for note in result.warnings)
-    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %).{notes}"
-    return {"values": values, "text": text}
+    details = " ".join(f"{note[:1].upper()}{note[1:]}." for note in result.warnings)
+    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %)."
+    return {"values": values, "text": text, "details": details}

@@ -22,6 +22,7 @@ from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import SI_UNITS
 from thud.explorer.improve import fit_recording, improve
 from thud.explorer.messages import describe_error
+from thud.explorer.press import fit_press
 from thud.explorer.recording import answer_recording
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ TASKS: dict[str, Callable[..., Any]] = {
     "recording": answer_recording,
     "improve": improve,
     "fit": fit_recording,
+    "press": fit_press,
     "download": lambda name, values: DOWNLOADS[name][0](values),
 }
 # Errors of invalid values; values of wrong types raise TypeError or ValueError when they are used.

@@ -21,7 +21,7 @@ const DOORS = ["recording", "ball", "floor"];
 const current = { recording: null, ball: null, floor: null };
 let kept = [];
 // Text on the last fit, and the values that it belongs to.
-let fitted = { text: "", values: "" };
+let fitted = { text: "", details: "", values: "", name: "" };
 let job = null;
 let timer = 0;
 let retryTimer = 0;
@@ -104,7 +104,7 @@ async function solve() {
       : await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
     clearTimeout(dimming);
     if (isRecording) current.recording = recordedVariant(answer);
-    else current[door] = { door, style: 0, values, answer, slow: thisJob.slow };
+    else current[door] = { door, style: 0, values, answer, slow: thisJob.slow, ...(door === "ball" && fitted.name && JSON.stringify(values) === fitted.values ? { title: fitted.name } : {}) };
     if (state.door !== door || job !== thisJob) return;
     hideMessage();
     setOutdated(false, thisJob.repeat);
@@ -198,14 +198,13 @@ function showAll() {
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(hasRoom ? variants : [], showError);
   if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
-  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted.text));
+  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted));
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
 }
 
 /** Return the result of a fit, and its details folded. */
-function fitTexts(text) {
-  const [, first, rest] = text.match(/^(.*?\)\.) ?(.*)$/s) ?? [null, text, ""];
-  return [element("p", {}, first), ...(rest ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, rest))] : [])];
+function fitTexts({ text, details }) {
+  return [element("p", {}, text), ...(details ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, details))] : [])];
 }
 
 /** Show the door without an answer. */
@@ -259,7 +258,7 @@ function openDoor(door, { focus = false } = {}) {
   byId("panel").setAttribute("aria-labelledby", `door_${door}`);
   history.replaceState(null, "", `#${door}`);
   document.body.dataset.door = door;
-  buildDoor(onChange, onInvalid);
+  buildDoor({ onChange, onInvalid, onPress });
   hideMessage();
   const isCurrent = Boolean(current[door]) && (door === "recording" || JSON.stringify(current[door].values) === JSON.stringify(caseValues(door)));
   showAll();
@@ -416,11 +415,24 @@ function begin(start) {
 async function fit() {
   byId("fit").disabled = true;
   try {
-    const { values, text } = await runTask("Fitting a ball to the recording", "fit", checkedBody(caseValues("ball")), new AbortController(), { showNow: true });
-    takeValues(values);
-    fitted = { text, values: JSON.stringify(caseValues("ball")) };
-    openDoor("ball");
+    showFit(await runTask("Fitting a ball to the recording", "fit", checkedBody(caseValues("ball")), new AbortController(), { showNow: true }));
   } catch (error) { showError(error); } finally { if (byId("fit")) byId("fit").disabled = false; }
+}
+
+/** Take over the values of a fit, and show its result beside them. */
+function showFit({ values, text, details, name = "" }) {
+  takeValues(values);
+  fitted = { text, details, name, values: JSON.stringify(caseValues("ball")) };
+  openDoor("ball");
+}
+
+/** Fit the ball to the curve of a press. */
+async function onPress(body, name) {
+  hideMessage();
+  body.set("case", JSON.stringify(caseValues("ball")));
+  try {
+    showFit(await runTask(`Fitting the ball to ${name}`, "press", body, new AbortController()));
+  } catch (error) { showError(error); }
 }
 
 /** Return the button that looks for a change with which a source conforms or a required level is met, if there is a need. */

@@ -1,8 +1,9 @@
 // The case and its form: fields from the declarations of the keys, presets, models, constructions and the room.
 import { button, byId, capitalize, element, scaled } from "./page.js";
+import { pressInputs } from "./press.js";
 
 /** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, ranges of moved fields, and what is not known, by model. */
-export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
+export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [], press: [] };
 export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {} };
 
 // Digits of a number in its field.
@@ -140,12 +141,13 @@ export function fillConstruction(name) {
 
 // ---- Form.
 
-/** Build the form of the current door; `onChange` is called after each change, `onInvalid` when a field has no valid or no current value. */
-export function buildInputs(onChange, onInvalid) {
+/** Build the form of the current door; `onChange` is called after each change, `onInvalid` when a field has no valid or no current value, `onPress` with the curve of a press. */
+export function buildInputs(handlers) {
+  const { onChange } = handlers;
   const focus = document.activeElement?.id;
   const scroll = byId("inputs").scrollTop;
-  const handlers = { onChange, onInvalid, rebuild: () => { buildInputs(onChange, onInvalid); onChange(); } };
-  replaceInputs(state.door === "floor" ? floorInputs(handlers) : ballInputs(handlers));
+  const all = { ...handlers, rebuild: () => { buildInputs(handlers); onChange(); } };
+  replaceInputs(state.door === "floor" ? floorInputs(all) : ballInputs(all));
   byId("inputs").scrollTop = scroll;
   if (focus && document.activeElement?.id !== focus) byId(focus)?.focus();
 }
@@ -173,8 +175,9 @@ function ballInputs(handlers) {
   const chosen = about.presets.find((preset) => isSame(sorted(preset.values), sorted(current)));
   const common = commonGroups();
   const own = findGroup("model", state.model);
+  const [pressButton, pressPanel] = pressInputs(handlers.onPress);
   return [
-    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), element("p", { class: "help" }, chosen ? `${chosen.text}.` : "Changed.")),
+    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices, pressButton), pressPanel, element("p", { class: "help" }, chosen ? `${chosen.text}.` : "Changed.")),
     choiceOf("model", "Model", about.models.map(({ name, title }) => [name, title]), state.model, (name) => { setModel(name); handlers.rebuild(); },
       element("p", { class: "help" }, `${factsOf("model", state.model).purpose}. `, element("em", {}, factsOf("model", state.model).validity))),
     ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),

@@ -9,7 +9,7 @@ export const recording = { files: [] };
 export function buildRecording(onChange) {
   const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, onChange));
   byId("inputs").replaceChildren(
-    element("div", { id: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
+    element("div", { id: "drop_zone", class: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
       element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS")),
     element("ul", { id: "files", "aria-label": "Files" }),
     element("fieldset", {}, element("legend", {}, "What the file does not say"), ...fields(false)),
@@ -18,7 +18,7 @@ export function buildRecording(onChange) {
 }
 
 function fileInput(onChange) {
-  const input = element("input", { type: "file", id: "file", multiple: true });
+  const input = element("input", { type: "file", id: "file", class: "file", multiple: true });
   input.addEventListener("change", () => {
     addFiles([...input.files], onChange);
     // Otherwise choosing the same file again would raise no event.
@@ -104,7 +104,7 @@ export function reportButton(answer) {
 }
 
 /** Build the inputs of the current door. */
-export function buildDoor(onChange, onInvalid) {
-  if (state.door === "recording") buildRecording(onChange);
-  else buildInputs(onChange, onInvalid);
+export function buildDoor(handlers) {
+  if (state.door === "recording") buildRecording(handlers.onChange);
+  else buildInputs(handlers);
 }
