@@ -512,6 +512,28 @@ def test_recordings_and_models_are_compared_and_fitted(browser: Browser, server:
     assert len(names_of(page)) == 2
 
 
+def test_aging_is_a_percentage_of_the_modulus(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    # The lines say which of the two standard balls to use.
+    lines = page.locator("#inputs fieldset").first.locator("li")
+    sync_api.expect(lines).to_have_text([re.compile("Use it by default"), re.compile("A check at")])
+    page.locator("#preset_aged_ball").click()
+    sync_api.expect(field(page, "aging.percent")).to_have_value("20")
+    page.locator("#preset_standard_ball").click()
+    sync_api.expect(field(page, "aging.percent")).to_have_value("0")
+    fill(page, "aging.percent", "30")
+    settle(page)
+    sync_api.expect(field(page, "ball.youngs_modulus")).to_have_value("2.08")
+    assert value_of(page, "63 Hz") > "32.5"
+    fill(page, "ball.youngs_modulus", "1.76")
+    sync_api.expect(field(page, "aging.percent")).to_have_value("10")
+    # The study varies the modulus, the key of the case.
+    moved = page.evaluate("Object.keys(state.moved)")
+    assert moved == ["ball.youngs_modulus"]
+    page.locator("#preset_tyre").click()
+    sync_api.expect(field(page, "aging.percent")).to_have_count(0)
+
+
 def test_press_curve_sets_the_modulus_of_the_ball(browser: Browser, server: Served) -> None:
     curve = thud.compress(thud.Ball(youngs_modulus=1.75e6), thud.ModalBall(), max_deflection=0.03)
     rows = [f"{1e3 * x:.5g},{y:.5g}" for x, y in zip(curve.deflection, curve.force, strict=True)]

@@ -5,6 +5,7 @@ import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms,
 import { STORE, firstVariant } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
 import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
+import { closePress } from "./press.js";
 import { addFiles, buildDoor, recording, recordingBody, reportButton, showAsks } from "./recording.js";
 import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
@@ -198,13 +199,16 @@ function showAll() {
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(hasRoom ? variants : [], showError);
   if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
-  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted));
+  if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
 }
 
-/** Return the result of a fit, and its details folded. */
-function fitTexts({ text, details }) {
-  return [element("p", {}, text), ...(details ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, details))] : [])];
+/** Show the result of the last fit, and its details folded; at first in sight. */
+function showFitTexts() {
+  const { text, details, isNew } = fitted;
+  byId("result").append(element("p", {}, text), ...(details ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, details))] : []));
+  if (isNew) byId("result").scrollIntoView({ block: "nearest" });
+  fitted.isNew = false;
 }
 
 /** Show the door without an answer. */
@@ -422,7 +426,7 @@ async function fit() {
 /** Take over the values of a fit, and show its result beside them. */
 function showFit({ values, text, details, name = "" }) {
   takeValues(values);
-  fitted = { text, details, name, values: JSON.stringify(caseValues("ball")) };
+  fitted = { text, details, name, isNew: true, values: JSON.stringify(caseValues("ball")) };
   openDoor("ball");
 }
 
@@ -431,7 +435,9 @@ async function onPress(body, name) {
   hideMessage();
   body.set("case", JSON.stringify(caseValues("ball")));
   try {
-    showFit(await runTask(`Fitting the ball to ${name}`, "press", body, new AbortController()));
+    const answer = await runTask(`Fitting the ball to ${name}`, "press", body, new AbortController());
+    closePress();
+    showFit(answer);
   } catch (error) { showError(error); }
 }
 

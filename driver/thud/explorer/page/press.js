@@ -5,6 +5,11 @@ import { about } from "./form.js";
 /** The file that was chosen last, and units of columns whose titles state none. */
 const press = { isOpen: false, file: null, units: {} };
 
+/** Fold the choice of a file at the next build of the form. */
+export function closePress() {
+  press.isOpen = false;
+}
+
 /** Return the button of the curve of a press, and what it opens; `onPress` is called with the form to fit. */
 export function pressInputs(onPress) {
   const send = () => {
