@@ -56,17 +56,17 @@ THICKNESS_STEP = 0.01
 STIFFNESS_STEP = 0.1
 FLOOR_STEPS = 15
 FLOOR_NOTE = (
-    "Each layer alone; the level need not fall with each step, as modes of the room move. Met by the "
-    "whole interval leaves the uncertainty of the prediction as margin, met by the mean none."
+    "Each layer alone; the level need not fall with each step, as modes of the room move. Met by "
+    "the whole interval leaves the uncertainty of the prediction as margin, met by the mean none."
 )
 # Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
 # over the width of its range.
 LEVEL_MARGIN = 0.1
 OTHER_MARGIN = 0.02
 NOTE = (
-    f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % of "
-    "the range to those of other criteria, besides the numerical error. What is not known of the "
-    "source is not considered."
+    f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % "
+    "of the range to those of other criteria, besides the numerical error. What is not known of "
+    "the source is not considered."
 )
 # Significant digits of changed values.
 DIGITS = 3
@@ -75,7 +75,8 @@ DIGITS = 3
 def improve(values: Values) -> Work:
     """Search for each parameter of the source the smallest change with which it conforms.
 
-    The change leaves a margin, see `_conforms`. Only one parameter is changed at a time; what is not known of the source is not considered.
+    The change leaves a margin, see `_conforms`. Only one parameter is changed at a time; what is
+    not known of the source is not considered.
     """
     case = new_case(values)
     if case.room is not None and case.floor is not None:

@@ -58,7 +58,7 @@ def _aged_ball() -> Case:
 PRESETS = {
     "standard_ball": Preset(
         "Standard ball",
-        "Use it by default: modes of a rubber sphere, with a loss factor chosen so that it conforms",
+        "Use it by default: modes of a rubber sphere, its loss factor chosen so that it conforms",
         "ball",
         standard_ball,
     ),

@@ -12,6 +12,7 @@ from thud.base.checks import shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import source_headline
+from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import name_fields
 from thud.plot.impact_figures import contact_force
 from thud.recordings.config import config_from
@@ -53,6 +54,8 @@ def answer_recording(
     # The page shows the name of a single file next to its warnings.
     prefix = f"{names[0]}: " if len(names) == 1 else ""
     answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
+    open_warnings = decisive_warnings(recording.warnings, verdict.criteria)
+    answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
     data = report_data(recording)
     drawings = [content.decode() for content in figures(recording).values()]
     answer["report"] = report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())

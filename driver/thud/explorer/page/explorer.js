@@ -216,6 +216,7 @@ function showNothing(door) {
   byId("verdict").className = "";
   byId("verdict").replaceChildren(element("b", {}, door === "recording" ? "Does my source conform?" : "Computing …"));
   byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
+  byId("open_warnings").replaceChildren();
   for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
   for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
 }
