@@ -502,10 +502,12 @@ def test_several_files_are_the_drops_of_one_measurement(client: TestClient) -> N
     thirds = recording.levels("third")
     assert answer["levels"]["thirds"]["level"] == pytest.approx(thirds, rel=1e-5)
     assert not any("recording_" in warning for warning in answer["warnings"])
-    # The report is complete in itself, and has the names of the files.
-    assert all(path.name in answer["report"] for path in paths)
-    assert "recording_" not in answer["report"]
-    assert not re.search(r'(src|href)="(?!data:|#)', answer["report"])
+    # The report is made only when it is asked for. It is complete, and has the names of the files.
+    assert "report" not in answer
+    report = last_report(client, "/report", files=files, data=data)["answer"]
+    assert all(path.name in report for path in paths)
+    assert "recording_" not in report
+    assert not re.search(r'(src|href)="(?!data:|#)', report)
 
 
 def test_recording_of_a_tyre_has_its_limits(client: TestClient) -> None:

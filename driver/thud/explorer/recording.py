@@ -1,4 +1,4 @@
-"""Answer of recorded drops for the page, with their calibration report."""
+"""Answer of recorded drops for the page, and their calibration report."""
 
 from __future__ import annotations
 
@@ -56,11 +56,18 @@ def answer_recording(
     answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
     open_warnings = decisive_warnings(recording.warnings, verdict.criteria)
     answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
-    data = report_data(recording)
-    drawings = [content.decode() for content in figures(recording).values()]
-    answer["report"] = report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
     answer["seconds"] = time.perf_counter() - start
     return answer
+
+
+def calibration_report(
+    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
+) -> str:
+    """Return the page with the calibration report of recorded drops, as `answer_recording`."""
+    recording, _ = read_copies(paths, names, table)
+    data = report_data(recording)
+    drawings = [content.decode() for content in figures(recording).values()]
+    return report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
 
 
 def read_copies(

@@ -105,6 +105,7 @@ def new_application(
                     ("/about", _about, ["GET"]),
                     ("/solve", _solve, ["POST"]),
                     ("/measure", _measure, ["POST"]),
+                    ("/report", _report, ["POST"]),
                     ("/improve", _improve, ["POST"]),
                     ("/fit", _fit, ["POST"]),
                     ("/press", _press, ["POST"]),
@@ -167,6 +168,10 @@ async def _solve(request: Request) -> Response:
 
 async def _measure(request: Request) -> Response:
     return await _with_files(request, "recording", lambda form: (recording_table(form),))
+
+
+async def _report(request: Request) -> Response:
+    return await _with_files(request, "report", lambda form: (recording_table(form),))
 
 
 async def _improve(request: Request) -> Response:

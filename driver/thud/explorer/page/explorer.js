@@ -6,7 +6,7 @@ import { STORE, firstVariant } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
 import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
 import { closePress } from "./press.js";
-import { addFiles, buildDoor, recording, recordingBody, reportButton, showAsks } from "./recording.js";
+import { addFiles, buildDoor, recording, recordingBody, showAsks } from "./recording.js";
 import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
@@ -100,11 +100,12 @@ async function solve() {
   const dimming = setTimeout(() => setOutdated(true), PAUSE);
   try {
     const values = isRecording ? null : caseValues(door);
+    const body = isRecording ? checkedBody() : JSON.stringify(values);
     const answer = isRecording
-      ? await runTask(`Assessing ${recording.files.map(({ name }) => name).join(", ")}`, "measure", checkedBody(), thisJob.controller, { showNow: true })
-      : await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
+      ? await runTask(`Assessing ${recording.files.map(({ name }) => name).join(", ")}`, "measure", body, thisJob.controller, { showNow: true })
+      : await runTask("Computing", "solve", body, thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
     clearTimeout(dimming);
-    if (isRecording) current.recording = recordedVariant(answer);
+    if (isRecording) current.recording = recordedVariant(answer, body);
     else current[door] = { door, style: 0, values, answer, slow: thisJob.slow, ...(door === "ball" && fitted.name && JSON.stringify(values) === fitted.values ? { title: fitted.name } : {}) };
     if (state.door !== door || job !== thisJob) return;
     hideMessage();
@@ -132,11 +133,11 @@ function checkedBody(values) {
   return recordingBody(values);
 }
 
-function recordedVariant(answer) {
+function recordedVariant(answer, body) {
   const [{ name }, ...others] = recording.files;
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
   const stated = Object.entries(state.recording).map(([key, text]) => [about.recording.find((field) => field.name === key)?.label ?? key, text]);
-  return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer };
+  return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer, body };
 }
 
 /** Compute the case after a change of the form; a slow case only after a pause. */
@@ -198,7 +199,7 @@ function showAll() {
   showBall(door === "recording" ? null : own.answer.motion);
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(hasRoom ? variants : [], showError);
-  if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
+  if (door === "recording") byId("next").append(button("Calibration report", () => saveReport(own), { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
   if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
 }
@@ -321,7 +322,7 @@ function restore(values) {
   for (const name of Object.keys(state)) state[name] = values[name] ?? state[name];
 }
 
-const withoutMotion = (variant) => ({ ...variant, answer: { ...variant.answer, motion: null, report: null } });
+const withoutMotion = (variant) => ({ ...variant, body: null, answer: { ...variant.answer, motion: null } });
 
 /** Store case and variants in this browser; without room for the answers, only the case. */
 function store() {
@@ -416,6 +417,14 @@ function begin(start) {
 }
 
 // ---- Actions.
+
+/** Save the calibration report of a recording, as it was assessed. */
+async function saveReport({ body }) {
+  byId("report").disabled = true;
+  try {
+    saveFile("calibration.html", await runTask("Calibration report", "report", body, new AbortController(), { showNow: true }), "text/html");
+  } catch (error) { showError(error); } finally { if (byId("report")) byId("report").disabled = false; }
+}
 
 async function fit() {
   byId("fit").disabled = true;

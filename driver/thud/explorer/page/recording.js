@@ -1,5 +1,5 @@
 // The door of a recording: its files, what they do not say, and what its answer asks for.
-import { button, byId, element, saveFile } from "./page.js";
+import { button, byId, element } from "./page.js";
 import { about, buildInputs, state } from "./form.js";
 
 /** Files of the recording, drops of one measurement. */
@@ -96,11 +96,6 @@ export function showAsks(asks, onChange) {
     }
     onChange();
   };
-}
-
-/** Return the button that saves the calibration report of an answer. */
-export function reportButton(answer) {
-  return button("Calibration report", () => saveFile("calibration.html", answer.report, "text/html"), { class: "strong", id: "report" });
 }
 
 /** Build the inputs of the current door. */
