@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -146,6 +148,34 @@ def test_page_begins_with_a_ball_that_conforms() -> None:
     answer = answer_case(new_case(first["values"]))
     assert answer["conforms"]
     assert answer["headline"]["text"] == "conforms"
+
+
+def test_modulus_that_is_too_low_is_named_with_three_digits() -> None:
+    case = new_case({"model": {"name": "modal_ball"}, "ball": {"youngs_modulus": 5e4}})
+    with pytest.raises(thud.ThudError) as raised:
+        compute(case)
+    report = describe_error(raised.value)
+    assert report["field"] == "ball.youngs_modulus"
+    assert report["error"].startswith("Young's modulus = 0.05 MPa is too low for this drop: ")
+    assert not re.search(r"\d\.\d{3,}", report["error"])
+
+
+@pytest.mark.parametrize("modulus", [1e4, 3e4, 5e4])
+def test_duration_that_a_message_allows_is_accepted(modulus: float) -> None:
+    # A coarse mesh: only the check of the duration matters.
+    case = replace(
+        new_case({"model": {"name": "finite_element"}, "ball": {"youngs_modulus": modulus}}),
+        model=thud.FiniteElement(radial_elements=2, polar_elements=16),
+    )
+    with pytest.raises(thud.ThudError, match="is too short") as raised:
+        compute(case)
+    (shortest,) = re.findall(r"allowed: at least ([\d.]+) s$", str(raised.value))
+    assert len(shortest.lstrip("0.")) <= 3
+    longer = replace(case, sampling=thud.Sampling(duration=float(shortest)))
+    try:
+        compute(longer)
+    except thud.ThudError as error:
+        assert "is too short" not in str(error)
 
 
 @pytest.mark.parametrize("preset", presets(), ids=lambda preset: preset["name"])

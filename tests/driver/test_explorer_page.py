@@ -512,6 +512,59 @@ def test_recordings_and_models_are_compared_and_fitted(browser: Browser, server:
     assert len(names_of(page)) == 2
 
 
+def test_aging_is_a_percentage_of_the_modulus(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    # The lines say which of the two standard balls to use.
+    lines = page.locator("#inputs fieldset").first.locator("li")
+    sync_api.expect(lines).to_have_text([re.compile("Use it by default"), re.compile("A check at")])
+    page.locator("#preset_aged_ball").click()
+    sync_api.expect(field(page, "aging.percent")).to_have_value("20")
+    page.locator("#preset_standard_ball").click()
+    sync_api.expect(field(page, "aging.percent")).to_have_value("0")
+    fill(page, "aging.percent", "30")
+    settle(page)
+    sync_api.expect(field(page, "ball.youngs_modulus")).to_have_value("2.08")
+    assert value_of(page, "63 Hz") > "32.5"
+    fill(page, "ball.youngs_modulus", "1.76")
+    sync_api.expect(field(page, "aging.percent")).to_have_value("10")
+    # The study varies the modulus, the key of the case.
+    moved = page.evaluate("Object.keys(state.moved)")
+    assert moved == ["ball.youngs_modulus"]
+    page.locator("#preset_tyre").click()
+    sync_api.expect(field(page, "aging.percent")).to_have_count(0)
+
+
+def test_press_curve_sets_the_modulus_of_the_ball(browser: Browser, server: Served) -> None:
+    curve = thud.compress(thud.Ball(youngs_modulus=1.75e6), thud.ModalBall(), max_deflection=0.03)
+    rows = [f"{1e3 * x:.5g},{y:.5g}" for x, y in zip(curve.deflection, curve.force, strict=True)]
+    page = new_page(browser, server[0])
+    page.locator("#press_open").click()
+    # A drop on this zone is a curve, not a recording.
+    page.evaluate(
+        """(text) => {
+            const data = new DataTransfer();
+            data.items.add(new File([text], "press 7.csv"));
+            document.getElementById("press_zone").dispatchEvent(
+                new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
+        }""",
+        "\n".join(["deflection,force (N)", *rows]),
+    )
+    # The unit is asked for, and the file is read again with it.
+    error = page.locator("[id='press_deflection.error']")
+    sync_api.expect(error).to_contain_text("press 7.csv: column 1, 'deflection': its unit is not")
+    page.locator("#press_deflection").select_option("mm")
+    sync_api.expect(page.locator("#result")).to_contain_text("Fitted to press 7.csv: Young's mod")
+    settle(page)
+    sync_api.expect(page.locator("#result > p")).to_contain_text("% of the largest force")
+    sync_api.expect(page.locator("#door_ball")).to_have_attribute("aria-selected", "true")
+    assert float(field(page, "ball.youngs_modulus").input_value()) == pytest.approx(1.75, 0.01)
+    sync_api.expect(page.locator("#verdict .subject")).to_have_text("press 7 ")
+    # Another value is no longer that of the curve.
+    fill(page, "ball.youngs_modulus", "1.6")
+    settle(page)
+    sync_api.expect(page.locator("#verdict .subject")).not_to_contain_text("press 7")
+
+
 def test_smallest_change_that_conforms_is_applied(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     sync_api.expect(page.locator("#improve")).to_have_count(0)

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
 
     from thud.case.case import Case
+    from thud.level.assessment import Criterion
 
     Values = dict[str, dict[str, Any]]
     # Yields begin and end of the fraction of the work of the next step, and returns the answer.
@@ -54,8 +55,19 @@ LAYERS = "thickness", "screed_thickness", "layer_stiffness", "subceiling_thickne
 THICKNESS_STEP = 0.01
 STIFFNESS_STEP = 0.1
 FLOOR_STEPS = 15
-FLOOR_NOTE = "Each layer alone; the level need not fall with each step, as modes of the room move."
-NOTE = "By the values of the case alone: what is not known of the source is not considered."
+FLOOR_NOTE = (
+    "Each layer alone; the level need not fall with each step, as modes of the room move. Met by "
+    "the whole interval leaves the uncertainty of the prediction as margin, met by the mean none."
+)
+# Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
+# over the width of its range.
+LEVEL_MARGIN = 0.1
+OTHER_MARGIN = 0.02
+NOTE = (
+    f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % "
+    "of the range to those of other criteria, besides the numerical error. What is not known of "
+    "the source is not considered."
+)
 # Significant digits of changed values.
 DIGITS = 3
 
@@ -63,7 +75,8 @@ DIGITS = 3
 def improve(values: Values) -> Work:
     """Search for each parameter of the source the smallest change with which it conforms.
 
-    Only one parameter is changed at a time; what is not known of the source is not considered.
+    The change leaves a margin, see `_conforms`. Only one parameter is changed at a time; what is
+    not known of the source is not considered.
     """
     case = new_case(values)
     if case.room is not None and case.floor is not None:
@@ -227,10 +240,19 @@ def _refined(case: Case, coarse: Case, name: str, exponent: float) -> float | No
 
 
 def _conforms(case: Case, name: str, value: float) -> bool:
+    """Whether the source conforms with a value of a parameter, with margins to the limits."""
     try:
-        return compute(with_values(case, {name: value})).assess().conforms
+        verdict = compute(with_values(case, {name: value})).assess()
     except ThudError:
         return False
+    return verdict.conforms and all(map(_has_margin, verdict.criteria))
+
+
+def _has_margin(criterion: Criterion) -> bool:
+    """Whether a criterion that is met leaves a margin besides its numerical error."""
+    width = criterion.upper - criterion.lower
+    margin = LEVEL_MARGIN if criterion.unit == "dB" else OTHER_MARGIN * width
+    return criterion.margin - criterion.estimate.expanded >= margin
 
 
 def _change(case: Case, name: str, start: float, value: float) -> dict[str, Any]:
@@ -259,8 +281,8 @@ def fit_recording(
     Returns
     -------
     dict
-        Values of the case with the fitted ones and what the recording states (``"values"``), and
-        a text with their intervals.
+        Values of the case with the fitted ones and what the recording states (``"values"``), a
+        text with their intervals, and details of the fit.
     """
     recording, _ = read_copies(paths, names, table)
     stated = {"height": recording.config.height, "mass": recording.config.mass}
@@ -288,6 +310,6 @@ def fit_recording(
     for name, value in (known | fitted).items():
         key, _ = find_key(name, key_owners(case))
         values.setdefault(key.group, {})[key.name] = value
-    notes = "".join(f" {note[:1].upper()}{note[1:]}." for note in result.warnings)
-    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %).{notes}"
-    return {"values": values, "text": text}
+    details = " ".join(f"{note[:1].upper()}{note[1:]}." for note in result.warnings)
+    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %)."
+    return {"values": values, "text": text, "details": details}

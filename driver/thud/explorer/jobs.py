@@ -22,7 +22,8 @@ from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import SI_UNITS
 from thud.explorer.improve import fit_recording, improve
 from thud.explorer.messages import describe_error
-from thud.explorer.recording import answer_recording
+from thud.explorer.press import fit_press
+from thud.explorer.recording import answer_recording, calibration_report
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable
@@ -37,8 +38,10 @@ TASKS: dict[str, Callable[..., Any]] = {
     "quick case": lambda values: answer_quickly(new_case(values)),
     "case": lambda values: answer_case(new_case(values)),
     "recording": answer_recording,
+    "report": calibration_report,
     "improve": improve,
     "fit": fit_recording,
+    "press": fit_press,
     "download": lambda name, values: DOWNLOADS[name][0](values),
 }
 # Errors of invalid values; values of wrong types raise TypeError or ValueError when they are used.

@@ -57,17 +57,22 @@ def _aged_ball() -> Case:
 
 PRESETS = {
     "standard_ball": Preset(
-        "Standard ball", "A rubber ball that conforms, by its modes", "ball", standard_ball
+        "Standard ball",
+        "Use it by default: modes of a rubber sphere, its loss factor chosen so that it conforms",
+        "ball",
+        standard_ball,
     ),
     "finite_elements": Preset(
         "Standard ball, finite elements",
-        "The same ball in detail; 500 Hz depends on a damping law that nobody has measured",
+        "A check at large strain, fitted to published modes and not to levels; 500 Hz depends on a "
+        "damping law that nobody has measured",
         "ball",
         partial(input_case, "rubber_ball_fe.nml"),
     ),
     "aged_ball": Preset(
         "Aged ball",
-        "Finite elements with a modulus that aging has raised by a fifth, an assumption",
+        "Finite elements with a modulus that aging has raised by a fifth, an assumption: state "
+        "your own below",
         "ball",
         _aged_ball,
     ),

@@ -1,4 +1,4 @@
-"""Answer of recorded drops for the page, with their calibration report."""
+"""Answer of recorded drops for the page, and their calibration report."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from thud.base.checks import shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import source_headline
+from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import name_fields
 from thud.plot.impact_figures import contact_force
 from thud.recordings.config import config_from
@@ -53,11 +54,20 @@ def answer_recording(
     # The page shows the name of a single file next to its warnings.
     prefix = f"{names[0]}: " if len(names) == 1 else ""
     answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
-    data = report_data(recording)
-    drawings = [content.decode() for content in figures(recording).values()]
-    answer["report"] = report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
+    open_warnings = decisive_warnings(recording.warnings, verdict.criteria)
+    answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
     answer["seconds"] = time.perf_counter() - start
     return answer
+
+
+def calibration_report(
+    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
+) -> str:
+    """Return the page with the calibration report of recorded drops, as `answer_recording`."""
+    recording, _ = read_copies(paths, names, table)
+    data = report_data(recording)
+    drawings = [content.decode() for content in figures(recording).values()]
+    return report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
 
 
 def read_copies(

@@ -107,10 +107,27 @@ FIELDS = (
     Field("serial", "Serial number", "text", folded=True),
 )  # fmt: skip
 
+# Units of the columns of the curve of a press, if their titles state none.
+PRESS_FIELDS = (
+    Field(
+        "press_deflection", "Unit of the deflection", "choice",
+        choices={unit: unit for unit in ("mm", "cm", "m", "um")},
+    ),
+    Field(
+        "press_force", "Unit of the force", "choice",
+        choices={unit: unit for unit in ("N", "kN", "daN", "kgf", "lbf")},
+    ),
+)  # fmt: skip
+
 
 def recording_form() -> list[dict[str, Any]]:
     """Return the fields for the page."""
     return [asdict(item) for item in FIELDS]
+
+
+def press_form() -> list[dict[str, Any]]:
+    """Return the fields of the curve of a press for the page."""
+    return [asdict(item) for item in PRESS_FIELDS]
 
 
 def recording_table(stated: Mapping[str, str]) -> Table:
@@ -161,7 +178,8 @@ def name_fields(message: str) -> str:
 
 def recording_field_of(message: str) -> str | None:
     """Return the name of the first field that a message names; None if there is none."""
-    places = {message.find(item.quoted): item.name for item in FIELDS if item.quoted in message}
+    fields = (*FIELDS, *PRESS_FIELDS)
+    places = {message.find(item.quoted): item.name for item in fields if item.quoted in message}
     return places[min(places)] if places else None
 
 

@@ -33,7 +33,7 @@ from thud.explorer.messages import describe_error
 from thud.explorer.models import changed_values, floor_facts, model_facts, standard_ball
 from thud.explorer.page_file import new_page
 from thud.explorer.presets import presets
-from thud.explorer.recording_fields import recording_form, recording_table
+from thud.explorer.recording_fields import press_form, recording_form, recording_table
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
@@ -105,8 +105,10 @@ def new_application(
                     ("/about", _about, ["GET"]),
                     ("/solve", _solve, ["POST"]),
                     ("/measure", _measure, ["POST"]),
+                    ("/report", _report, ["POST"]),
                     ("/improve", _improve, ["POST"]),
                     ("/fit", _fit, ["POST"]),
+                    ("/press", _press, ["POST"]),
                     ("/download/{name}", _download, ["POST"]),
                 )
             ),
@@ -122,6 +124,7 @@ def new_application(
     application.state.about = {
         "constructions": construction_form(),
         "recording": recording_form(),
+        "press": press_form(),
         "models": model_facts(),
         "floors": floor_facts(),
         "presets": presets(),
@@ -167,6 +170,10 @@ async def _measure(request: Request) -> Response:
     return await _with_files(request, "recording", lambda form: (recording_table(form),))
 
 
+async def _report(request: Request) -> Response:
+    return await _with_files(request, "report", lambda form: (recording_table(form),))
+
+
 async def _improve(request: Request) -> Response:
     reports = request.app.state.slow.run("improve", await _values(request))
     return _Reports(reports, AsyncExitStack())
@@ -175,6 +182,12 @@ async def _improve(request: Request) -> Response:
 async def _fit(request: Request) -> Response:
     return await _with_files(
         request, "fit", lambda form: (recording_table(form), _groups(form.get("case", "")))
+    )
+
+
+async def _press(request: Request) -> Response:
+    return await _with_files(
+        request, "press", lambda form: (dict(form), _groups(form.get("case", "")))
     )
 
 

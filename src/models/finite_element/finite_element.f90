@@ -25,7 +25,7 @@ module thud_finite_element
    use thud_receiver, only: get_pole_count, receiver_type
    use thud_sampling, only: get_step_count, sampling_type
    use thud_source_model, only: typical_contact
-   use thud_text, only: fixed, to_text
+   use thud_text, only: fixed, significant, to_text
    use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
    private
@@ -47,6 +47,9 @@ module thud_finite_element
 
    !> Ratio of the required to the given length of a record from which on it is too short at any resolution.
    real(wp), parameter :: short_record = 1.05_wp
+
+   !> Factor with which a number of three digits is never rounded down.
+   real(wp), parameter :: rounded_up = 1.005_wp
 
    !> Time between two checks of the step, s: the ball deforms little meanwhile.
    real(wp), parameter :: check_interval = 0.5e-3_wp
@@ -235,8 +238,8 @@ contains
       end if
       if (sampling%duration <= options%flight_before + contacts%settling_time) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
-            //'after '//to_text(contacts%settling_time)//' s without touch, in which shear waves cross the ball; allowed: ' &
-            //'above '//to_text(options%flight_before + contacts%settling_time)//' s')
+            //'after '//significant(contacts%settling_time, 3)//' s without touch, in which shear waves cross the ball; ' &
+            //'allowed: at least '//significant(rounded_up*(options%flight_before + contacts%settling_time), 3)//' s')
          return
       end if
       run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)

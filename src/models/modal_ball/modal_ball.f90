@@ -26,7 +26,7 @@ module thud_modal_ball
    use thud_sphere_modes, only: basis_type, family_type, get_families, get_static_family, limit_family, new_basis
    use thud_static_step, only: new_static_step, static_step_type
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
-   use thud_text, only: fixed, to_text
+   use thud_text, only: fixed, significant, to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
@@ -365,9 +365,11 @@ contains
                   ball%outer_radius*rings%radius(contact%outermost))
             end if
             if (contact%outermost == size(rings%radius)) then
-               error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its center lowered by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
-                  //' mm; allowed: a lower height, or a stiffer ball')
+               error = numerical_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low for this ' &
+                  //'drop: '//significant(1.0e3_wp*n_step*interval, 3)//' ms after first touch the ball lies on its ' &
+                  //'outermost ring, its center lowered by ' &
+                  //significant(1.0e3_wp*(ball%outer_radius - state%height), 3)//' mm; allowed: a stiffer ball, or a ' &
+                  //'lower height')
                return
             end if
             has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time

@@ -5,7 +5,8 @@ import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms,
 import { STORE, firstVariant } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
 import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
-import { addFiles, buildDoor, recording, recordingBody, reportButton, showAsks } from "./recording.js";
+import { closePress } from "./press.js";
+import { addFiles, buildDoor, recording, recordingBody, showAsks } from "./recording.js";
 import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
@@ -21,7 +22,7 @@ const DOORS = ["recording", "ball", "floor"];
 const current = { recording: null, ball: null, floor: null };
 let kept = [];
 // Text on the last fit, and the values that it belongs to.
-let fitted = { text: "", values: "" };
+let fitted = { text: "", details: "", values: "", name: "" };
 let job = null;
 let timer = 0;
 let retryTimer = 0;
@@ -99,12 +100,13 @@ async function solve() {
   const dimming = setTimeout(() => setOutdated(true), PAUSE);
   try {
     const values = isRecording ? null : caseValues(door);
+    const body = isRecording ? checkedBody() : JSON.stringify(values);
     const answer = isRecording
-      ? await runTask(`Assessing ${recording.files.map(({ name }) => name).join(", ")}`, "measure", checkedBody(), thisJob.controller, { showNow: true })
-      : await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
+      ? await runTask(`Assessing ${recording.files.map(({ name }) => name).join(", ")}`, "measure", body, thisJob.controller, { showNow: true })
+      : await runTask("Computing", "solve", body, thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
     clearTimeout(dimming);
-    if (isRecording) current.recording = recordedVariant(answer);
-    else current[door] = { door, style: 0, values, answer, slow: thisJob.slow };
+    if (isRecording) current.recording = recordedVariant(answer, body);
+    else current[door] = { door, style: 0, values, answer, slow: thisJob.slow, ...(door === "ball" && fitted.name && JSON.stringify(values) === fitted.values ? { title: fitted.name } : {}) };
     if (state.door !== door || job !== thisJob) return;
     hideMessage();
     setOutdated(false, thisJob.repeat);
@@ -131,11 +133,11 @@ function checkedBody(values) {
   return recordingBody(values);
 }
 
-function recordedVariant(answer) {
+function recordedVariant(answer, body) {
   const [{ name }, ...others] = recording.files;
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
   const stated = Object.entries(state.recording).map(([key, text]) => [about.recording.find((field) => field.name === key)?.label ?? key, text]);
-  return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer };
+  return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer, body };
 }
 
 /** Compute the case after a change of the form; a slow case only after a pause. */
@@ -197,15 +199,17 @@ function showAll() {
   showBall(door === "recording" ? null : own.answer.motion);
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(hasRoom ? variants : [], showError);
-  if (door === "recording") byId("next").append(reportButton(own.answer), button("Fit a ball to this recording", fit, { id: "fit" }));
-  if (door === "ball" && JSON.stringify(own.values) === fitted.values) byId("result").append(...fitTexts(fitted.text));
+  if (door === "recording") byId("next").append(button("Calibration report", () => saveReport(own), { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
+  if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
 }
 
-/** Return the result of a fit, and its details folded. */
-function fitTexts(text) {
-  const [, first, rest] = text.match(/^(.*?\)\.) ?(.*)$/s) ?? [null, text, ""];
-  return [element("p", {}, first), ...(rest ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, rest))] : [])];
+/** Show the result of the last fit, and its details folded; at first in sight. */
+function showFitTexts() {
+  const { text, details, isNew } = fitted;
+  byId("result").append(element("p", {}, text), ...(details ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, details))] : []));
+  if (isNew) byId("result").scrollIntoView({ block: "nearest" });
+  fitted.isNew = false;
 }
 
 /** Show the door without an answer. */
@@ -213,6 +217,7 @@ function showNothing(door) {
   byId("verdict").className = "";
   byId("verdict").replaceChildren(element("b", {}, door === "recording" ? "Does my source conform?" : "Computing …"));
   byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
+  byId("open_warnings").replaceChildren();
   for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
   for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
 }
@@ -259,7 +264,7 @@ function openDoor(door, { focus = false } = {}) {
   byId("panel").setAttribute("aria-labelledby", `door_${door}`);
   history.replaceState(null, "", `#${door}`);
   document.body.dataset.door = door;
-  buildDoor(onChange, onInvalid);
+  buildDoor({ onChange, onInvalid, onPress });
   hideMessage();
   const isCurrent = Boolean(current[door]) && (door === "recording" || JSON.stringify(current[door].values) === JSON.stringify(caseValues(door)));
   showAll();
@@ -317,7 +322,7 @@ function restore(values) {
   for (const name of Object.keys(state)) state[name] = values[name] ?? state[name];
 }
 
-const withoutMotion = (variant) => ({ ...variant, answer: { ...variant.answer, motion: null, report: null } });
+const withoutMotion = (variant) => ({ ...variant, body: null, answer: { ...variant.answer, motion: null } });
 
 /** Store case and variants in this browser; without room for the answers, only the case. */
 function store() {
@@ -413,14 +418,37 @@ function begin(start) {
 
 // ---- Actions.
 
+/** Save the calibration report of a recording, as it was assessed. */
+async function saveReport({ body }) {
+  byId("report").disabled = true;
+  try {
+    saveFile("calibration.html", await runTask("Calibration report", "report", body, new AbortController(), { showNow: true }), "text/html");
+  } catch (error) { showError(error); } finally { if (byId("report")) byId("report").disabled = false; }
+}
+
 async function fit() {
   byId("fit").disabled = true;
   try {
-    const { values, text } = await runTask("Fitting a ball to the recording", "fit", checkedBody(caseValues("ball")), new AbortController(), { showNow: true });
-    takeValues(values);
-    fitted = { text, values: JSON.stringify(caseValues("ball")) };
-    openDoor("ball");
+    showFit(await runTask("Fitting a ball to the recording", "fit", checkedBody(caseValues("ball")), new AbortController(), { showNow: true }));
   } catch (error) { showError(error); } finally { if (byId("fit")) byId("fit").disabled = false; }
+}
+
+/** Take over the values of a fit, and show its result beside them. */
+function showFit({ values, text, details, name = "" }) {
+  takeValues(values);
+  fitted = { text, details, name, isNew: true, values: JSON.stringify(caseValues("ball")) };
+  openDoor("ball");
+}
+
+/** Fit the ball to the curve of a press. */
+async function onPress(body, name) {
+  hideMessage();
+  body.set("case", JSON.stringify(caseValues("ball")));
+  try {
+    const answer = await runTask(`Fitting the ball to ${name}`, "press", body, new AbortController());
+    closePress();
+    showFit(answer);
+  } catch (error) { showError(error); }
 }
 
 /** Return the button that looks for a change with which a source conforms or a required level is met, if there is a need. */

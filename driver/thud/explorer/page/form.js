@@ -1,8 +1,9 @@
 // The case and its form: fields from the declarations of the keys, presets, models, constructions and the room.
 import { button, byId, capitalize, element, scaled } from "./page.js";
+import { pressInputs } from "./press.js";
 
 /** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, ranges of moved fields, and what is not known, by model. */
-export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
+export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [], press: [] };
 export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {} };
 
 // Digits of a number in its field.
@@ -140,12 +141,13 @@ export function fillConstruction(name) {
 
 // ---- Form.
 
-/** Build the form of the current door; `onChange` is called after each change, `onInvalid` when a field has no valid or no current value. */
-export function buildInputs(onChange, onInvalid) {
+/** Build the form of the current door; `onChange` is called after each change, `onInvalid` when a field has no valid or no current value, `onPress` with the curve of a press. */
+export function buildInputs(handlers) {
+  const { onChange } = handlers;
   const focus = document.activeElement?.id;
   const scroll = byId("inputs").scrollTop;
-  const handlers = { onChange, onInvalid, rebuild: () => { buildInputs(onChange, onInvalid); onChange(); } };
-  replaceInputs(state.door === "floor" ? floorInputs(handlers) : ballInputs(handlers));
+  const all = { ...handlers, rebuild: () => { buildInputs(handlers); onChange(); } };
+  replaceInputs(state.door === "floor" ? floorInputs(all) : ballInputs(all));
   byId("inputs").scrollTop = scroll;
   if (focus && document.activeElement?.id !== focus) byId(focus)?.focus();
 }
@@ -171,15 +173,47 @@ function ballInputs(handlers) {
   const choices = about.presets.filter((preset) => preset.door === "ball").map((preset) => button(preset.title, () => { takeValues(preset.values); handlers.rebuild(); },
     { id: `preset_${preset.name}`, "aria-pressed": String(isSame(sorted(preset.values), sorted(current))), title: preset.text }));
   const chosen = about.presets.find((preset) => isSame(sorted(preset.values), sorted(current)));
+  // The first two are both standard balls, and their lines say which to trust.
+  const lines = about.presets.filter((preset, i) => i < 2 || preset === chosen);
   const common = commonGroups();
   const own = findGroup("model", state.model);
+  const [pressButton, pressPanel] = pressInputs(handlers.onPress);
   return [
-    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), element("p", { class: "help" }, chosen ? `${chosen.text}.` : "Changed.")),
+    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices, pressButton), pressPanel,
+      element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`))), agingElement(handlers)),
     choiceOf("model", "Model", about.models.map(({ name, title }) => [name, title]), state.model, (name) => { setModel(name); handlers.rebuild(); },
       element("p", { class: "help" }, `${factsOf("model", state.model).purpose}. `, element("em", {}, factsOf("model", state.model).validity))),
     ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),
     foldedElement([own, ...common], handlers),
   ];
+}
+
+// Range of the slider of aging, %.
+const AGING = { ends: [0, 100], log: false };
+
+/** Return the modulus of the first preset of which the case is an aged ball, in its own unit; null if there is none. */
+function newModulus() {
+  const without = ({ ball, ...rest }) => sorted({ ...rest, ball: { ...ball, youngs_modulus: 0 } });
+  const field = findField("ball", "youngs_modulus");
+  const current = caseValues("ball");
+  const preset = isUsed(field) && about.presets.find(({ door, values }) => door === "ball" && isSame(without(values), without(current)));
+  return preset ? preset.values.ball?.youngs_modulus ?? field.default : null;
+}
+
+/** Return the percentage by which aging has raised the modulus. */
+const agingOf = (modulus) => Number((100 * (valueOf(findField("ball", "youngs_modulus")) / modulus - 1)).toFixed(1));
+
+/** Return the field of the percentage by which aging has raised the modulus of a named ball; nothing for others. */
+function agingElement(handlers) {
+  const modulus = newModulus();
+  if (modulus === null) return "";
+  const own = findField("ball", "youngs_modulus");
+  const field = { group: "aging", name: "percent", label: "Stiffer by aging", unit: "%", power: 0, default: agingOf(modulus), lower: -90, step: 1, slider: AGING,
+    help: `Change of Young's modulus from that of the new ball, ${Number(scaled(modulus, -own.power).toPrecision(4))} ${own.unit}` };
+  const setModulus = (percent) => {
+    byId("ball.youngs_modulus").send(Number(scaled(modulus * (1 + percent / 100), -own.power).toPrecision(DIGITS)));
+  };
+  return newField(field, numberInput(field, "aging.percent", setModulus, handlers.onInvalid));
 }
 
 function floorInputs(handlers) {
@@ -242,27 +276,37 @@ function foldedElement(groups, handlers, sources = {}) {
 
 function fieldElement(field, handlers, source) {
   const id = `${field.group}.${field.name}`;
-  const label = element("label", { for: id }, field.unit ? `${field.label}, ${field.unit}` : field.label);
-  const help = element("p", { class: "help", id: `${id}.help` }, source ? `${field.help}. Source of the value: ${source}.` : `${field.help}.`);
-  const error = element("p", { class: "error", id: `${id}.error` });
   const onInput = (value) => {
     const changesFields = about.form.some(({ fields }) => fields.some(({ condition }) => condition?.group === field.group && condition.name === field.name));
+    if (typeof value === "number") {
+      const ends = (state.moved[id] ??= [valueOf(field), valueOf(field)]);
+      state.moved[id] = [Math.min(ends[0], value), Math.max(ends[1], value)];
+    }
     setValue(field, value);
-    help.textContent = `${field.help}.`;
+    byId(`${id}.help`).textContent = `${field.help}.`;
     if (changesFields) handlers.rebuild();
     else handlers.onChange();
     showChoices();
   };
   const newInputs = { choice: choiceInput, flag: flagInput, list: listInput, text: textInput }[field.kind] ?? numberInput;
-  const inputs = newInputs(field, id, onInput, handlers.onInvalid);
-  for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help ${id}.error`);
-  return element("div", { class: "field" }, label, ...inputs, help, error);
+  return newField(field, newInputs(field, id, onInput, handlers.onInvalid), source);
 }
 
-/** Show which preset or construction the form has. */
+/** Return a field with label, inputs, help and error. */
+function newField({ label, unit, help }, inputs, source) {
+  const { id } = inputs[0];
+  for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help ${id}.error`);
+  return element("div", { class: "field" }, element("label", { for: id }, unit ? `${label}, ${unit}` : label), ...inputs,
+    element("p", { class: "help", id: `${id}.help` }, source ? `${help}. Source of the value: ${source}.` : `${help}.`),
+    element("p", { class: "error", id: `${id}.error` }));
+}
+
+/** Show which preset, aging or construction the form has. */
 function showChoices() {
   const current = sorted(caseValues("ball"));
   for (const preset of about.presets) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isSame(sorted(preset.values), current)));
+  const modulus = newModulus();
+  if (modulus !== null) byId("aging.percent")?.show(agingOf(modulus));
   if (!byId("construction")) return;
   const construction = findConstruction();
   byId("construction").value = construction?.name ?? "";
@@ -307,15 +351,16 @@ function numberInput(field, id, onInput, onInvalid) {
   const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;,]+)/) ?? [];
   const textOf = (value) => (zero && value === 0 ? "" : Number(value.toPrecision(DIGITS)));
   const number = element("input", { id, type: "number", step: "any", value: textOf(current), placeholder: zero, class: zero && "open" });
-  const send = (entered) => {
-    const converted = scaled(entered, field.power);
-    const ends = (state.moved[id] ??= [valueOf(field), valueOf(field)]);
-    state.moved[id] = [Math.min(ends[0], converted), Math.max(ends[1], converted)];
+  number.show = (entered) => {
     current = entered;
     number.value = textOf(entered);
     slider?.moveTo(entered);
-    onInput(converted);
   };
+  number.send = (entered) => {
+    number.show(entered);
+    onInput(scaled(entered, field.power));
+  };
+  const { send } = number;
   const step = field.step ?? (field.kind === "whole" ? 1 : null);
   const slider = field.slider && step ? sliderInput(field, current, step, send) : null;
   // The results belong to the value before.

@@ -1,5 +1,5 @@
 // The door of a recording: its files, what they do not say, and what its answer asks for.
-import { button, byId, element, saveFile } from "./page.js";
+import { button, byId, element } from "./page.js";
 import { about, buildInputs, state } from "./form.js";
 
 /** Files of the recording, drops of one measurement. */
@@ -9,7 +9,7 @@ export const recording = { files: [] };
 export function buildRecording(onChange) {
   const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, onChange));
   byId("inputs").replaceChildren(
-    element("div", { id: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
+    element("div", { id: "drop_zone", class: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
       element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS")),
     element("ul", { id: "files", "aria-label": "Files" }),
     element("fieldset", {}, element("legend", {}, "What the file does not say"), ...fields(false)),
@@ -18,7 +18,7 @@ export function buildRecording(onChange) {
 }
 
 function fileInput(onChange) {
-  const input = element("input", { type: "file", id: "file", multiple: true });
+  const input = element("input", { type: "file", id: "file", class: "file", multiple: true });
   input.addEventListener("change", () => {
     addFiles([...input.files], onChange);
     // Otherwise choosing the same file again would raise no event.
@@ -98,13 +98,8 @@ export function showAsks(asks, onChange) {
   };
 }
 
-/** Return the button that saves the calibration report of an answer. */
-export function reportButton(answer) {
-  return button("Calibration report", () => saveFile("calibration.html", answer.report, "text/html"), { class: "strong", id: "report" });
-}
-
 /** Build the inputs of the current door. */
-export function buildDoor(onChange, onInvalid) {
-  if (state.door === "recording") buildRecording(onChange);
-  else buildInputs(onChange, onInvalid);
+export function buildDoor(handlers) {
+  if (state.door === "recording") buildRecording(handlers.onChange);
+  else buildInputs(handlers);
 }

@@ -32,8 +32,9 @@ export function showHeadline({ label, answer }) {
   byId("numbers").textContent = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`).join(" · ");
 }
 
-/** Show warnings. */
-export function showWarnings({ answer: { warnings } }) {
+/** Show warnings, and those open that can change the verdict. */
+export function showWarnings({ answer: { warnings, open_warnings: open = [] } }) {
+  byId("open_warnings").replaceChildren(...open.map((warning) => element("li", {}, ...withSymbols(capitalize(warning)))));
   byId("warnings_section").hidden = !warnings.length;
   byId("warnings_title").textContent = warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`;
   byId("warnings").replaceChildren(...warnings.map((warning) => element("li", {}, ...withSymbols(warning))));

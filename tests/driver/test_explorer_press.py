@@ -1,0 +1,153 @@
+"""The curve of a press on the page: the fitted modulus, and files that are no curve."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+import thud
+from thud.explorer import server
+from thud.explorer.models import standard_ball
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+TRUE_RATIO = 1.1
+BALL = standard_ball()
+
+VALUES: dict[str, Any] = {"model": {"name": "modal_ball"}}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    """Return a client of the server that has the token."""
+    application = server.new_application({}, token="a", hosts=("127.0.0.1",))  # noqa: S106
+    with TestClient(application, base_url="http://127.0.0.1", headers={server.TOKEN: "a"}) as found:
+        yield found
+
+
+def curve(ratio: float = TRUE_RATIO) -> tuple[np.ndarray, np.ndarray]:
+    """Return deflection, mm, and force, N, of a press, with noise of 1 N."""
+    exact = thud.compress(BALL.ball, BALL.model or "modal_ball", max_deflection=0.03, points=61)
+    noise = np.random.default_rng(1).normal(size=exact.force.size)
+    return 1e3 * exact.deflection, ratio * exact.force + noise
+
+
+def table(titles: str, *columns: np.ndarray) -> str:
+    """Return a file of columns."""
+    rows = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
+    return "\n".join([*([titles] if titles else []), *rows])
+
+
+def fitted(client: TestClient, content: str, **fields: object) -> dict[str, Any]:
+    """Return the last report of a fit to the curve in a file."""
+    case = {"case": json.dumps(VALUES)}
+    response = client.post(
+        "/press", files={"file": ("press 1.csv", content)}, data=case | fields
+    )  # fmt: skip
+    assert response.status_code == 200, response.text
+    report: dict[str, Any] = json.loads(response.text.splitlines()[-1])
+    return report
+
+
+@pytest.mark.parametrize(
+    ("titles", "scales", "fields"),
+    [
+        ('"Deflection, mm","Force, N"', (1.0, 1.0), {}),
+        ("deflection_m,force_N", (1e-3, 1.0), {}),
+        ("Weg [mm],Standardkraft [kN]", (1.0, 1e-3), {}),
+        ("travel,load", (1.0, 1.0), {"press_deflection": "mm", "press_force": "N"}),
+        ("", (0.1, 1e-3), {"press_deflection": "cm", "press_force": "kN"}),
+    ],
+)
+def test_modulus_is_that_of_the_curve(
+    client: TestClient, titles: str, scales: tuple[float, float], fields: dict[str, str]
+) -> None:
+    deflection, force = curve()
+    content = table(titles, scales[0] * deflection, scales[1] * force)
+    answer = fitted(client, content, **fields)["answer"]
+    modulus = answer["values"]["ball"]["youngs_modulus"]
+    assert modulus == pytest.approx(TRUE_RATIO * BALL.ball.youngs_modulus, rel=0.02)
+    assert answer["name"] == "press 1"
+    assert answer["text"].startswith("Fitted to press 1.csv: Young's modulus 1.7")
+    assert "MPa (95 %). The curve differs from the model by " in answer["text"]
+    assert answer["text"].endswith("% of the largest force: the model explains the curve.")
+
+
+def test_unloading_branch_of_a_press_is_left_out(client: TestClient) -> None:
+    deflection, force = curve()
+    both = [np.concatenate([x, x[-2::-1]]) for x in (deflection, force)]
+    answer = fitted(client, table("deflection (mm),force (N)", *both))["answer"]
+    assert "60 points after the largest deflection are left out" in answer["details"]
+    assert answer["values"]["ball"]["youngs_modulus"] > 1.7e6
+
+
+def test_curve_that_the_model_does_not_explain_says_so(client: TestClient) -> None:
+    deflection, force = curve()
+    answer = fitted(client, table("deflection (mm),force (N)", deflection, force**2 / 400))[
+        "answer"
+    ]
+    assert answer["text"].endswith("see the warnings.")
+    assert "the model does not explain the curve" in answer["details"]
+
+
+@pytest.mark.parametrize(
+    ("content", "fields", "words"),
+    [
+        ("", {}, "press 1.csv: cannot be read (no numbers); allowed: a column of deflection"),
+        ("force (N)\n1\n2", {}, "press 1.csv: the file has 1 column of numbers; allowed: a column"),
+        (
+            "travel,force (N)\n0,0\n1,2",
+            {},
+            "press 1.csv: column 1, 'travel': its unit is not stated; allowed: mm, cm, m, um in",
+        ),
+        (
+            "travel (mm),load\n0,0\n1,2",
+            {},
+            "press 1.csv: column 2, 'load': its unit is not stated; allowed: N, kN",
+        ),
+        (
+            "travel (in),force (N)\n0,0\n1,2",
+            {},
+            "press 1.csv: column 1, 'travel': the unit 'in' is not known here",
+        ),
+        (
+            "travel (mm),force (N)\n0,0\n1,2",
+            {"press_deflection": "cm"},
+            "press 1.csv: column 1, 'travel': mm by its title, cm under “Unit of the deflection”",
+        ),
+        ("time,force (N)\n0,0\n1,2", {}, "press 1.csv: no column of deflection among column 1"),
+        (
+            "travel (mm),travel (cm),force (N)\n0,0,0\n1,1,2",
+            {},
+            "column 1, 'travel' and column 2, 'travel' may both be the deflection",
+        ),
+        ("travel (mm),force (N)\n0,0\n1,x", {}, "press 1.csv: line 3: 'x' is not a number"),
+        ("travel (mm),force (N)\n0,0\n1,nan", {}, "column 2, 'force': a value is not finite"),
+        ("travel (mm),force (N)\n0,0\n1,2", {}, "has 2 entries and force 2; allowed: the same num"),
+        (
+            "travel (mm),force (N)\n0,0\n1,-2\n2,-3\n3,-4\n4,-9",
+            {},
+            "press 1.csv: force does not rise with the deflection",
+        ),
+    ],
+)
+def test_bad_curves_name_file_column_and_what_is_expected(
+    client: TestClient, content: str, fields: dict[str, str], words: str
+) -> None:
+    report = fitted(client, content, **fields)
+    assert words in report["error"], report["error"]
+    assert report["field"] in {None, "press_deflection", "press_force"}
+    assert (report["field"] is not None) == (
+        "under “Unit" in words or "mm, cm" in words or "N, kN" in words or "'in'" in words
+    )
+
+
+def test_model_without_a_modulus_is_not_fitted_to_a_press(client: TestClient) -> None:
+    case = {"case": json.dumps({"model": {"name": "two_mass"}})}
+    report = fitted(client, "deflection (mm),force (N)\n0,0\n1,2", **case)
+    assert "a press determines no parameter of the model “Tyre: belt and rim”" in report["error"]
