@@ -102,7 +102,8 @@ contains
 
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
    !> that of the simply supported floor without further supports, its floating plate simply supported, too: its waves are so
-   !> short that these matter little. The power through bridges is that of infinite plates there.
+   !> short that these matter little. The middle of the floor represents it if not all of it is resolved. The power through
+   !> bridges is that of infinite plates there.
    subroutine get_radiation(room, floor, plate, modes, bands, radiation, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
@@ -117,14 +118,22 @@ contains
       type(floor_modes_type) :: simple_modes
       type(modal_radiation_type) :: beyond
       type(plate_type) :: simple_plate
+      real(wp) :: area(4)
       integer :: n
 
       n = count(bands%upper <= modes%limit/(2*pi))
-      call get_modal_radiation(modes, plate, room%air, bands(:n), get_area(room, plate), radiation)
+      area = get_area(room, plate)
+      call get_modal_radiation(modes, plate, room%air, bands(:n), area, radiation)
       if (n == size(bands)) return
       call floor%get_room_modes(uncoupled_support, simple_plate, simple_modes, error)
       if (allocated(error)) return
-      call get_modal_radiation(simple_modes, plate, room%air, bands(n + 1:), get_area(room, plate), beyond)
+      ! Of a floor whose middle represents it, as much of the middle as the room covers; losses keep energy near the strike.
+      associate (stack => simple_modes%stack)
+         if (stack%length*stack%width < plate%length*plate%width*(1 - 1.0e-9_wp)) area = &
+            [0.0_wp, min(area(2) - area(1), stack%length), 0.0_wp, min(area(4) - area(3), stack%width)]
+      end associate
+      call get_modal_radiation(simple_modes, plate, room%air, bands(n + 1:), area, beyond)
+      if (n > 0) beyond%energy_beyond = max(beyond%energy_beyond, radiation%energy_beyond(n))
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor]
       radiation%upper_factor = [radiation%upper_factor, beyond%upper_factor]
       radiation%energy_beyond = [radiation%energy_beyond, beyond%energy_beyond]

@@ -20,7 +20,8 @@ module thud_floor_model
    !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
 
-   !> Simply supported edges without further supports and rows across ribs, whose modes reach the highest frequency.
+   !> Simply supported edges without further supports and rows across ribs; of large floors the middle, as far as modes reach
+   !> the highest frequency of a rating.
    character(len=*), parameter :: uncoupled_support = 'uncoupled'
 
    !> The floor, whose components are its options: procedures name it `options`.

@@ -9,7 +9,7 @@ module thud_rectangular_floor
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: get_resistance, get_thin_limit, plate_type
-   use thud_plate_stack, only: edge_type, orthotropic_type, plate_stack_type, rigid_support
+   use thud_plate_stack, only: edge_type, get_resolved_part, orthotropic_type, plate_stack_type, rigid_support
    use thud_receiver, only: receiver_type
    use thud_screed, only: get_screed_edge, get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, &
       screed_type
@@ -29,6 +29,12 @@ module thud_rectangular_floor
 
    !> Minimum distance of two rigid lines, m: less than any wall or beam is thick.
    real(wp), parameter :: min_line_distance = 0.01_wp
+
+   !> Thickness of the thinnest subceiling whose waves are resolved, m: a metal sheet.
+   real(wp), parameter :: min_subceiling = 0.0005_wp
+
+   !> Frequency that uncoupled functions resolve, Hz: above the highest band of a rating.
+   real(wp), parameter :: resolved_limit = 800.0_wp
 
    !> Numbers of octaves and one-third-octave bands of a rating.
    integer, parameter :: octave_bands = 4, third_bands = 12
@@ -185,6 +191,9 @@ contains
       else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
          error = input_error('&'//trim(base%group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
             //' values and bridge_y '//to_text(options%screed%bridge_y%count)//'; allowed: the same number of both')
+      else if (options%has_subceiling() .and. options%subceiling%thickness < min_subceiling) then
+         error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(options%subceiling%thickness) &
+            //' m; allowed: 0, or 0.0005 to 0.2 m')
       end if
    contains
 
@@ -391,6 +400,7 @@ contains
          end if
          stack%radiator = size(stack%plate)
       end associate
+      if (is_uncoupled) stack = get_resolved_part(stack, resolved_limit)
    end function get_stack
 
    !> Whether a subceiling radiates into the room.

@@ -91,6 +91,8 @@ contains
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
       allocate (radiation%radiated(size(bands)), radiation%energy_beyond(size(bands)))
+      allocate (radiation%upper_factor(size(bands)))
+      if (size(bands) == 0) return
       highest = 2*pi*maxval(bands%upper)/air%sound_speed
       part = new_part(modes, area)
       couples_all = all([area(2) - area(1), area(4) - area(3)] &
@@ -119,8 +121,8 @@ contains
             call add_modes(get_coupled_modes(modes, part, radiator, kept, mixing), pole, air, bands(i), &
                get_some(along, radiator%x), get_some(across, radiator%y), sums)
          end if
-         if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > modes%known_limit) then
-            ! A plate without modes there, or without known ones.
+         if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) then
+            ! A plate without modes there, or without resolved or known ones.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
             radiation%conductance(i) = 1/get_resistance(plate)
             radiation%radiated(i) = 0.0_wp

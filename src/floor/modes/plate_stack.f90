@@ -9,7 +9,7 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, point_spring_type, ribs_type, rigid_support
-   public :: get_counts, get_degree, get_resolved_frequency, get_twisting_ribs, has_sines, is_uncoupled
+   public :: get_counts, get_degree, get_resolved_frequency, get_resolved_part, get_twisting_ribs, has_sines, is_uncoupled
    public :: with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
@@ -22,6 +22,9 @@ module thud_plate_stack
 
    !> Ratio of the number of modes of a beam to that of the half waves which they resolve.
    real(wp), parameter :: beam_ratio = 1.2_wp
+
+   !> Longer side of the smallest part of a floor that represents it, m.
+   real(wp), parameter :: min_part = 1.0_wp
 
    !> Number of sines per rib, and in all, that resolve the curvature at ribs by themselves.
    integer, parameter :: min_sines(2) = [8, 50]
@@ -144,6 +147,55 @@ contains
          n = n + [(size(get_twisting_ribs(plate, direction, n(direction))), direction=1, 2)]
       end function get_all_counts
    end function get_resolved_frequency
+
+   !> The middle of a stack, as large as functions resolve its waves up to a frequency: as a rule all of it. Supports at lines
+   !> and springs at points stay behind.
+   pure function get_resolved_part(stack, frequency) result(part)
+      type(plate_stack_type), intent(in) :: stack
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      type(plate_stack_type) :: part
+
+      part = stack
+      do while (get_resolved_frequency(part, frequency) < frequency .and. max(part%length, part%width) > min_part)
+         if (part%length > part%width) then
+            call shorten(part%length, .true.)
+         else
+            call shorten(part%width, .false.)
+         end if
+      end do
+   contains
+
+      !> Shortens a side, with the positions across it.
+      pure subroutine shorten(side, is_length)
+         real(wp), intent(inout) :: side
+         logical, intent(in) :: is_length
+         real(wp) :: cut
+         integer :: i, j
+
+         cut = 0.05_wp*side
+         side = side - 2*cut
+         do i = 1, size(part%plate)
+            if (.not. allocated(part%plate(i)%ribs)) cycle
+            do j = 1, size(part%plate(i)%ribs)
+               associate (ribs => part%plate(i)%ribs(j))
+                  if (ribs%along_width .eqv. is_length) call move(ribs%position, cut, side)
+               end associate
+            end do
+         end do
+         do i = 1, size(part%layer)
+            if (allocated(part%layer(i)%line_y) .and. .not. is_length) call move(part%layer(i)%line_y, cut, side)
+         end do
+      end subroutine shorten
+
+      !> Moves positions, without those beyond the new side.
+      pure subroutine move(position, cut, side)
+         real(wp), allocatable, intent(inout) :: position(:)
+         real(wp), intent(in) :: cut, side
+
+         position = pack(position - cut, position > cut .and. position < cut + side)
+      end subroutine move
+   end function get_resolved_part
 
    !> Whether each mode of a stack has one number of half waves along the length and one along the width.
    pure function is_uncoupled(stack) result(yes)
