@@ -179,7 +179,7 @@ function ballInputs(handlers) {
   const lines = about.presets.filter((preset, i) => i < 2 || preset === chosen);
   const common = commonGroups();
   const own = findGroup("model", state.model);
-  const [pressButton, pressPanel] = pressInputs(handlers.onPress);
+  const [pressButton, pressPanel] = pressInputs(about.press, handlers.onPress);
   return [
     element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices, pressButton), pressPanel,
       element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`))), agingElement(handlers)),
