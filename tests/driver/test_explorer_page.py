@@ -370,6 +370,48 @@ def test_focus_moves_no_field(browser: Browser, server: Served, width: int) -> N
     sync_api.expect(wall).to_have_value("32")
 
 
+def test_help_on_a_phone_hides_no_row_beside_its_owner(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0], 400)
+    box = "box => (({ top, bottom }) => [top, bottom])(box.getBoundingClientRect())"
+    rows = field(page, "ball.wall_thickness"), field(page, "ball.mass")
+    for at in range(2):
+        rows[at].focus()
+        top, _ = field(page, f"ball.{('wall_thickness', 'mass')[at]}.help").evaluate(box)
+        assert max(row.evaluate(box)[1] for row in rows) < top
+    terms = page.locator("#criteria .term")
+    for at in (1, terms.count() - 2):
+        terms.nth(at).focus()
+        tip = page.locator("#tip").evaluate(box)
+        for row in (at - 1, at, at + 1):
+            top, bottom = terms.nth(row).evaluate(box)
+            assert bottom < tip[0] or top > tip[1]
+    # Enter on a value that was asked for goes on to the next.
+    open_door(page, "recording")
+    page.locator("#file").set_input_files(RECORDING)
+    settle(page)
+    page.locator("#ask_height").fill("1")
+    page.locator("#ask_height").press("Enter")
+    settle(page)
+    sync_api.expect(page.locator("#ask_height")).to_have_count(0)
+    sync_api.expect(page.locator("#ask_mass")).to_be_focused()
+
+
+def test_changed_construction_is_named_as_changed(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "floor")
+    page.locator("#construction").select_option("concrete 180")
+    settle(page)
+    subject = page.locator("#verdict .subject")
+    sync_api.expect(subject).to_have_text("Concrete 180 ")
+    fill(page, "plate.thickness", "190")
+    settle(page)
+    sync_api.expect(subject).to_have_text("Concrete 180, slab changed to 190 mm ")
+    # The room is not part of the construction.
+    fill(page, "room.reverberation_time", "0.8")
+    settle(page)
+    sync_api.expect(subject).to_have_text("Concrete 180, slab changed to 190 mm, T 0.8 s ")
+
+
 def test_slider_of_a_standard_ball_is_not_at_its_end(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("[id='modal_ball.loss_factor'] + input").focus()

@@ -106,7 +106,7 @@ async function solve() {
       : await runTask("Computing", "solve", body, thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
     clearTimeout(dimming);
     if (isRecording) current.recording = recordedVariant(answer, body);
-    else current[door] = { door, style: 0, values, answer, slow: thisJob.slow, ...(door === "ball" && fitted.name && JSON.stringify(values) === fitted.values ? { title: fitted.name } : {}) };
+    else current[door] = { door, style: 0, values, chosen: state.chosen, answer, slow: thisJob.slow, ...(door === "ball" && fitted.name && JSON.stringify(values) === fitted.values ? { title: fitted.name } : {}) };
     if (state.door !== door || job !== thisJob) return;
     hideMessage();
     setOutdated(false, thisJob.repeat);

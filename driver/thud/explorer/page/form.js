@@ -122,12 +122,14 @@ function setFloor(name) {
 const filledFields = (construction) => findGroup("floor", construction.floor).fields;
 const ceilingFields = () => findGroup("room", "room").fields.filter((field) => field.name.startsWith("ceiling_"));
 
-/** Return the construction whose values the form has, if there is one; of several, the chosen one. */
+/** Return the construction whose values the form has, if there is one, and choose it; of several, the chosen one. */
 function findConstruction() {
   const hasValues = (fields, values) => fields.every((field) => isSame(valueOf(field), values[field.name] ?? field.default));
   const equal = about.constructions.filter((construction) => construction.floor === state.floor && hasValues(filledFields(construction), construction.keys)
     && (state.room ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
-  return equal.find(({ name }) => name === state.chosen) ?? equal[0];
+  const construction = equal.find(({ name }) => name === state.chosen) ?? equal[0];
+  if (construction) state.chosen = construction.name;
+  return construction;
 }
 
 /** Fill the fields of floor and ceiling with the values of a construction; a ceiling needs the room below. */
@@ -177,7 +179,7 @@ function ballInputs(handlers) {
   const lines = about.presets.filter((preset, i) => i < 2 || preset === chosen);
   const common = commonGroups();
   const own = findGroup("model", state.model);
-  const [pressButton, pressPanel] = pressInputs(handlers.onPress);
+  const [pressButton, pressPanel] = pressInputs(about.press, handlers.onPress);
   return [
     element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices, pressButton), pressPanel,
       element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`))), agingElement(handlers)),

@@ -1,6 +1,5 @@
 // The curve of a press, from which the modulus of the ball is fitted.
 import { button, byId, element } from "./page.js";
-import { about } from "./form.js";
 
 /** The file that was chosen last, and units of columns whose titles state none. */
 const press = { isOpen: false, file: null, units: {} };
@@ -10,8 +9,8 @@ export function closePress() {
   press.isOpen = false;
 }
 
-/** Return the button of the curve of a press, and what it opens; `onPress` is called with the form to fit. */
-export function pressInputs(onPress) {
+/** Return the button of the curve of a press, and what it opens, with the declared fields; `onPress` is called with the form to fit. */
+export function pressInputs(declared, onPress) {
   const send = () => {
     const body = new FormData();
     for (const [name, unit] of Object.entries(press.units)) if (unit) body.set(name, unit);
@@ -33,7 +32,7 @@ export function pressInputs(onPress) {
     document.body.classList.remove("dragging");
     if (event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
   });
-  const fields = about.press.map(({ name, label, choices }) => {
+  const fields = declared.map(({ name, label, choices }) => {
     const options = Object.entries({ "": "in the title", ...choices }).map(([value, text]) => element("option", { value }, text));
     const select = element("select", { id: name, "aria-describedby": `${name}.error` }, ...options);
     select.value = press.units[name] ?? "";

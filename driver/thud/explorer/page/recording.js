@@ -87,7 +87,8 @@ export function showAsks(asks, onChange) {
     return element("div", {}, element("p", {}, reason), ...inputs);
   });
   form.replaceChildren(...cards, ...(cards.length ? [button("Assess with this", () => {}, { class: "strong", type: "submit", id: "assess" })] : []));
-  if (focus) byId(focus)?.focus();
+  // After Enter the next value is missing.
+  if (focus) (byId(focus) ?? form.querySelector("input"))?.focus();
   form.onsubmit = (event) => {
     event.preventDefault();
     for (const [name, value] of new FormData(form)) {

@@ -192,6 +192,14 @@ function showTip(owner, lines) {
   tip.hidden = false;
   const at = owner.getBoundingClientRect();
   const isBelow = at.bottom + tip.offsetHeight + 8 < innerHeight;
+  // On a phone it stands at the bottom, away from the rows beside its owner, or at the top.
+  const isNarrow = tip.offsetWidth > innerWidth - 40;
+  if (isNarrow) {
+    const bottom = innerHeight - tip.offsetHeight - 4;
+    tip.style.left = "8px";
+    tip.style.top = `${at.bottom + at.height < bottom ? bottom : byId("headline").getBoundingClientRect().bottom + 4}px`;
+    return;
+  }
   tip.style.left = `${Math.max(8, Math.min(at.left, innerWidth - tip.offsetWidth - 8))}px`;
   tip.style.top = `${isBelow ? at.bottom + 4 : Math.max(4, at.top - tip.offsetHeight - 4)}px`;
 }

@@ -26,8 +26,9 @@ export function nameVariants(variants) {
     .filter((key) => models.length === 1 || new Set(models.map(({ values }) => valueText(values, key))).size > 1);
   for (const [i, variant] of models.entries()) {
     const { base, changes } = described[i];
-    const words = keys.filter((key) => isShared || changes.has(key)).map((key) => wordsOf(key, variant.values));
-    const shown = [...(isShared && words.length ? [] : [base]), ...words.slice(0, MAX_DIFFERENCES), ...(words.length > MAX_DIFFERENCES ? ["…"] : [])];
+    const hasBase = !isShared || !keys.length;
+    const words = keys.filter((key) => isShared || changes.has(key)).map((key) => wordsOf(key, variant.values, hasBase));
+    const shown = [...(hasBase ? [base] : []), ...words.slice(0, MAX_DIFFERENCES), ...(words.length > MAX_DIFFERENCES ? ["…"] : [])];
     variant.label = variant.title ?? capitalize(shown.join(", "));
   }
   for (const variant of variants) if (!variant.values) variant.label = variant.title ?? variant.name;
@@ -40,7 +41,7 @@ export function nameVariants(variants) {
 }
 
 /** Return the preset or construction that is closest to a case, and the changed keys, "group.key". */
-function describe({ values }) {
+function describe({ values, chosen }) {
   const model = values.model.name;
   const presets = about.presets.filter((preset) => preset.door === "ball" && preset.values.model.name === model)
     .map((preset) => ({ base: preset.title, values: preset.values }));
@@ -48,7 +49,7 @@ function describe({ values }) {
   if (!values.floor) return source;
   const name = values.floor.name;
   const constructions = about.constructions.filter((entry) => entry.floor === name).map((entry) => ({ base: entry.name, values: { [name]: withoutDefaults(name, entry.keys), room: entry.room } }));
-  const floor = closest(values, (group) => group === name || group === "room", [...constructions, { base: factsOf("floor", name).title, values: factsOf("floor", name).values }]);
+  const floor = closest(values, (group) => group === name || group === "room", [...constructions, { base: factsOf("floor", name).title, values: factsOf("floor", name).values }], chosen);
   const isStandard = source.base === about.presets[0].title && !source.changes.size;
   return { base: isStandard ? floor.base : `${floor.base}, ${source.base.toLowerCase()}`, changes: new Map([...floor.changes, ...source.changes]) };
 }
@@ -59,32 +60,41 @@ function withoutDefaults(floor, keys) {
   return Object.fromEntries(Object.entries(keys).filter(([name, value]) => JSON.stringify(findField(floor, name)?.default) !== JSON.stringify(value)));
 }
 
-function closest(values, isOwn, candidates) {
+/** Return the candidate with the fewest changes; of several, the chosen one, or that with the smallest changes. */
+function closest(values, isOwn, candidates, chosen) {
   const results = candidates.map((candidate) => {
     const keys = new Set([values, candidate.values].flatMap((groups) => Object.entries(groups).filter(([group]) => isOwn(group)).flatMap(([group, own]) => Object.keys(own).map((name) => `${group}.${name}`))));
     const changes = [...keys].filter((key) => valueText(values, key) !== valueText(candidate.values, key));
-    return { base: candidate.base, changes: new Map(changes.map((key) => [key, true])) };
+    const size = candidate.base === chosen ? 0 : changes.reduce((sum, key) => sum + Math.abs(Math.log(keyValue(values, key) / keyValue(candidate.values, key)) || 0), 0);
+    return { base: candidate.base, changes: new Map(changes.map((key) => [key, true])), size };
   });
-  return results.reduce((best, result) => (result.changes.size < best.changes.size ? result : best));
+  return results.reduce((best, result) => (result.changes.size - best.changes.size || result.size - best.size) < 0 ? result : best);
+}
+
+function keyValue(values, key) {
+  const [group, name] = key.split(".");
+  return values[group]?.[name] ?? findField(group, name)?.default;
 }
 
 /** Return the text of the value of a key, "group.key", in the unit of its field. */
 function valueText(values, key) {
   const [group, name] = key.split(".");
   const field = findField(group, name);
-  const value = values[group]?.[name] ?? field?.default;
+  const value = keyValue(values, key);
   if (typeof value === "number") return `${Number(scaled(value, -(field?.power ?? 0)).toPrecision(4))} ${field?.unit ?? ""}`.trim();
   if (typeof value === "boolean") return value ? "on" : "off";
-  return field?.choices?.[value] ?? [value].flat().join(" ");
+  if (Array.isArray(value)) return `${value.join(" ")} ${field?.unit ?? ""}`.trim();
+  return field?.choices?.[value] ?? String(value);
 }
 
-/** Return name and value of a key; with a floor, fields with the same label have the name of their group. */
-function wordsOf(key, values) {
+/** Return name and value of a key; with a floor, fields with the same label have the name of their group, and behind the name of a construction its values are changed ones. */
+function wordsOf(key, values, hasBase) {
   const [group, name] = key.split(".");
   const label = findField(group, name)?.label;
   const parts = new Set(about.form.filter(({ fields }) => fields.some((field) => field.label === label)).map(({ part }) => part));
   const owner = values.floor && parts.size > 1 ? `${about.form.find((entry) => entry.name === group)?.title.toLowerCase() ?? group} ` : "";
-  return `${WORDS[key] ?? `${owner}${label?.toLowerCase() ?? name}`} ${valueText(values, key)}`;
+  const changed = hasBase && group === values.floor?.name ? " changed to" : "";
+  return `${WORDS[key] ?? `${owner}${label?.toLowerCase() ?? name}`}${changed} ${valueText(values, key)}`;
 }
 
 /** Return values as rows: group, label and text, for pages. */
