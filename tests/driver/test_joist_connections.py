@@ -124,3 +124,18 @@ def test_connections_that_cannot_be_are_refused(keys: dict[str, Any], words: str
     with pytest.raises(thud.InputError, match=re.escape(words)) as refused:
         thud.mobility(replace(JOISTS, **keys), [50.0])
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("keys", [{}, {"subceiling_thickness": 0.0125, "cavity_depth": 0.247}])
+def test_level_below_joists_hardly_depends_on_the_width_of_the_floor(
+    keys: dict[str, float],
+) -> None:
+    """Modes of wide floors end below the bands; their middle represents them there."""
+    impact = thud.solve(model="modal_ball")
+    room = thud.Room(length=6.0, width=5.0, height=2.5)
+    narrow, wide = (
+        thud.predict_level(impact, thud.JoistFloor(length=6.0, width=width, **keys), room).level
+        for width in (5.0, 20.0)
+    )
+    # Parts of the energy are beyond the room.
+    assert np.max(abs(wide - narrow)[5:]) < 4.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -234,3 +235,9 @@ def test_limits_of_cavity_and_board_are_warned_of() -> None:
     warnings = thud.solve(model="hollow_sphere", floor=thick).warnings
     assert any("six thicknesses of the subceiling" in warning for warning in warnings)
     assert not any("subceiling" in warning for warning in thud.solve(floor=CONCRETE).warnings)
+
+
+def test_foils_are_no_subceilings() -> None:
+    floor = thud.Plate(subceiling_thickness=1e-4)
+    with pytest.raises(thud.InputError, match=re.escape("allowed: 0, or 0.0005 to 0.2 m")):
+        thud.solve(floor=floor)

@@ -102,11 +102,7 @@ contains
          across = new_wave_series(displacement%y, area(3:4), highest)
       end associate
       do i = 1, size(bands)
-         kept = pack([(k, k=1, size(modes%omega))], &
-            modes%omega < min(modes%limit, max(max_ratio*2*pi*bands(i)%upper, min_highest)))
-         ! Of so many modes, those far from the band matter little.
-         if (size(kept) > merge(max_coupled, max_modes, couples_all)) kept = pack(kept, &
-            modes%omega(kept) > 2*pi*bands(i)%lower/near_ratio .and. modes%omega(kept) < 2*pi*bands(i)%upper*near_ratio)
+         kept = get_participating(modes, bands(i), merge(max_coupled, max_modes, couples_all))
          pole = get_poles(modes, kept)
          pole%re = max(pole%re, min_omega**2)
          pole%im = max(pole%im, min_loss_factor*pole%re)
@@ -140,6 +136,32 @@ contains
       ! The upper side of a floor with a subceiling is that of the bearing plate.
       if (modes%stack%radiator /= modes%stack%bearing) radiation%upper_factor = get_plate_radiation(plate, air, bands%center)
    end subroutine get_modal_radiation
+
+   !> Numbers of the modes that take part in a band: all up to `max_ratio`, or, if these are too many, those near the band.
+   !> Modes of plates above each other with one number of half waves stay together, as their motions cancel.
+   pure function get_participating(modes, band, max_count) result(kept)
+      type(floor_modes_type), intent(in) :: modes
+      type(band_type), intent(in) :: band
+      !> Number of modes above which fewer take part.
+      integer, intent(in) :: max_count
+      integer, allocatable :: kept(:)
+      logical :: is_kept(size(modes%omega))
+      integer :: i, k, n
+
+      is_kept = modes%omega < min(modes%limit, max(max_ratio*2*pi*band%upper, min_highest))
+      if (count(is_kept) > max_count) then
+         is_kept = is_kept .and. modes%omega > 2*pi*band%lower/near_ratio .and. modes%omega < 2*pi*band%upper*near_ratio
+         n = 0
+         do i = 1, size(modes%modes%block)
+            associate (n_mode => size(modes%modes%block(i)%omega))
+               if (n_mode <= size(modes%stack%plate)) is_kept(n + 1:n + n_mode) = any(is_kept(n + 1:n + n_mode)) &
+                  .and. modes%omega(n + 1:n + n_mode) < modes%limit
+               n = n + n_mode
+            end associate
+         end do
+      end if
+      kept = pack([(k, k=1, size(is_kept))], is_kept)
+   end function get_participating
 
    !> Integrals over the frequencies of a band and means over strike points, with the cross terms of the modes.
    subroutine add_strikes(radiator, bearing, part, pole, mixing, drive, air, band, along, across, sums)
