@@ -148,8 +148,8 @@ contains
       end function get_all_counts
    end function get_resolved_frequency
 
-   !> The middle of a stack without further supports, as large as functions resolve its waves up to a frequency: as a rule all
-   !> of it.
+   !> The middle of a stack without further supports, as large as functions resolve its waves up to a frequency: as a rule
+   !> all of it.
    pure function get_resolved_part(stack, frequency) result(part)
       type(plate_stack_type), intent(in) :: stack
       !> Frequency, Hz.
