@@ -147,7 +147,8 @@ def test_page_begins_with_a_ball_that_conforms() -> None:
     assert first["door"] == "ball"
     answer = answer_case(new_case(first["values"]))
     assert answer["conforms"]
-    assert answer["headline"]["text"] == "conforms"
+    assert answer["headline"]["text"] == "conforms by this model"
+    assert "what is not known of the source is not counted" in answer["headline"]["detail"]
 
 
 def test_modulus_that_is_too_low_is_named_with_three_digits() -> None:
@@ -205,7 +206,25 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
     values = {**slab, "model": {"name": "hollow_sphere"}, "room": {"required": 49.0}}
     headline = answer_case(new_case(values))["headline"]
     assert headline["result"] == "undecided"
-    assert headline["detail"].startswith(f"L_iA,Fmax of octaves (KS F 2863-2): {headline['text']}")
+    assert headline["detail"].startswith("L_iA,Fmax of octaves (KS F 2863-2), required 49 dB")
+    assert "undecided: the source does not conform" in headline["detail"]
+
+
+def test_headline_of_a_room_names_the_bands_of_its_rating() -> None:
+    (slab,) = (preset["values"] for preset in presets() if preset["name"] == "slab")
+    bands = {
+        rating: answer_case(
+            new_case({**slab, "room": {"required": 49.0, "required_rating": rating}})
+        )["headline"]["bands"]
+        for rating in ("octaves", "thirds", "standardized")
+    }
+    assert bands == {
+        "octaves": "octaves", "thirds": "one-third octaves",
+        "standardized": "one-third octaves, standardized",
+    }  # fmt: skip
+    headline = answer_case(new_case(slab))["headline"]
+    assert headline["bands"] == "one-third octaves"
+    assert headline["detail"].startswith("L_iA,Fmax of one-third octaves (ISO 717-2)")
 
 
 def test_every_criterion_names_standard_and_limits_and_explains_itself() -> None:

@@ -13,7 +13,7 @@ from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse
 from thud.case.case import tables_case
 from thud.case.keys import humanize
-from thud.explorer.criteria import criterion_facts, room_headline, source_headline
+from thud.explorer.criteria import criterion_facts, model_headline, room_headline, unknowns_text
 from thud.explorer.messages import in_words
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.motion import motion_of
@@ -107,9 +107,11 @@ def answer_case(case: Case) -> Answer:
     if not math.isnan(error):
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
     verdict = assess_impact(impact)
-    answer["headline"] = source_headline(assessed, verdict)
+    answer["headline"] = model_headline(case, assessed, verdict)
     if verdict:
-        answer["model_verdict"] = {"result": verdict.result, "reason": verdict.reason}
+        answer["model_verdict"] = {
+            "result": verdict.result, "reason": verdict.reason, "unknowns": unknowns_text(verdict),
+        }  # fmt: skip
         answer["warnings"] += verdict.warnings
         for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
             entry["range"] = criterion.range
@@ -118,7 +120,7 @@ def answer_case(case: Case) -> Answer:
     answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
     if case.room is not None and case.floor is not None:
         prediction = predict_level(impact)
-        answer["room"] = _room(prediction)
+        answer["room"] = _room(prediction) | {"source": answer["headline"]}
         answer["headline"] = room_headline(prediction)
         known = answer["warnings"]
         answer["warnings"] += [text for text in prediction.warnings if text not in known]

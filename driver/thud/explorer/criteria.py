@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import TYPE_CHECKING, Any
 
+from thud.base._schema import RATINGS
+from thud.base.units import scaled
+from thud.case.keys import humanize
+from thud.explorer.form import fields_by_key
+from thud.explorer.messages import lower
 from thud.level.assessment import VERDICTS
 from thud.report.page import STANDARDS
+from thud.studies.bundled_surrogate import reason_without_defaults
 from thud.studies.model_verdict import OUTCOMES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from thud.base._schema import LimitsSource
+    from thud.base._schema import LimitsSource, RoomRequiredRating
+    from thud.case.case import Case
     from thud.floors.prediction import RoomPrediction
     from thud.level.assessment import Criterion, Verdict
     from thud.studies.model_verdict import ModelCriterion, ModelVerdict
@@ -27,7 +35,15 @@ RESULTS = {
     "not met": "fails",
     "undecided": "undecided",
 }
-# Maximum number of criteria in a headline.
+# Words of the results.
+WORDS = {"conforms": VERDICTS[0], "fails": VERDICTS[1], "undecided": "undecided"}
+# Bands of the ratings of a room.
+BANDS: dict[RoomRequiredRating, str] = {
+    "octaves": "octaves",
+    "thirds": "one-third octaves",
+    "standardized": "one-third octaves, standardized",
+}
+# Maximum number of criteria with values in a headline.
 MAX_NAMED = 2
 TRANSCRIBED = "Nominal value and tolerance of these tables, from a published transcription."
 OCTAVE = (
@@ -67,45 +83,139 @@ def criterion_facts(name: str, source: LimitsSource) -> dict[str, str]:
     }
 
 
-def source_headline(verdict: Verdict, model: ModelVerdict | None) -> dict[str, str]:
-    """Return text, result and detail of the verdict on a source.
+def recording_headline(verdict: Verdict, excluded: str, *, is_stated: bool) -> dict[str, str]:
+    """Return text, result and detail of the verdict on a recording.
 
-    The verdict of a model over what is not known goes before that of its values.
+    The detail of an undecided level names the largest contribution to its uncertainty; `excluded`
+    is a sentence on what the uncertainty lacks, and `is_stated` whether the source is stated.
     """
-    outcome = model.result if model else verdict.result
-    result = RESULTS[outcome]
-    if model:
-        causes = [_range_text(entry) for entry in model.criteria if entry.result == outcome]
-        detail = f"Probability of conformity {model.shown_probability} over what is not known."
-    else:
-        causes = [_cause(entry) for entry in verdict.criteria if entry.result == outcome]
-        detail = f"Limits of the {verdict.source.replace('_', ' ')}: {STANDARDS[verdict.source]}."
-    words = {"fails": VERDICTS[1]}.get(result, result)
+    result = RESULTS[verdict.result]
+    parts = [_largest_contribution(verdict) if result == "undecided" else "", excluded]
+    parts.append(_standard(verdict))
+    if not is_stated:
+        parts.append("The source is not stated: these limits are assumed.")
+    detail = " ".join(filter(None, parts))
+    return _headline(verdict, result, WORDS[result], detail)
+
+
+def _largest_contribution(verdict: Verdict) -> str:
+    """Return the largest contribution to the first undecided level, as a sentence, or nothing."""
+    undecided = [entry for entry in verdict.criteria if entry.result == VERDICTS[2]]
+    for entry in undecided:
+        parts = [part for part in entry.estimate.contributions if part.counted]
+        if entry.unit == "dB" and parts:
+            largest = max(parts, key=lambda part: part.uncertainty)
+            title = entry.quantity.title
+            return f"Largest contribution to the uncertainty of {title}: {largest.name}."
+    return ""
+
+
+def model_headline(
+    case: Case, verdict: Verdict, ranges: ModelVerdict | None = None
+) -> dict[str, str]:
+    """Return text, result and detail of the verdict on the source of a case.
+
+    The verdict over what is not known, `ranges`, goes before that of the values of the model.
+    """
+    if ranges is None:
+        detail = f"{_without_ranges(case)} {_standard(verdict)}"
+        words = f"{WORDS[RESULTS[verdict.result]]} by this model"
+        return _headline(verdict, RESULTS[verdict.result], words, detail)
+    result = RESULTS[ranges.result]
+    names = [_label(entry.key) for entry in ranges.unknowns]
+    detail = (
+        f"Probability of conformity {ranges.shown_probability} over the ranges of "
+        f"{_joined(names)}, whatever the fields state within them. {_standard(verdict)}"
+    )
+    words = WORDS[result]
+    entries = [entry for entry in ranges.criteria if entry.result == ranges.result]
+    causes = {entry.criterion.quantity.title: _range_text(entry) for entry in entries}
     if result == "conforms":
-        return {"text": words, "result": result, "detail": f"{_closest(verdict)} {detail}"}
+        return _headline(verdict, result, words, detail)
     return {"text": f"{words}: {_listed(causes)}", "result": result, "detail": detail}
 
 
+def _headline(verdict: Verdict, result: str, words: str, detail: str) -> dict[str, str]:
+    """Return the headline of a verdict by its values, with their causes or the closest limit."""
+    if result == "conforms":
+        return {"text": words, "result": result, "detail": f"{_closest(verdict)} {detail}"}
+    entries = [entry for entry in verdict.criteria if entry.result == verdict.result]
+    causes = {e.quantity.title: _cause(e) for e in entries if not math.isnan(e.value)}
+    unknown = [entry.quantity.title for entry in entries if math.isnan(entry.value)]
+    return {"text": f"{words}: {_listed(causes, unknown)}", "result": result, "detail": detail}
+
+
+def _standard(verdict: Verdict) -> str:
+    return f"Limits of the {verdict.source.replace('_', ' ')}: {STANDARDS[verdict.source]}."
+
+
+def _without_ranges(case: Case) -> str:
+    """Return why the verdict on a case has no range, as a sentence."""
+    text = "Values of the model only: what is not known of the source is not counted"
+    if case.unknowns:
+        return f"{text}; thud-driver assess counts the stated unknowns."
+    outside = re.fullmatch(
+        r"(\w+) = \S+, allowed: (\S+) <= \w+ <= (\S+)", reason_without_defaults(case)
+    )
+    if outside is None:
+        return f"{text}."
+    field = next(item for (_, name), item in fields_by_key().items() if name == outside[1])
+    low, high = (f"{scaled(float(end), -field['power']):g}" for end in outside.groups()[1:])
+    ends = f"{low} to {high} {field['unit']}".rstrip()
+    return f"{text}; its ranges are known for {lower(field['label'])} {ends}."
+
+
+def _label(key: str) -> str:
+    """Return the label of a key for the middle of a sentence."""
+    labels = (item["label"] for (_, name), item in fields_by_key().items() if name == key)
+    return lower(next(labels, humanize(key)))
+
+
+def unknowns_text(ranges: ModelVerdict) -> str:
+    """Return the ranges of the unknowns of a verdict, such as ``"friction 0 to 1"``."""
+    _, *rows = ranges.unknown_rows()
+    parts = []
+    for entry, (label, low, high, *_) in zip(ranges.unknowns, rows, strict=True):
+        unit = label.partition(", ")[2]
+        parts.append(f"{_label(entry.key)} {low} to {high} {unit}".rstrip())
+    return ", ".join(parts)
+
+
 def room_headline(prediction: RoomPrediction) -> dict[str, str]:
-    """Return text, result and detail of the level in a room; with a requirement, of its rating."""
+    """Return text, result and detail of the level in a room; with a requirement, of its rating.
+
+    The text names the bands of the rating, as ratings of other bands differ.
+    """
     required = prediction.requirement
-    name = f"{prediction.rated_name}{prediction.standards[0]}"
+    name = required.rating if required else "thirds"
+    title = RATINGS[name] if prediction.is_ball else f"A-weighted level ({name})"
     if required:
         # A source that does not conform is named after the verdict.
         result = RESULTS[required.verdict.partition(":")[0]]
-        text, parts = required.shown, [str(required), f"{name} {prediction.rated_text}"]
+        text, parts = required.shown, [f"{title}, required {required.required:g} dB"]
+        if required.verdict.startswith("undecided:"):
+            parts.append(required.verdict)
+        parts.append(f"{prediction.rated_name}{prediction.standards[0]} {prediction.rated_text}")
     else:
-        result, text, parts = "level", prediction.rated_text, [f"{name} with its range"]
+        result, text, parts = "level", prediction.rated_text, [f"{title} with its range"]
     if prediction.class_text:
         parts.append(f"KS F 2863-2: {prediction.class_text}")
-    return {"text": text, "result": result, "detail": "; ".join(parts)}
+    return {"text": text, "result": result, "bands": BANDS[name], "detail": "; ".join(parts)}
 
 
-def _listed(causes: Sequence[str]) -> str:
-    """Return the first causes and the number of the others."""
-    rest = len(causes) - MAX_NAMED
-    more = f" and {rest} more" if rest > 0 else ""
-    return "; ".join(causes[:MAX_NAMED]) + more
+def _listed(causes: Mapping[str, str], unknown: Sequence[str] = ()) -> str:
+    """Return the first causes, the titles of the others, and those of unknown quantities."""
+    parts = list(causes.values())[:MAX_NAMED]
+    if rest := list(causes)[MAX_NAMED:]:
+        parts.append(f"also {_joined(rest)}")
+    if unknown:
+        parts.append(f"{_joined(unknown)} not known")
+    return "; ".join(parts)
+
+
+def _joined(names: Sequence[str]) -> str:
+    """Return names joined by commas and "and"."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _closest(verdict: Verdict) -> str:
@@ -118,8 +228,6 @@ def _closest(verdict: Verdict) -> str:
 def _cause(criterion: Criterion) -> str:
     """Return name, value and limit of a criterion that is not met or not decided."""
     quantity = criterion.quantity
-    if math.isnan(criterion.value):
-        return f"{quantity.title} not known"
     value, expanded = criterion.value, criterion.estimate.expanded
     if criterion.result == VERDICTS[1]:
         is_low = value < criterion.lower

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 CALIBRATION_ERROR = 0.05
 # Effects on a level that no uncertainty includes: dB and Hz, or Hz and dB.
 _SIZED = re.compile(
-    r"(?:with half of it|its correction,) (?P<size>[\d.]+) dB at (?P<band>[\d.]+) Hz"
+    r"its correction, (?P<size>[\d.]+) dB at (?P<band>[\d.]+) Hz"
     r"|octave of (?P<other_band>[\d.]+) Hz may be off by (?P<other_size>[\d.]+) dB"
 )
-_ASSUMED = "not stated, and assumed for levels and peak: "
 _NOT_STATED = "uncertainty not stated, and not included: "
 # Warnings on other criteria, and on effects that are included or asked for.
 _OTHER = re.compile(
-    r"restitution|number of peaks|mass is not stated|no bounce|uncertainty|keeps ringing"
+    r"not stated, and assumed|restitution|number of peaks|mass is not stated|no bounce|uncertainty"
+    r"|keeps ringing"
 )
 
 
@@ -45,7 +45,7 @@ def _distance(criterion: Criterion) -> float:
 
 
 def _decisive(warning: str, distances: dict[str, float]) -> Iterator[str]:
-    """Yield the parts of a warning that can change a verdict, each as a sentence."""
+    """Yield a warning, or its part, that can change a verdict."""
     if warning.startswith(_NOT_STATED):
         name = min(distances, key=lambda band: distances[band])
         error = 10 ** (distances[name] / 20) - 1
@@ -55,17 +55,13 @@ def _decisive(warning: str, distances: dict[str, float]) -> Iterator[str]:
                 f"% changes the verdict on {_band(name)} Hz."
             )
         return
-    is_assumed = warning.startswith(_ASSUMED)
-    # Each assumption begins with an article; their sizes stand in parentheses, some after "; ".
-    for part in re.split("; (?=the )", warning.removeprefix(_ASSUMED)) if is_assumed else [warning]:
-        effect = _SIZED.search(part)
-        if effect:
-            band, size = effect["band"] or effect["other_band"], effect["size"]
-            size = size or effect["other_size"]
-            if float(size) >= distances[f"octave_{band.replace('.', '_')}"]:
-                yield f"Not stated, and assumed: {part}." if is_assumed else part
-        elif not is_assumed and not _OTHER.search(part):
-            yield part
+    effect = _SIZED.search(warning)
+    if effect:
+        band, size = effect["band"] or effect["other_band"], effect["size"] or effect["other_size"]
+        if float(size) >= distances[f"octave_{band.replace('.', '_')}"]:
+            yield warning
+    elif not _OTHER.search(warning):
+        yield warning
 
 
 def _band(name: str) -> str:

@@ -15,7 +15,7 @@ from thud.base.errors import ThudError
 from thud.base.units import scaled
 from thud.case.keys import find_key, key_owners, limits, value_in, with_values
 from thud.explorer.answer import new_case
-from thud.explorer.criteria import source_headline
+from thud.explorer.criteria import model_headline
 from thud.explorer.form import fields_by_key
 from thud.explorer.messages import lower
 from thud.explorer.models import MODEL_FACTS, Facts
@@ -95,7 +95,7 @@ def improve(values: Values) -> Work:
     if changes:
         return {"changes": changes, "none": "", "note": NOTE}
     labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
-    reason = source_headline(verdict, None)["text"]
+    reason = model_headline(case, verdict)["text"]
     none = (
         f"No change of a single parameter makes the source conform: tried {labels}, each from half "
         f"to twice its value in steps of {100 * STEP:g} %. It {reason}."

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from thud.base.checks import shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
-from thud.explorer.criteria import source_headline
+from thud.explorer.criteria import recording_headline
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import name_fields
 from thud.plot.impact_figures import contact_force
@@ -20,7 +20,7 @@ from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
 from thud.report.contents import criteria_data, report_data
 from thud.report.page import report_page
-from thud.report.rows import expanded_text, value_text
+from thud.report.rows import INCOMPLETE, excluded_text, expanded_text, value_text
 from thud.report.write import figures, json_bytes
 
 if TYPE_CHECKING:
@@ -45,10 +45,13 @@ def answer_recording(
     recording, in_words = read_copies(paths, names, table)
     verdict = recording.assess()
     answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
-    for entry, row in zip(answer["criteria"], criteria_data(recording), strict=True):
+    rows = criteria_data(recording)
+    for entry, row in zip(answer["criteria"], rows, strict=True):
         entry["value_text"] = value_text(row)
         entry["uncertainty_text"] = expanded_text(row)
-    answer["headline"] = source_headline(verdict, None)
+        entry["mark"] = INCOMPLETE if row["excluded"] else ""
+    excluded = excluded_text(rows).replace(f"{INCOMPLETE} U", f"{INCOMPLETE} The uncertainty")
+    answer["headline"] = recording_headline(verdict, excluded, is_stated="source" in table)
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording)
     # The page shows the name of a single file next to its warnings.

@@ -35,7 +35,13 @@ PEAK_PADDING = 2
 
 
 # Contributions of instruments that are not stated: rectangular distributions.
-ASSUMED_PLATE, ASSUMED_FILTER = ASSUMED = "plate, assumed", "recorder filter, assumed"
+ASSUMED_PLATE, ASSUMED_SHARE, ASSUMED_FILTER = ASSUMED = (
+    "plate, assumed",
+    "share of the plate's resonance, assumed",
+    "recorder filter, assumed",
+)
+# Share of a resonance in the static response that may be instead of the whole, if it is not stated.
+MIN_SHARE = 0.5
 
 
 def assumed_contributions(
@@ -58,6 +64,7 @@ def assumed_contributions(
         )
     assumed = {
         ASSUMED_PLATE: _plate_gain(drops, config),
+        ASSUMED_SHARE: _share_gain(config),
         ASSUMED_FILTER: _filter_gain(drops, config),
     }
     for name, gain in assumed.items():
@@ -86,11 +93,10 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
             f"the force plate is flat within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz "
             f"([plate]; {size(ASSUMED_PLATE)})"
         )
-    change = _share_effect(drops, config)
-    if change > MIN_WARNED:
+    if ASSUMED_SHARE in contributions:
         assumed.append(
-            "the resonance has the whole static response of the plate ([plate] share; with half "
-            f"of it {change:.2f} dB at 500 Hz)"
+            "the resonance has the whole static response of the plate, or half of it ([plate] "
+            f"share; {size(ASSUMED_SHARE)})"
         )
     if config.filter is None:
         assumed.append(
@@ -133,21 +139,6 @@ def _plate_warnings(drops: Sequence[Drop], plate: Plate, effect: str) -> list[st
         f"its correction, {change:.2f} dB at 500 Hz, depends on [plate] alone"
     )
     return [unclear] if change > MIN_WARNED else []
-
-
-def _share_effect(drops: Sequence[Drop], config: Config) -> float:
-    """Return the change at 500 Hz, dB, if the mode had half of the static response, not all.
-
-    It is zero if the share is stated, or no resonance.
-    """
-    plate = config.resonance
-    if plate is None or config.plate is None or config.plate.share is not None:
-        return 0.0
-    half = replace(plate, share=0.5)
-    change = PulseSpectra(drops).level_change(
-        lambda f: np.abs(half.response(f) / plate.response(f))
-    )
-    return abs(float(change[-1]))
 
 
 def with_assumptions(drop: Drop, config: Config) -> Drop:
@@ -212,6 +203,18 @@ def _plate_gain(drops: Sequence[Drop], config: Config) -> Gain | None:
             plate = Plate(limit * math.sqrt(1 + 1 / TOLERANCE), 100.0)
     resonance = plate
     return (lambda f: np.abs(resonance.response(f))) if is_doubtful else None
+
+
+def _share_gain(config: Config) -> Gain | None:
+    """Return the gain of a resonance with a smaller share; None if it is stated, or no resonance.
+
+    A force that was corrected for the whole share is multiplied by it.
+    """
+    plate = config.resonance
+    if plate is None or config.plate is None or config.plate.share is not None:
+        return None
+    smaller = replace(plate, share=MIN_SHARE)
+    return lambda f: np.abs(plate.response(f) / smaller.response(f))
 
 
 def _filter_gain(drops: Sequence[Drop], config: Config) -> Gain | None:

@@ -83,6 +83,8 @@ def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
     for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
         value = value_in(result, name)
         low, high = ranges.get(name, region)
-        if not (isinstance(value, float | int) and region[0] <= low <= value <= high <= region[1]):
-            refuse(f"{name} = {value:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
+        if not region[0] <= low <= high <= region[1]:
+            refuse(f"{name} = {low:g} to {high:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
+        if not (isinstance(value, float | int) and low <= value <= high):
+            refuse(f"{name} = {value:g}", f"{low:g} <= {name} <= {high:g}")
     return result

@@ -3,21 +3,22 @@ import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "
 import { interpolate, plot, swatch } from "./plot.js";
 
 const RESULTS = { conforms: "conforms", inconclusive: "undecided" };
+const UNCERTAINTIES = { "numerical error": "numerical error of the computation", "uncertainty (95 %)": "measurement uncertainty (95 %)" };
 // Verdicts on the required level of a room.
 const ROOM_VERDICTS = { conforms: "met", fails: "not met", undecided: "undecided" };
 const SIGNS = { conforms: "✓", fails: "✕", undecided: "?", level: "" };
 // Uncertainties that are smaller are not drawn, dB.
 const MIN_UNCERTAINTY = 0.02;
 
-/** Return the headline of an answer: the verdict on a required level, and uncertainties of the values in it. */
-export function headlineText({ headline: { text, result }, room, criteria }) {
-  if (room) return ROOM_VERDICTS[result] ? `${ROOM_VERDICTS[result]}: ${text}` : text;
-  return criteria.filter(({ uncertainty, range }) => uncertainty && !range).reduce((shown, criterion) => shown.replace(
+/** Return the headline of an answer: the verdict on a required level, and uncertainties of the measured values in it. */
+export function headlineText({ headline: { text, result, bands }, room, criteria }) {
+  if (room) return `${ROOM_VERDICTS[result] ? `${ROOM_VERDICTS[result]}: ` : ""}${text}, ${bands}`;
+  return criteria.filter(({ uncertainty, value_text: measured }) => uncertainty && measured).reduce((shown, criterion) => shown.replace(
     new RegExp(`((?:^|: |; )${criterion.name}) -?[\\d.]+(?= ${criterion.unit})`, "i"), `$1 ${valueTextOf(criterion)} ± ${uncertaintyText(criterion)}`), text);
 }
 
 const valueTextOf = (criterion) => criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
-const uncertaintyText = ({ uncertainty, uncertainty_text: text }) => text ?? Number(uncertainty.toPrecision(2));
+const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${text ?? Number(uncertainty.toPrecision(2))}${mark ? ` ${mark}` : ""}`;
 
 /** Show the answer to the question; `variant` has a label and an answer. */
 export function showHeadline({ label, answer }) {
@@ -167,8 +168,11 @@ export function showCriteria(variants) {
     element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Criterion"), element("th", { scope: "col" }, "Limits"), ...heads)),
     element("tbody", {}, ...rows));
   byId("criteria_section").classList.toggle("half", Boolean(variants[0].answer.motion) && variants.length < 3);
-  const ranges = variants.some(({ answer }) => answer.model_verdict) ? "In parentheses: the range over what is not known of the model, 95 %. " : "";
-  byId("criteria_text").textContent = `${ranges}${variants[0].answer.criteria[0].standard ?? ""}`;
+  const unknowns = variants.map(({ answer }) => answer.model_verdict?.unknowns).find(Boolean);
+  const ranges = unknowns ? `In parentheses: the range (95 %) over what is not known: ${unknowns}. ` : "";
+  const names = new Set(variants.flatMap(({ answer }) => answer.criteria).filter(({ uncertainty, range }) => uncertainty && !range).map((criterion) => criterion.uncertainty_name));
+  const uncertainties = names.size ? `±: ${[...names].map((name) => UNCERTAINTIES[name]).join("; ")}. ` : "";
+  byId("criteria_text").textContent = `${ranges}${uncertainties}${variants[0].answer.criteria[0].standard ?? ""}`;
 }
 
 /** Return the name of a criterion, which shows its explanation on hover and focus. */
