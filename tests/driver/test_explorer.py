@@ -881,11 +881,47 @@ def test_layers_that_meet_the_requirement_of_a_room_are_found(client: TestClient
         below = thud.Room(**room)  # type: ignore[arg-type]
         required = thud.predict_level(floor=floor, room=below).requirement
         assert required is not None
-        assert change["text"].endswith("interval") == (required.verdict == "met")
+        is_whole = change["text"].endswith("met by the whole range")
+        assert is_whole == change["is_whole"] == (required.verdict == "met")
+        assert is_whole or change["text"].endswith("met by the mean, undecided over the range")
         assert round(required.level) <= 52
     met = values | {"room": room | {"required": 80.0}}
     answer = last_report(client, "/improve", json=met)["answer"]
     assert answer["none"] == "The requirement is met already."
+
+
+def test_source_that_does_not_conform_is_the_reason_why_no_floor_meets_a_level(
+    client: TestClient,
+) -> None:
+    values = SHELL | {"floor": {"name": "plate"}, "room": {"volume": 50.0, "required": 60.0}}
+    answer = last_report(client, "/improve", json=values)["answer"]
+    assert answer["changes"] == []
+    assert "the source does not conform (125 Hz" in answer["none"]
+    assert "layer" not in answer["none"]
+
+
+def test_bare_slab_that_no_change_helps_gets_a_screed(client: TestClient) -> None:
+    values = next(
+        p["values"] for p in client.get("/about").json()["presets"] if p["name"] == "slab"
+    )
+    values = values | {"room": {"required": 49.0}}
+    answer = last_report(client, "/improve", json=values)["answer"]
+    assert answer["changes"] == []
+    # The slab has no resilient layer.
+    tried = r"lowest mean level reached: thickness 180 to 330 mm, \d+ dB \(\d+ to \d+\)\.$"
+    assert re.search(tried, answer["none"])
+    assert "concrete 180, screed on 6 MN/m3: " in answer["note"]
+
+
+def test_change_of_a_source_states_both_verdicts(client: TestClient) -> None:
+    values: dict[str, Any] = f90nml.read(REPOSITORY / "inputs/rubber_ball_fe.nml").todict()
+    # The values conform, what is not known does not decide.
+    values["ball"]["youngs_modulus"] = 2.24e6
+    answer = last_report(client, "/improve", json=values)["answer"]
+    assert "undecided by the model (" in answer["none"]
+    shell = {"model": {"name": "hunt_crossley"}}
+    for change in last_report(client, "/improve", json=shell)["answer"]["changes"]:
+        assert change["text"].endswith(": conforms by these values")
 
 
 def test_fit_to_a_recording_returns_its_values(client: TestClient) -> None:

@@ -20,6 +20,7 @@ from thud.explorer.form import fields_by_key
 from thud.explorer.messages import lower
 from thud.explorer.models import MODEL_FACTS, Facts
 from thud.explorer.recording import read_copies
+from thud.floors.constructions import constructions
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
@@ -27,12 +28,16 @@ from thud.level.assessment import get_criteria
 from thud.level.rating import meets
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
+from thud.studies.model_assessment import assess_impact
+from thud.studies.model_verdict import OUTCOMES
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
 
+    from thud.base._schema import FloorOptions
     from thud.case.case import Case
     from thud.level.assessment import Criterion
+    from thud.level.rating import Requirement
 
     Values = dict[str, dict[str, Any]]
     # Yields begin and end of the fraction of the work of the next step, and returns the answer.
@@ -50,6 +55,13 @@ MESH = 6, 64
 BLOCK = 10
 # Maximum number of further steps if the source does not conform with the mesh of the case.
 FURTHER_STEPS = 5
+# Keys of the structural floor, on which layers lie, and maximum number of proposed constructions.
+STRUCTURES = {
+    "plate": ("thickness", "density"),
+    "laminate_floor": ("layer_thickness",),
+    "joist_floor": ("spacing", "joist_width", "joist_height"),
+}
+MAX_NAMED = 3
 # Layers of floors, the step of a thickness, m, and of a stiffness, and the maximum number of steps.
 LAYERS = "thickness", "screed_thickness", "layer_stiffness", "subceiling_thickness"
 THICKNESS_STEP = 0.01
@@ -57,7 +69,7 @@ STIFFNESS_STEP = 0.1
 FLOOR_STEPS = 15
 FLOOR_NOTE = (
     "Each layer alone; the level need not fall with each step, as modes of the room move. Met by "
-    "the whole interval leaves the uncertainty of the prediction as margin, met by the mean none."
+    "the whole range leaves the uncertainty of the prediction as margin, met by the mean none."
 )
 # Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
 # over the width of its range.
@@ -65,8 +77,8 @@ LEVEL_MARGIN = 0.1
 OTHER_MARGIN = 0.02
 NOTE = (
     f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % "
-    "of the range to those of other criteria, besides the numerical error. What is not known of "
-    "the source is not considered."
+    "of the range to those of other criteria, besides the numerical error. The search aims at the "
+    "verdict on the values of the model, not at that over what is not known of the source."
 )
 # Significant digits of changed values.
 DIGITS = 3
@@ -81,9 +93,18 @@ def improve(values: Values) -> Work:
     case = new_case(values)
     if case.room is not None and case.floor is not None:
         return (yield from _improve_floor(case))
-    verdict = compute(case).assess()
+    impact = compute(case)
+    verdict = impact.assess()
     if verdict:
-        return {"changes": [], "none": "The source conforms already.", "note": NOTE}
+        ranges = assess_impact(impact)
+        none = "The source conforms already."
+        if ranges and ranges.result != OUTCOMES[0]:
+            none = (
+                "The values of the fields conform already. The verdict over what is not known, "
+                f"{ranges.result} ({ranges.shown_probability}), is that of all values in its "
+                "ranges: only narrower ranges (&unknowns) can change it."
+            )
+        return {"changes": [], "none": none, "note": NOTE}
     model = case.model.name if case.model else ""
     names = _facts(model).tuned
     changes = []
@@ -92,6 +113,11 @@ def improve(values: Values) -> Work:
         if change:
             changes.append(change)
     changes.sort(key=lambda change: abs(math.log(change["factor"])))
+    for change in changes:
+        changed = with_values(case, {change["key"].partition(".")[2]: change["value"]})
+        ranges = assess_impact(compute(changed))
+        over = f"; {ranges.result} over what is not known" if ranges else ""
+        change["text"] += f": conforms by these values{over}"
     if changes:
         return {"changes": changes, "none": "", "note": NOTE}
     labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
@@ -110,34 +136,58 @@ def _improve_floor(case: Case) -> Work:
 
     Thicknesses grow in steps of 10 mm, stiffnesses fall in steps of 10 %. The level need not fall
     with each step, so the first step that meets the requirement is the smallest. Two answers are
-    given where both are found: by the mean rating, and by its whole interval.
+    given where both are found: by the mean rating, and by its whole interval. If no change meets it
+    by the whole interval, constructions of the library on the same structural floor are tried.
     """
-    required = predict_level(compute(case)).requirement
+    prediction = predict_level(compute(case))
+    required = prediction.requirement
     if required is None:
         refuse("&room: required = 0: the room has no requirement", "the required level, dB")
     if required.verdict == "met":
         return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
-    names = [name for name in LAYERS if getattr(case.floor, name, 0.0)]
-    changes = []
+    if required.verdict.startswith("undecided:"):
+        reason = " ".join(prediction.source_warnings)
+        none = f"No floor meets the requirement with this source: {reason}. Choose another source."
+        return {"changes": [], "none": none, "note": ""}
+    names = [name for name in LAYERS if _has_layer(case.floor, name)]
+    changes, reached = [], []
+    # The last fraction of the work are the constructions of the library.
+    length = 1 / (len(names) + 1)
     for i, name in enumerate(names):
-        begin, length = i / len(names), 1 / len(names)
-        changes += yield from _floor_changes(case, name, begin, length)
-    labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
-    none = (
-        ""
-        if changes
-        else f"No change of a single layer meets the requirement: tried {labels}, up to twice a "
-        "thickness and down to a fifth of a stiffness."
-        if names
-        else "This floor has no layers to change."
-    )
-    return {"changes": changes, "none": none, "note": FLOOR_NOTE}
+        found, best = yield from _floor_changes(case, name, i * length, length)
+        changes += found
+        if best:
+            reached.append(best)
+    none = ""
+    if not changes:
+        none = "No change of a single layer meets the requirement."
+        if not names:
+            none = "This floor has no single layer that could be changed."
+        elif reached:
+            none += f" Tried, with the lowest mean level reached: {'; '.join(reached)}."
+    note = FLOOR_NOTE
+    if not any(change["is_whole"] for change in changes):
+        built = yield from _constructions_that_meet(case, len(names) * length, length)
+        known = "Constructions of the library on the same structural floor that meet it: "
+        missing = "No construction of the library on the same structural floor meets it."
+        note = f"{known}{'; '.join(built)}." if built else missing
+        note += f" {FLOOR_NOTE}"
+    return {"changes": changes, "none": none, "note": note}
+
+
+def _has_layer(floor: FloorOptions | None, name: str) -> bool:
+    """Whether a floor has the layer of a key; a resilient layer only lies below a screed."""
+    owner = "screed_thickness" if name == "layer_stiffness" else name
+    return bool(getattr(floor, owner, 0.0)) and hasattr(floor, name)
 
 
 def _floor_changes(
     case: Case, name: str, begin: float, length: float
-) -> Generator[tuple[float, float], None, list[dict[str, Any]]]:
-    """Return the changes of a layer that meet the requirement by the mean and by the interval."""
+) -> Generator[tuple[float, float], None, tuple[list[dict[str, Any]], str]]:
+    """Return the changes of a layer that meet the requirement by the mean and by the interval.
+
+    Also return the tried values, and the lowest level with its interval, in words.
+    """
     start = float(getattr(case.floor, name))
     _, high = limits(find_key(name, key_owners(case))[0], case)
     steps = range(1, FLOOR_STEPS + 1)
@@ -147,22 +197,60 @@ def _floor_changes(
         tried = [start + THICKNESS_STEP * i for i in steps if THICKNESS_STEP * i <= start]
     tried = [float(f"{value:.{DIGITS}g}") for value in tried if value <= high]
     changes: list[dict[str, Any]] = []
+    levels: dict[float, Requirement] = {}
     for i, value in enumerate(tried):
         yield begin + length * i / len(tried), begin + length * (i + 1) / len(tried)
-        try:
-            required = predict_level(compute(with_values(case, {name: value}))).requirement
-        except ThudError:
+        required = _requirement(with_values(case, {name: value}))
+        if required is None:
             break
-        if required is None or required.verdict.startswith("undecided:"):
-            break
-        if required.verdict == "met" or (not changes and meets(required.level, required.required)):
-            change = _change(case, name, start, value)
-            by = "whole interval" if required.verdict == "met" else "mean"
+        levels[value] = required
+        is_whole = required.verdict == "met"
+        if is_whole or (not changes and meets(required.level, required.required)):
+            change = _change(case, name, start, value) | {"is_whole": is_whole}
+            by = "whole range" if is_whole else "mean, undecided over the range"
             change["text"] += f": {required.shown}, met by the {by}"
             changes.append(change)
-        if required.verdict == "met":
+        if is_whole:
             break
-    return changes
+    if not levels:
+        return changes, ""
+    field, best = _field(case, name), min(levels.values(), key=lambda entry: entry.level)
+    ends = (f"{scaled(value, -field['power']):.3g}" for value in (start, list(levels)[-1]))
+    return changes, f"{lower(field['label'])} {' to '.join(ends)} {field['unit']}, {best.shown}"
+
+
+def _requirement(case: Case) -> Requirement | None:
+    """Return the verdict on the requirement of the room of a case; None without a result."""
+    try:
+        return predict_level(compute(case)).requirement
+    except ThudError:
+        return None
+
+
+def _constructions_that_meet(
+    case: Case, begin: float, length: float
+) -> Generator[tuple[float, float], None, list[str]]:
+    """Return constructions on the same structural floor that meet the requirement, in words.
+
+    They are at most `MAX_NAMED`, that with the lowest level first.
+    """
+    assert case.floor is not None  # noqa: S101 - that of a room
+    keys = STRUCTURES.get(case.floor.name, ())
+    entries = [
+        entry
+        for entry in constructions()
+        if keys
+        and entry.floor.name == case.floor.name
+        and all(getattr(entry.floor, key) == getattr(case.floor, key) for key in keys)
+    ]
+    result = {}
+    for i, entry in enumerate(entries):
+        yield begin + length * i / len(entries), begin + length * (i + 1) / len(entries)
+        required = _requirement(entry.case(case))
+        if required and meets(required.level, required.required):
+            by = "whole range" if required.verdict == "met" else "mean"
+            result[f"{entry.name}: {required.shown}, by the {by}"] = required.level
+    return sorted(result, key=lambda text: result[text])[:MAX_NAMED]
 
 
 def _facts(model: str) -> Facts:
