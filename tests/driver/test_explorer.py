@@ -919,8 +919,10 @@ def test_change_of_a_source_states_both_verdicts(client: TestClient) -> None:
     values["ball"]["youngs_modulus"] = 2.24e6
     answer = last_report(client, "/improve", json=values)["answer"]
     assert "undecided by the model (" in answer["none"]
-    shell = {"model": {"name": "hunt_crossley"}}
-    for change in last_report(client, "/improve", json=shell)["answer"]["changes"]:
+    modal = {"model": {"name": "modal_ball"}, "modal_ball": {"loss_factor": 0.15}}
+    answer = last_report(client, "/improve", json=modal)["answer"]
+    assert "aims at the verdict on the values of the model" in answer["note"]
+    for change in answer["changes"]:
         assert change["text"].endswith(": conforms by these values")
 
 
@@ -940,6 +942,8 @@ def test_fit_to_a_recording_returns_its_values(client: TestClient) -> None:
     assert fitted["restitution"] == pytest.approx(0.75, abs=0.01)
     assert answer["values"]["drop"] == {"height": 0.9}
     assert answer["text"].startswith("Fitted to drop.csv: contact time 0.019 (")
+    assert "does not explain" not in answer["text"]
+    assert "verdict is that of the best values, not of their intervals" in answer["text"]
     modes = {"model": {"name": "measured_modes"}}
     form = form_of(table_of(force, rate), {**fields, "case": json.dumps(modes)})
     assert (
@@ -947,6 +951,42 @@ def test_fit_to_a_recording_returns_its_values(client: TestClient) -> None:
     )
     form = form_of(table_of(force, rate), {**fields, "case": "[]"})
     assert client.post("/fit", **form).status_code == 400
+
+
+def test_fit_that_does_not_explain_the_recording_says_so(client: TestClient) -> None:
+    # The ringing plate is not stated.
+    content = (RECORDINGS / "drop_1.csv").read_bytes()
+    start = {"contact_time": 0.019, "restitution": 0.8}
+    case = json.dumps({"model": {"name": "hunt_crossley"}, "hunt_crossley": start})
+    form = form_of(content, {"name": "drop_1.csv", "height": 1, "mass": 2.5, "case": case})
+    text = last_report(client, "/fit", **form)["answer"]["text"]
+    assert re.search(
+        r"but the model does not explain the data: the largest residual is \d+ N", text
+    )
+
+
+def test_recording_without_a_physical_restitution_is_not_fitted(client: TestClient) -> None:
+    # Three times the mass of the ball.
+    content = (RECORDINGS / "drop_1.csv").read_bytes()
+    case = json.dumps({"model": {"name": "hunt_crossley"}})
+    form = form_of(content, {"name": "drop_1.csv", "height": 1, "mass": 8, "case": case})
+    assert "the restitution of the recording is −" in last_report(client, "/fit", **form)["error"]
+
+
+def test_unknown_key_of_an_options_group_is_refused(client: TestClient) -> None:
+    for group in ("finite_element", "plate", "room"):
+        response = client.post("/solve", json=SHELL | {group: {"foo": 1}})
+        assert response.status_code == 400
+        assert "'foo' is not known" in response.json()["error"]
+
+
+def test_measured_modes_below_a_floor_say_that_the_floor_does_not_move(client: TestClient) -> None:
+    models = {model["name"]: model["values"] for model in client.get("/about").json()["models"]}
+    values = {"model": {"name": "measured_modes"}, "floor": {"name": "plate"}, "room": {}}
+    values |= models["measured_modes"]
+    case = new_case(values)
+    (text,) = (text for text in thud.predict_level(compute(case)).warnings if "rigid floor" in text)
+    assert text in solved(client, values)["warnings"]
 
 
 def test_sound_in_the_room_is_that_of_the_case(client: TestClient) -> None:

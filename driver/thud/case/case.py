@@ -257,6 +257,8 @@ def tables_case(tables: Mapping[str, Any]) -> Case:
     for group, keys in tables.items():
         if not isinstance(keys, Mapping):
             refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")
+        known = [key.name for key in KEYS if key.group == group]
+        refuse_unknown(f"&{group}", keys, known or ["name"])
     for group, choices in (("model", MODELS), ("floor", FLOORS)):
         if group in tables:
             require_choice(f"&{group}: name", tables[group].get("name"), list(choices))

@@ -104,7 +104,7 @@ EXPLORE = Command(
             "case",
             nargs="?",
             metavar="CASE.nml|RESULTS",
-            help="case, or directory of results, to start with (default: the ball of the paper)",
+            help="case, or directory of results, to start with (default: a standard ball)",
             type=Path,
         ),
         argument(

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.level.assessment import Criterion
     from thud.level.rating import Requirement
+    from thud.studies.fitting.fit_result import Fit
 
     Values = dict[str, dict[str, Any]]
     # Yields begin and end of the fraction of the work of the next step, and returns the answer.
@@ -80,6 +81,8 @@ NOTE = (
     "of the range to those of other criteria, besides the numerical error. The search aims at the "
     "verdict on the values of the model, not at that over what is not known of the source."
 )
+# Words of a fit whose residuals exceed the uncertainty.
+UNEXPLAINED = "the model does not explain the data"
 # Significant digits of changed values.
 DIGITS = 3
 
@@ -384,6 +387,13 @@ def fit_recording(
             f"the model {model} has no parameters that a recording determines",
             ", ".join(name for name, facts in MODEL_FACTS.items() if facts.fitted),
         )
+    restitution = recording.restitution
+    if not math.isnan(restitution) and not 0 < restitution <= 1:
+        shown = f"{restitution:.2f}".replace("-", "−")
+        refuse(
+            f"the restitution of the recording is {shown}: no ball can be fitted to it",
+            "0 to 1; check mass, drop height, calibration, drops and polarity",
+        )
     with warnings.catch_warnings():
         # They are part of the text.
         warnings.simplefilter("ignore")
@@ -394,10 +404,26 @@ def fit_recording(
     for name, value in fitted.items():
         field = _field(case, name)
         best, low, high = (f"{scaled(x, -field['power']):.4g}" for x in (value, *intervals[name]))
-        texts.append(f"{lower(field['label'])} {best} ({low} to {high}) {field['unit']}".strip())
+        ends = f"{low} to {high}" if np.isfinite(intervals[name]).all() else "not determined"
+        texts.append(f"{lower(field['label'])} {best} ({ends}) {field['unit']}".strip())
     for name, value in (known | fitted).items():
         key, _ = find_key(name, key_owners(case))
         values.setdefault(key.group, {})[key.name] = value
     details = " ".join(f"{note[:1].upper()}{note[1:]}." for note in result.warnings)
-    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %)."
+    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %){_misfit_text(result)}"
+    text += " The verdict is that of the best values, not of their intervals."
     return {"values": values, "text": text, "details": details}
+
+
+def _misfit_text(result: Fit) -> str:
+    """Return the end of a sentence on a fit: the largest residual, if it is more than the noise."""
+    size = next((text for text in result.warnings if UNEXPLAINED in text), "")
+    if not size:
+        return "."
+    columns = {name: np.asarray(values) for name, values in result.targets[0].columns().items()}
+    residual = np.abs(columns["residual_N"])
+    percent = 100 * residual.max() / columns["target_N"].max()
+    return (
+        f", but {UNEXPLAINED}: the largest residual is {residual.max():.0f} N, {percent:.2g} % of "
+        f"the peak, and {size.removesuffix(f': {UNEXPLAINED}')}."
+    )

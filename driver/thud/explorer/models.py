@@ -151,7 +151,8 @@ MODEL_FACTS = {
     "measured_modes": Facts(
         "Measured modes",
         "A ball whose natural frequencies on the floor were measured",
-        "Rigid floor only; frequencies, damping and masses determine the force.",
+        "The force on a rigid floor, which a room below takes as it is; frequencies, damping and "
+        "masses determine it.",
         partial(input_case, "measured_modes.nml"),
         (*_BALL, "substeps"),
     ),

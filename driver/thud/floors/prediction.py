@@ -252,6 +252,12 @@ class RoomPrediction(RoomLevel, Displayed):
                 f"the floor is not rigid: its motion would change the peak force by about "
                 f"{self.force_change:.1f} dB, but the force on a rigid floor is used"
             )
+        elif self.force == "blocked" and (model := self.source.case.model) is not None:
+            result.append(
+                f"the model {model.name} has no force on a mobile floor: that on a "
+                "rigid floor is used, whose peak the floor would change by less than "
+                f"{MAX_CHANGE:g} dB"
+            )
         return (*result, *self.source_warnings)
 
     def difference(self, measured: RoomLevels) -> Array:
