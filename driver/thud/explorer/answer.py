@@ -222,11 +222,18 @@ def _room(prediction: RoomPrediction) -> Answer:
         "rated": {"value": prediction.rated, "low": low, "high": high},
         "interval": prediction.rated_text,
         "contributions": [
-            [contribution_title(name), *ends] for name, ends in prediction.contributions.items()
+            [_contribution(name, prediction), *ends]
+            for name, ends in prediction.contributions.items()
         ],
         "source_warnings": list(prediction.source_warnings),
         "ratings": _ratings_text(prediction),
     }
+
+
+def _contribution(name: str, prediction: RoomPrediction) -> str:
+    """Return the title of a contribution; that of the source says if its source does not conform."""
+    is_other = name == "source" and prediction.source_note
+    return "spread of sources that conform, unlike this one" if is_other else contribution_title(name)
 
 
 def _ratings_text(prediction: RoomPrediction) -> str:

@@ -9,7 +9,7 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, RATINGS
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
@@ -119,7 +119,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "label": label,
         "kind": key.kind,
         "help": meaning,
-        "choices": {choice: humanize(choice) for choice in key.choices},
+        "choices": {choice: _choice_text(key, choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
         "unit": _typeset(key.unit),
         "si_unit": key.unit,
@@ -146,6 +146,14 @@ def _field(key: Key, default: object) -> dict[str, Any]:
             "slider": _slider(value or 0.0, *ends, whole=is_whole),
         }
     return field
+
+
+def _choice_text(key: Key, choice: str) -> str:
+    """Return the text of a choice; that of a rating names its standard."""
+    if key.name == "required_rating":
+        standardized = "standardized " if choice == "standardized" else ""
+        return f"{standardized}{RATINGS[choice].partition(' of ')[2]}"  # type: ignore[index]
+    return humanize(choice)
 
 
 def _title(name: str) -> str:

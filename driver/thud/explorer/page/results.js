@@ -113,7 +113,7 @@ export function showRooms(variants, { differences }) {
     curves: (isDifference ? rooms.slice(1) : rooms).flatMap(({ label, style, answer: { room } }) => {
       const { room: reference } = first.answer;
       const modal = { name: `${label}, by modes`, style, x: room.modal_level.map((_, k) => k), y: difference(room.modal_level, reference.modal_level), thin: true };
-      return [{ name: label, style, x: room.level.map((_, k) => k), y: difference(room.level, reference.level), marks: true }, ...(room.modal_level.length && !isDifference ? [modal] : [])];
+      return [{ name: `${label}, statistical`, style, x: room.level.map((_, k) => k), y: difference(room.level, reference.level), marks: true }, ...(room.modal_level.length && !isDifference ? [modal] : [])];
     }),
     x: { title: "One-third-octave band", unit: "Hz", bands: first.answer.room.frequency.map(String) },
     y: { title: isDifference ? `Difference to ${first.label}` : "Maximum Fast level", unit: "dB", reference: isDifference ? "" : " re 20 µPa", zero: isDifference },

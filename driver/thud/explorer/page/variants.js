@@ -8,6 +8,8 @@ import { about, factsOf, findField, sorted } from "./form.js";
 const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
 // Number of differences in a name.
 const MAX_DIFFERENCES = 3;
+// Verdicts on a source, by the result of its headline.
+const SOURCE_VERDICTS = { conforms: "conforms", fails: "does not conform", undecided: "undecided" };
 const SOURCE_GROUPS = ["sampling", "levels", "limits", "drop", "ball"];
 
 /** Return a free style for a further variant. */
@@ -113,6 +115,9 @@ export function inputRows(values) {
 /** Show the table of variants, of which the first belongs to the form; `actions` remove and rename one. */
 export function showVariants(variants, { remove, rename }) {
   const isRoom = variants.every(({ answer }) => answer.room);
+  const hasLevel = variants.some(({ answer }) => answer.room);
+  const sourceOf = ({ answer }) => answer.room?.source ?? answer.headline;
+  const hasVerdict = !isRoom || variants.some((variant) => sourceOf(variant).result !== "conforms");
   const [first] = variants;
   const columns = isRoom ? roomColumns(variants) : sourceColumns(variants);
   const cell = (variant, [, valueOf, unit, decimals]) => {
@@ -127,14 +132,16 @@ export function showVariants(variants, { remove, rename }) {
   const rows = variants.map((variant, i) => {
     const name = element("button", { type: "button", class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` }, variant.label);
     name.addEventListener("click", () => renameIn(name, variant, rename));
-    const result = variant.answer.headline.result;
+    const { answer } = variant;
+    const source = sourceOf(variant).result;
     return element("tr", {}, element("th", { scope: "row" }, element("span", { class: "named" }, swatch(variant.style), name)),
-      element("td", { class: result }, isRoom ? headlineText(variant.answer) : { conforms: "conforms", fails: "does not conform", undecided: "undecided", level: variant.answer.verdict }[result]),
+      ...(hasVerdict ? [element("td", { class: source }, SOURCE_VERDICTS[source])] : []),
+      ...(hasLevel ? [element("td", { class: answer.room ? answer.headline.result : "" }, answer.room ? headlineText(answer) : "–")] : []),
       ...columns.map((column) => cell(variant, column)),
       element("td", {}, i ? button("×", () => remove(variant), { class: "remove", "aria-label": `Remove ${variant.label}` }) : ""));
   });
   byId("variants").replaceChildren(
-    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), element("th", { scope: "col" }, isRoom ? "Level (range)" : "Verdict"),
+    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), ...(hasVerdict ? [element("th", { scope: "col" }, hasLevel ? "Source" : "Verdict")] : []), ...(hasLevel ? [element("th", { scope: "col" }, "Level (range)")] : []),
       ...columns.map(([title, , unit]) => element("th", { scope: "col" }, title, element("small", {}, ` ${unit}`))), element("td", {}))),
     element("tbody", {}, ...rows));
   byId("differences").disabled = variants.length < 2;
