@@ -210,6 +210,24 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
     assert "undecided: the source does not conform" in headline["detail"]
 
 
+def test_other_sources_in_the_range_are_named_as_such() -> None:
+    (slab,) = (preset["values"] for preset in presets() if preset["name"] == "slab")
+    titles = {
+        model: [title for title, *_ in answer_case(new_case(case))["room"]["contributions"]]
+        for model, case in {
+            "conforms": slab, "shell": {**slab, "model": {"name": "hollow_sphere"}},
+        }.items()
+    }  # fmt: skip
+    assert "another source that conforms" in titles["conforms"]
+    assert "spread of sources that conform, unlike this one" in titles["shell"]
+
+
+def test_choices_of_a_rating_name_their_standards() -> None:
+    choices = FIELDS["room", "required_rating"]["choices"].values()
+    standards = ("KS F 2863-2", "ISO 717-2", "ISO 16283-2")
+    assert all(name in text for name, text in zip(standards, choices, strict=True))
+
+
 def test_headline_of_a_room_names_the_bands_of_its_rating() -> None:
     (slab,) = (preset["values"] for preset in presets() if preset["name"] == "slab")
     bands = {

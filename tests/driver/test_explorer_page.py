@@ -159,11 +159,19 @@ def test_does_my_recording_conform(browser: Browser, server: Served, tmp_path: P
     settle(page)
     sync_api.expect(asks).to_be_hidden()
     sync_api.expect(page.locator("#recording_plate_f0")).to_have_value("1100")
+    # The share of the resonance is assumed, until it is stated.
+    sync_api.expect(page.locator("#verdict")).to_have_text(re.compile("Undecided: 500 Hz"))
+    sync_api.expect(page.locator("#detail")).to_contain_text("share of the plate's resonance")
+    page.locator("#inputs summary").click()
+    page.locator("#recording_plate_share").fill("1")
+    page.locator("#recording_plate_share").press("Tab")
+    settle(page)
+    # The mark is that of an uncertainty without that of the calibration.
     sync_api.expect(page.locator("#verdict")).to_have_text(
-        re.compile(r"Does not conform: 500 Hz 10\.\d+ ± 0\.\d+ dB, below 10\.5")
+        re.compile(r"Does not conform: 500 Hz 10\.\d+ ± 0\.\d+ † dB, below 10\.5")
     )
     # The true level is 10.18 dB.
-    level, uncertainty = map(float, value_of(page, "500 Hz").split(" ± "))
+    level, uncertainty = map(float, value_of(page, "500 Hz").removesuffix(" †").split(" ± "))
     assert abs(level - 10.18) < max(uncertainty, 0.05)
     with page.expect_download() as found:
         page.locator("#report").click()
@@ -656,6 +664,25 @@ def test_changes_are_undone_and_redone(browser: Browser, server: Served) -> None
     page.locator("#keep").click()
     page.keyboard.press("Control+z")
     sync_api.expect(page.locator("#variants tbody tr")).to_have_count(2)
+
+
+def test_source_and_requirement_have_columns_of_their_own(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "floor")
+    fill(page, "room.required", "49")
+    settle(page)
+    page.locator("#keep").click()
+    page.locator("#has_room").uncheck()
+    settle(page)
+    heads = page.locator("#variants thead th").all_inner_texts()
+    assert heads[:3] == ["Variant", "Source", "Level (range)"]
+    rows = [
+        row.locator("td").all_inner_texts()[:2] for row in page.locator("#variants tbody tr").all()
+    ]
+    # The same source has the same verdict, and the requirement its own.
+    assert rows[0] == ["conforms", "–"]
+    assert rows[1][0] == "conforms"
+    assert re.fullmatch(r"not met: \d+ dB \(\d+ to \d+\), octaves", rows[1][1])
 
 
 def test_link_carries_all_variants(browser: Browser, server: Served) -> None:

@@ -231,9 +231,10 @@ def _room(prediction: RoomPrediction) -> Answer:
 
 
 def _contribution(name: str, prediction: RoomPrediction) -> str:
-    """Return the title of a contribution; that of the source says if its source does not conform."""
-    is_other = name == "source" and prediction.source_note
-    return "spread of sources that conform, unlike this one" if is_other else contribution_title(name)
+    """Return the title of a contribution; that of other sources, if this one does not conform."""
+    if name == "source" and prediction.source_note:
+        return "spread of sources that conform, unlike this one"
+    return contribution_title(name)
 
 
 def _ratings_text(prediction: RoomPrediction) -> str:
