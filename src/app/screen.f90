@@ -14,8 +14,8 @@ module thud_screen
 
    !> Words of verdicts, and their colors.
    character(len=*), parameter :: words(*) = [character(len=16) :: 'conforms', ': met', 'does not conform', 'too low', &
-      'too high', ': not met', 'inconclusive', ': undecided']
-   integer, parameter :: colors(size(words)) = [green, green, red, red, red, red, yellow, yellow]
+      'too high', ': not met', 'undecided']
+   integer, parameter :: colors(size(words)) = [green, green, red, red, red, red, yellow]
 
 contains
 

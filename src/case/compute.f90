@@ -21,7 +21,7 @@ module thud_compute
    use thud_room_prediction, only: predict_room
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, is_inconclusive, source_limits_type
+      get_source_limits, is_undecided, source_limits_type
    use thud_system, only: is_forked
    use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings, warning_length
    implicit none (type, external)
@@ -305,7 +305,7 @@ contains
       logical :: yes
 
       associate (criteria => assessment%criteria(:, get_assessed_force(case)))
-         yes = all(conforms(criteria) .and. .not. is_inconclusive(criteria))
+         yes = all(conforms(criteria) .and. .not. is_undecided(criteria))
       end associate
    end function is_conforming
 

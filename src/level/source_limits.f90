@@ -10,7 +10,7 @@ module thud_source_limits
    implicit none (type, external)
    private
 
-   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, is_inconclusive
+   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, is_undecided
    public :: criterion_count, source_limits_type, source_names
 
    !> Number of criteria of a verdict: octaves, contact time, restitution, peaks, mass, drop height.
@@ -144,12 +144,12 @@ contains
    end function conforms
 
    !> Whether the numerical error of a value could change whether it meets a criterion, or the error is unknown.
-   elemental function is_inconclusive(criterion) result(yes)
+   elemental function is_undecided(criterion) result(yes)
       type(criterion_type), intent(in) :: criterion
       logical :: yes
 
       yes = .not. criterion%error <= min(abs(criterion%value - criterion%lower), abs(criterion%value - criterion%upper))
-   end function is_inconclusive
+   end function is_undecided
 
    !> Number of peaks of a force after low-pass filtering at `recorded_band`; see `peak_prominence`.
    function get_peak_count(whole_force, sample_rate) result(peak_count)

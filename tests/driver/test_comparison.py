@@ -183,7 +183,7 @@ def test_verdict_on_a_record_is_open_where_its_ball_is_not_known(tmp_path: Path)
     assert impact.assess().result == "conforms"
     write_recording(tmp_path / "plate.csv", impact)
     recording = thud.read_recording(tmp_path / "plate.csv")
-    assert recording.assess().result == "inconclusive"
+    assert recording.assess().result == "undecided"
     assert not recording.assess()
 
 

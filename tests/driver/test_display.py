@@ -77,7 +77,7 @@ def test_unknown_criteria_are_not_met(flagship: thud.Impact) -> None:
     record = recorded(flagship)
     verdicts = {row[0]: row[-1] for row in record.assess().rows()}
     assert verdicts["restitution"] == "not known"
-    assert verdicts["all criteria"] == "inconclusive"
+    assert verdicts["all criteria"] == "undecided"
 
 
 def test_warnings_are_shown() -> None:

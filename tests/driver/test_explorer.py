@@ -456,9 +456,9 @@ def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: Tes
     # The plate lifts the level, but the range holds the truth: nothing is decided.
     assert abs(octave["value"] - truth["levels"][4]) > 1
     assert abs(octave["value"] - truth["levels"][4]) < octave["uncertainty"]
-    assert octave["verdict"] == "inconclusive"
+    assert octave["verdict"] == "undecided"
     # So are the peaks: those of a ringing plate may be none of the ball.
-    assert answer["verdict"] == "inconclusive"
+    assert answer["verdict"] == "undecided"
     assert answer["headline"]["result"] == "undecided"
     (asked,) = answer["asks"]
     assert asked["values"] == {"plate_f0": "1100", "plate_Q": "24"}

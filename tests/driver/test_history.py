@@ -220,7 +220,7 @@ def test_temperatures_and_calibrations_are_shown() -> None:
 
 def test_marks_of_the_table_are_explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = read_history([folder])
-    line = "?: inconclusive; *: the drift is significant, at 5 % for all criteria together"
+    line = "?: undecided; *: the drift is significant, at 5 % for all criteria together"
     assert found.marks() == line
     options = argparse.Namespace(
         name="history", reports=[str(folder)], different_balls=False, output=str(folder / "out"),
@@ -228,7 +228,7 @@ def test_marks_of_the_table_are_explained(folder: Path, capsys: pytest.CaptureFi
     )  # fmt: skip
     run_history(options)
     assert line in capsys.readouterr().out.splitlines()
-    # Drop height is unknown in all of them, so that one verdict is always inconclusive.
+    # Drop height is unknown in all of them, so that one verdict is always undecided.
     assert "*" not in history(count=2).marks()
 
 

@@ -198,7 +198,7 @@ def test_limits_of_octaves_are_those_of_the_verdict() -> None:
     assert upper.tolist() == [40, 32.5, 24.5, 19, 14.5]
 
 
-def test_verdict_is_inconclusive_if_all_known_criteria_conform() -> None:
+def test_verdict_is_undecided_if_all_known_criteria_conform() -> None:
     good = Criterion("octave_31_5", Estimate(39.0, unit="dB"), 38.0, 40.0)
     low, high, unknown = (
         replace(good, name=f"octave_{value}", estimate=Estimate(value, unit="dB"))
@@ -206,7 +206,7 @@ def test_verdict_is_inconclusive_if_all_known_criteria_conform() -> None:
     )
     for criteria, result in (
         ((good, good), "conforms"), ((good, low), "does not conform"),
-        ((good, unknown), "inconclusive"), ((low, unknown), "does not conform"),
+        ((good, unknown), "undecided"), ((low, unknown), "does not conform"),
     ):  # fmt: skip
         found = Verdict("rubber_ball", criteria)
         assert (found.result, found.conforms) == (result, result == "conforms")

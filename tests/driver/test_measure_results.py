@@ -118,10 +118,10 @@ def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
 
 
 def test_criteria_are_counted_in_words() -> None:
-    verdicts = ["conforms"] * 7 + ["does not conform"] * 2 + ["inconclusive"]
-    counts = "7 criteria conform, 2 do not conform, 1 inconclusive"
+    verdicts = ["conforms"] * 7 + ["does not conform"] * 2 + ["undecided"]
+    counts = "7 criteria conform, 2 do not conform, 1 undecided"
     assert recording_files.count_verdicts(verdicts) == counts
-    assert recording_files.count_verdicts(["inconclusive"]) == "1 criterion inconclusive"
+    assert recording_files.count_verdicts(["undecided"]) == "1 criterion undecided"
 
 
 @pytest.mark.usefixtures("working_directory")

@@ -279,7 +279,7 @@ def test_wide_probabilities_raise_a_warning() -> None:
     )
 
 
-def test_numerical_error_makes_the_verdict_of_a_drop_inconclusive(
+def test_numerical_error_makes_the_verdict_of_a_drop_undecided(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     ball = thud.Ball(poisson_ratio=0.5, youngs_modulus=2.08e6)
@@ -287,20 +287,20 @@ def test_numerical_error_makes_the_verdict_of_a_drop_inconclusive(
     impact = thud.solve(thud.Case(ball=ball, model=model))
     verdict = impact.assess()
     assert all(c.lower <= c.value <= c.upper for c in verdict.criteria)
-    assert verdict.result == "inconclusive"
+    assert verdict.result == "undecided"
     assert not verdict
-    (cause,) = (c for c in verdict.criteria if c.result == "inconclusive")
+    (cause,) = (c for c in verdict.criteria if c.result == "undecided")
     assert cause.estimate.expanded == pytest.approx(impact.octave_500_error)
     assert verdict.rows()[0][2] == "numerical error"
     thud.write_case(impact.case, tmp_path / "case.nml")
     folder = tmp_path / "results"
     run = ["run", "--no-figures", "--check", "-o", str(folder), str(tmp_path / "case.nml")]
     assert main(run) == 3
-    assert "it is inconclusive whether the source conforms" in capsys.readouterr().out
+    assert "it is undecided whether the source conforms" in capsys.readouterr().out
     summary = f90nml.read(folder / "summary.nml")["verdict"]
-    assert (summary["conforms"], summary["result"]) == (False, "inconclusive")
+    assert (summary["conforms"], summary["result"]) == (False, "undecided")
     assert summary["numerical_error"][4] == impact.octave_500_error
-    assert "10.5,14.5,inconclusive" in (folder / "levels.csv").read_text()
+    assert "10.5,14.5,undecided" in (folder / "levels.csv").read_text()
     header, *rows = (folder / "model_verdict.csv").read_text().splitlines()
     assert header.startswith("criterion,unit,value,low,high,")
     assert len(rows) == len(verdict.criteria) + 1

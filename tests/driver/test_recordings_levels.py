@@ -680,19 +680,19 @@ def with_levels(level: Estimate, band: int = 0, **others: Any) -> str:  # noqa: 
 def test_verdict_has_a_guard_band_on_both_sides() -> None:
     # Limits 38 to 40 dB; 1.96 times 0.1 dB.
     for value, word in (
-        (37.80, "does not conform"), (37.81, "inconclusive"), (38.19, "inconclusive"),
-        (38.20, "conforms"), (39.80, "conforms"), (39.81, "inconclusive"),
-        (40.19, "inconclusive"), (40.20, "does not conform"),
+        (37.80, "does not conform"), (37.81, "undecided"), (38.19, "undecided"),
+        (38.20, "conforms"), (39.80, "conforms"), (39.81, "undecided"),
+        (40.19, "undecided"), (40.20, "does not conform"),
     ):  # fmt: skip
         assert with_levels(Estimate(value, 0.1)) == word
     # An exact value on the limit conforms; one that is uncertain by more than the range never.
     assert with_levels(Estimate(38.0, 0.0)) == "conforms"
-    assert with_levels(Estimate(39.0, 1.0)) == "inconclusive"
-    assert with_levels(Estimate(39.0, math.nan)) == "inconclusive"
-    assert with_levels(Estimate(math.nan, 0.1)) == "inconclusive"
+    assert with_levels(Estimate(39.0, 1.0)) == "undecided"
+    assert with_levels(Estimate(39.0, math.nan)) == "undecided"
+    assert with_levels(Estimate(math.nan, 0.1)) == "undecided"
     # An upper bound can only fail.
-    assert with_levels(Estimate(39.0, 0.1, upper_bound=True)) == "inconclusive"
-    assert with_levels(Estimate(45.0, 0.1, upper_bound=True)) == "inconclusive"
+    assert with_levels(Estimate(39.0, 0.1, upper_bound=True)) == "undecided"
+    assert with_levels(Estimate(45.0, 0.1, upper_bound=True)) == "undecided"
     assert with_levels(Estimate(37.0, 0.1, upper_bound=True)) == "does not conform"
 
 
@@ -704,7 +704,7 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
         (c.lower, c.upper) for c in expected.criteria
     ]
     assert [d.result for d in verdict.criteria] == [
-        *["conforms"] * 7, "does not conform", *["inconclusive"] * 2,
+        *["conforms"] * 7, "does not conform", *["undecided"] * 2,
     ]  # fmt: skip
     assert verdict.result == "does not conform"
     assert not verdict
@@ -712,7 +712,7 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
     assert (first.margin, first.probability) == (1.0, 1.0)
     assert verdict.criteria[7].margin == -1
     assert with_levels(Estimate(39.0)) == "conforms"
-    assert with_levels(Estimate(39.0), mass=math.nan) == "inconclusive"
+    assert with_levels(Estimate(39.0), mass=math.nan) == "undecided"
     assert with_levels(Estimate(39.0), restitution=0.95, mass=math.nan) == "does not conform"
     with pytest.raises(thud.InputError, match=naming("levels", 4, 5)):
         assess_levels(NOMINAL[:4])

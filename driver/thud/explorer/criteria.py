@@ -29,14 +29,13 @@ if TYPE_CHECKING:
 RESULTS = {
     VERDICTS[0]: "conforms",
     VERDICTS[1]: "fails",
-    VERDICTS[2]: "undecided",
     OUTCOMES[2]: "undecided",
     "met": "conforms",
     "not met": "fails",
-    "undecided": "undecided",
+    VERDICTS[2]: "undecided",
 }
 # Words of the results.
-WORDS = {"conforms": VERDICTS[0], "fails": VERDICTS[1], "undecided": "undecided"}
+WORDS = {"conforms": VERDICTS[0], "fails": VERDICTS[1], "undecided": VERDICTS[2]}
 # Bands of the ratings of a room.
 BANDS: dict[RoomRequiredRating, str] = {
     "octaves": "octaves",

@@ -138,7 +138,7 @@ def _asks(recording: Recording) -> list[dict[str, Any]]:
     missing = [name for name in ("height", "mass") if getattr(config, name) is None]
     if missing:
         reason = (
-            "Without drop height and mass of the source these criteria are inconclusive, and the "
+            "Without drop height and mass of the source these criteria are undecided, and the "
             "restitution is known only if the file holds bounces."
         )
         result.append({"reason": reason, "values": dict.fromkeys(missing, "")})

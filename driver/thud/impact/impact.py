@@ -249,7 +249,7 @@ class Impact(ImpactQuantities, Displayed):
     ) -> Verdict:
         """Assess the source by the criteria of the standards, with `numerical_error`.
 
-        A criterion is inconclusive if the numerical error, which is that of the force on the floor,
+        A criterion is undecided if the numerical error, which is that of the force on the floor,
         is unknown or could change the result.
 
         Parameters

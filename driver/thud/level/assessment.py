@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
 
-VERDICTS = ("conforms", "does not conform", "inconclusive")
+VERDICTS = ("conforms", "does not conform", "undecided")
 _MAX_PEAKS = 2**31
 
 
@@ -79,21 +79,21 @@ class Criterion(Displayed):
 
     @property
     def result(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"inconclusive"`` at 95 % confidence.
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"`` at 95 % confidence.
 
         The guard band is the expanded uncertainty (JCGM 106). An upper bound cannot conform.
         """
         value, expanded = self.value, self.estimate.expanded
-        conforms, fails, inconclusive = VERDICTS
+        conforms, fails, undecided = VERDICTS
         if math.isnan(value) or not math.isfinite(expanded):
-            return inconclusive
+            return undecided
         below, above = value + expanded < self.lower, value - expanded > self.upper
         if self.estimate.upper_bound:
-            return fails if below else inconclusive
+            return fails if below else undecided
         if below or above:
             return fails
         inside = value - expanded >= self.lower and value + expanded <= self.upper
-        return conforms if inside else inconclusive
+        return conforms if inside else undecided
 
     @property
     def conforms(self) -> bool:
@@ -159,7 +159,7 @@ class Verdict(Displayed):
 
     @property
     def result(self) -> str:
-        """``"does not conform"`` if any criterion fails, else ``"inconclusive"`` if any is."""
+        """``"does not conform"`` if any criterion fails, else ``"undecided"`` if any is."""
         results = {criterion.result for criterion in self.criteria}
         return next(
             result for result in (VERDICTS[1], VERDICTS[2], VERDICTS[0]) if result in results
@@ -201,7 +201,7 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     """Assess a source by the criteria of the standards, with the stated uncertainties at 95 %.
 
     A criterion conforms if the value and its expanded uncertainty lie within the limits, does not
-    conform if they lie outside, and is inconclusive otherwise (guard band, JCGM 106) or if value or
+    conform if they lie outside, and is undecided otherwise (guard band, JCGM 106) or if value or
     uncertainty are NaN (unknown). Plain numbers have no uncertainty.
 
     Parameters

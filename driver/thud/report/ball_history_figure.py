@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 # Marker and its fill by verdict: distinct in grey as well.
 MARKS = {
     "conforms": ("o", COLORS[0]),
-    "inconclusive": ("s", "white"),
+    "undecided": ("s", "white"),
     "does not conform": ("X", COLORS[1]),
 }
 # Lines of the control limits, by their distance in standard deviations, and of calibrations.

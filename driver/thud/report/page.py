@@ -150,7 +150,7 @@ def _mark(mark: tuple[str, bytes] | None) -> str:
 
 
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
-    """Return the criteria that are inconclusive or not met, and whether U is incomplete."""
+    """Return the criteria that are undecided or not met, and whether U is incomplete."""
     parts = []
     for verdict in VERDICTS[1:]:
         matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
@@ -360,7 +360,7 @@ def _rules(data: dict[str, Any]) -> list[str]:
     decision = (
         "Decision rule: non-binary statement with guard bands w = U (ILAC-G8:09/2019, 4.2; "
         "JCGM 106:2012). A criterion conforms if value ± U lies within its limits, does not "
-        f"conform if it lies outside, and is inconclusive otherwise. {excluded}"
+        f"conform if it lies outside, and is undecided otherwise. {excluded}"
         "P (outside): probability that the true value lies outside the limits, which for a "
         "criterion that conforms is the probability of a false acceptance. U: expanded "
         "uncertainty for 95 %. Spread: standard deviation of single drops, for levels in dB; the "

@@ -92,7 +92,7 @@ def verdict_text(recording: Recording) -> str:
     sentence = {
         "conforms": f"The source conforms to the limits of the {name}",
         "does not conform": f"The source does not conform to the limits of the {name}",
-        "inconclusive": f"The result is inconclusive by the limits of the {name}",
+        "undecided": f"The result is undecided by the limits of the {name}",
     }[assessment.result]
     has_own_limits = any(
         not criterion["limits_of_standard"] for criterion in criteria_data(recording)

@@ -85,7 +85,7 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 .cards th:first-child, .cards td:first-child { text-align: left; padding-left: 0; }
 .criteria th:last-child, .criteria td:last-child { text-align: left; }
 .does-not-conform td:last-child { font-weight: bold; }
-.inconclusive td:last-child { text-decoration: underline; }
+.undecided td:last-child { text-decoration: underline; }
 .budget tbody { break-inside: avoid; border-top: 1px solid #bbb; }
 .budget th[colspan] { text-align: left; padding-left: 0; white-space: normal; }
 .budget td { padding-top: 0; padding-bottom: 0; }

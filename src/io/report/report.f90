@@ -9,7 +9,7 @@ module thud_report
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
-   use thud_source_limits, only: conforms, criterion_type, is_inconclusive
+   use thud_source_limits, only: conforms, criterion_type, is_undecided
    use thud_text, only: join, join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
@@ -136,7 +136,7 @@ contains
             //line('value', join(criteria%value), '') &
             //line('lower', join(criteria%lower), '') &
             //line('upper', join(criteria%upper), '') &
-            //line('met', join(merge('.true. ', '.false.', conforms(criteria) .and. .not. is_inconclusive(criteria))), '')
+            //line('met', join(merge('.true. ', '.false.', conforms(criteria) .and. .not. is_undecided(criteria))), '')
          if (history%numerical_error%known) text = text//line('numerical_error', join(criteria%error), '')
          text = text//'/'//newline
       end associate
@@ -188,26 +188,26 @@ contains
          //'/'//newline//newline
    end function warning_group
 
-   !> Verdict on all values: `conforms`, `does not conform`, or `inconclusive` by their numerical errors.
+   !> Verdict on all values: `conforms`, `does not conform`, or `undecided` by their numerical errors.
    pure function get_verdict(criteria) result(word)
       !> The criteria: [criterion_count].
       type(criterion_type), intent(in) :: criteria(:)
       character(len=:), allocatable :: word
 
-      if (any(.not. conforms(criteria) .and. .not. is_inconclusive(criteria))) then
+      if (any(.not. conforms(criteria) .and. .not. is_undecided(criteria))) then
          word = 'does not conform'
       else
-         word = trim(merge('inconclusive', 'conforms    ', any(is_inconclusive(criteria))))
+         word = trim(merge('undecided', 'conforms ', any(is_undecided(criteria))))
       end if
    end function get_verdict
 
-   !> Verdict on one value: `conforms`, `too low` or `too high`, or `inconclusive` by its numerical error.
+   !> Verdict on one value: `conforms`, `too low` or `too high`, or `undecided` by its numerical error.
    function get_verdict_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
       character(len=:), allocatable :: word
 
-      if (is_inconclusive(criterion)) then
-         word = 'inconclusive'
+      if (is_undecided(criterion)) then
+         word = 'undecided'
       else if (conforms(criterion)) then
          word = 'conforms'
       else

@@ -14,7 +14,7 @@ module thud_table
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count, show
    use thud_report, only: get_verdict, get_verdict_word
-   use thud_source_limits, only: conforms, criterion_type, is_inconclusive
+   use thud_source_limits, only: conforms, criterion_type, is_undecided
    use thud_text, only: fixed, flush_right, newline, padded, replaced, screen_width, significant, to_text
    implicit none (type, external)
    private
@@ -76,7 +76,7 @@ contains
          do i = 1, octave_count
             associate (error => history%numerical_error%octave(i))
                if (.not. history%numerical_error%known) exit
-               if (error > shown_error .or. is_inconclusive(criteria(i))) text = text//row('error at ' &
+               if (error > shown_error .or. is_undecided(criteria(i))) text = text//row('error at ' &
                   //get_band_name(assessment%bands(i))//' Hz', fixed(error, 2), 'dB')
             end associate
          end do
@@ -84,13 +84,13 @@ contains
          text = text//get_verification_rows(history)//newline
          verdict = 'the source '//get_verdict(criteria)
          undecided = ''
-         if (any(is_inconclusive(criteria))) then
-            undecided = '; '//to_text(count(is_inconclusive(criteria)))//' inconclusive by the numerical error'
-            if (get_verdict(criteria) == 'inconclusive') verdict = 'it is inconclusive whether the source conforms'
+         if (any(is_undecided(criteria))) then
+            undecided = '; '//to_text(count(is_undecided(criteria)))//' undecided by the numerical error'
+            if (get_verdict(criteria) == 'undecided') verdict = 'it is undecided whether the source conforms'
          end if
          text = text//'  With these values '//verdict//' to the limits of the ' &
             //replaced(trim(case%source), '_', ' ')//': it meets ' &
-            //to_text(count(conforms(criteria) .and. .not. is_inconclusive(criteria)))//' of '//to_text(size(criteria)) &
+            //to_text(count(conforms(criteria) .and. .not. is_undecided(criteria)))//' of '//to_text(size(criteria)) &
             //' criteria'//undecided//'.'//newline &
             //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
       end associate

@@ -2,7 +2,7 @@
 import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
 import { interpolate, plot, swatch } from "./plot.js";
 
-const RESULTS = { conforms: "conforms", inconclusive: "undecided" };
+const RESULTS = { conforms: "conforms", undecided: "undecided" };
 const UNCERTAINTIES = { "numerical error": "numerical error of the computation", "uncertainty (95 %)": "measurement uncertainty (95 %)" };
 // Verdicts on the required level of a room.
 const ROOM_VERDICTS = { conforms: "met", fails: "not met", undecided: "undecided" };
@@ -139,7 +139,7 @@ function marginOf(criterion) {
 
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
-  if (criterion.verdict === "inconclusive") return "undecided";
+  if (criterion.verdict === "undecided") return criterion.verdict;
   if (marginOf(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
