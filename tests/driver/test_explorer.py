@@ -34,6 +34,7 @@ from thud.explorer import server
 from thud.explorer.answer import new_case
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.form import construction_form, form
+from thud.explorer.models import input_case
 from thud.impact.compute import compute
 from thud.level.assessment import Criterion
 from thud.level.estimate import Estimate
@@ -175,6 +176,45 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("path", ["/solve", "/improve", "/download/case.nml", "/press", "/fit"])
+def test_files_named_by_a_page_are_neither_opened_nor_quoted(
+    client: TestClient, tmp_path: Path, path: str
+) -> None:
+    (tmp_path / "secret").write_text("password 123\n")
+    floor = {"floor": {"name": "modal_floor"}}
+    messages = set()
+    for name in ("secret", "missing"):
+        case = SHELL | floor | {"modal_floor": {"file": str(tmp_path / name)}, "room": {}}
+        request: dict[str, Any] = {"json": case}
+        if path in {"/press", "/fit"}:
+            request = form_of(WAV, {"case": json.dumps(case)})
+        response = client.post(path, **request)
+        assert response.status_code == 400
+        messages.add(response.json()["error"])
+    # It does not even say whether a file exists.
+    (message,) = messages
+    assert message == "File cannot be chosen on the page; allowed: a file that it offers"
+
+
+def test_page_opens_files_of_the_command_and_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "modes.csv"
+    path.write_bytes((REPOSITORY / "inputs/floors/modal_slab.csv").read_bytes())
+    for file in (str(path), None):
+        values = input_case("floors/modal_slab.nml").to_namelist()
+        start = {group: dict(keys) for group, keys in values.items()}
+        if file:
+            start["modal_floor"]["file"] = file
+        application = server.new_application(
+            start if file else {}, token=TOKEN, hosts=("127.0.0.1",)
+        )
+        with TestClient(application, base_url="http://127.0.0.1", headers=HEAD) as own:
+            assert solved(own, start)["floor"]
+
+
+def test_every_key_of_a_text_is_treated_as_a_file() -> None:
+    assert {"modal_floor": ["file"]} == server.FILE_KEYS
+
+
 def test_slow_case_reports_and_answers(client: TestClient) -> None:
     values = {
         "model": {"name": "finite_element"},

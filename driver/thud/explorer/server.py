@@ -22,6 +22,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from thud.base._schema import KEYS
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
@@ -36,7 +37,7 @@ from thud.explorer.presets import presets
 from thud.explorer.recording_fields import press_form, recording_form, recording_table
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping
 
     from starlette.requests import Request
     from starlette.types import Receive, Scope, Send
@@ -46,6 +47,12 @@ if TYPE_CHECKING:
 # Maximum size of a case and of the files of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
+# Keys that name files, by group: all texts but the name of the case and the lists of unknowns.
+FILE_KEYS = {
+    key.group: [other.name for other in KEYS if other.group == key.group and other.kind == "text"]
+    for key in KEYS
+    if key.kind == "text" and key.group != "case"
+}
 # Maximum number of files and of fields in a form.
 MAX_FILES = 100
 MAX_FIELDS = 100
@@ -136,6 +143,12 @@ def new_application(
     }
     # The page itself is sent without a token, and holds nothing of a user.
     application.state.page = new_page(None if start else presets()[0]["values"])
+    application.state.offered = {
+        path
+        for values in (start, *(facts["values"] for facts in floor_facts()))
+        for _, keys in _files_in(values)
+        for path in keys.values()
+    }
     application.state.token = token
     application.state.slow = slow
     application.state.quick = quick
@@ -181,13 +194,13 @@ async def _improve(request: Request) -> Response:
 
 async def _fit(request: Request) -> Response:
     return await _with_files(
-        request, "fit", lambda form: (recording_table(form), _groups(form.get("case", "")))
+        request, "fit", lambda form: (recording_table(form), _groups(request, form.get("case", "")))
     )
 
 
 async def _press(request: Request) -> Response:
     return await _with_files(
-        request, "press", lambda form: (dict(form), _groups(form.get("case", "")))
+        request, "press", lambda form: (dict(form), _groups(request, form.get("case", "")))
     )
 
 
@@ -352,18 +365,33 @@ async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None
 
 async def _values(request: Request) -> dict[str, dict[str, Any]]:
     """Return the values in the body of a request, by group and key."""
-    return _groups(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+    return _groups(request, b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
 
 
-def _groups(content: bytes | str) -> dict[str, dict[str, Any]]:
-    """Return the values of JSON, by group and key."""
+def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]:
+    """Return the values of JSON, by group and key.
+
+    Raise InputError if they name a file that the server does not offer itself.
+    """
     try:
         values = json.loads(content)
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
     if not isinstance(values, dict):
         raise HTTPException(400, "the request does not contain groups of keys")
+    for group, keys in _files_in(values):
+        for name, path in keys.items():
+            if not isinstance(path, str) or path not in request.app.state.offered:
+                refuse(f"&{group}: {name} cannot be chosen on the page", "a file that it offers")
     return values
+
+
+def _files_in(values: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield groups with the files that they name, by key."""
+    for group, names in FILE_KEYS.items():
+        keys = values.get(group)
+        if isinstance(keys, dict):
+            yield group, {name: keys[name] for name in names if keys.get(name)}
 
 
 def start_with(path: Path | None) -> dict[str, Any]:
