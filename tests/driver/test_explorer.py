@@ -212,7 +212,7 @@ def test_page_opens_files_of_the_command_and_its_own(tmp_path: Path) -> None:
 
 
 def test_every_key_of_a_text_is_treated_as_a_file() -> None:
-    assert {"modal_floor": ["file"]} == server.FILE_KEYS
+    assert server.FILE_KEYS == {"modal_floor": ["file"]}
 
 
 def test_slow_case_reports_and_answers(client: TestClient) -> None:
