@@ -1122,3 +1122,15 @@ def test_body_that_rests_is_ended(client: TestClient, monkeypatch: pytest.Monkey
         raise AssertionError
 
     assert call(client, rest)[0]["status"] == 408
+
+
+def test_body_that_trickles_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "BODY_TIME", 0.2)
+
+    async def trickle() -> dict[str, Any]:
+        await asyncio.sleep(0.01)
+        return {"type": "http.request", "body": b" ", "more_body": True}
+
+    start, body = call(client, trickle)
+    assert start["status"] == 408
+    assert "too slowly" in body["body"].decode()

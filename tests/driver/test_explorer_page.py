@@ -342,13 +342,43 @@ def test_error_of_a_recording_is_at_its_field(browser: Browser, server: Served) 
     sync_api.expect(page.locator("#message")).to_contain_text("<b>note.wav")
 
 
-def test_missing_token_is_said_at_once(browser: Browser, server: Served) -> None:
-    page = browser.new_context().new_page()
-    page.goto(server[0].partition("#")[0])
+@pytest.mark.parametrize("is_same_page", [True, False])
+def test_link_without_a_token_shows_how_to_open_it_and_then_its_case(
+    browser: Browser, server: Served, *, is_same_page: bool
+) -> None:
+    sender = new_page(browser, server[0])
+    fill(sender, "drop.height", "0.7")
+    settle(sender)
+    share(sender, "#link")
+    note = sender.locator(".note")
+    sync_api.expect(note).to_contain_text("browsers that have opened the full address")
+    link = sender.evaluate("navigator.clipboard.readText()")
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(link)
     sync_api.expect(page.locator("#message")).to_contain_text("Open the full address")
-    assert "Loading" not in page.locator("#verdict").inner_text()
-    for part in ("#keep", "#tools"):
-        sync_api.expect(page.locator(part)).to_be_hidden()
+    shown = page.locator("main").inner_text()
+    assert shown == page.locator("#message").inner_text()
+    (page if is_same_page else context.new_page()).goto(server[0])
+    sync_api.expect(field(page, "drop.height")).to_have_value("0.7")
+
+
+def test_link_copied_twice_keeps_the_name_of_its_button(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    for _ in range(2):
+        share(page, "#link")
+    sync_api.expect(page.locator("#link")).to_have_text("Copy link")
+
+
+def test_each_tab_has_its_own_units(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    other = page.context.new_page()
+    other.goto(server[0])
+    other.locator("#preset_standard_ball").wait_for()
+    share(other, "#units")
+    sync_api.expect(field(other, "ball.wall_thickness")).to_have_value("0.032")
+    fill(page, "ball.wall_thickness", "200")
+    sync_api.expect(page.locator("#message")).to_contain_text("200 mm")
 
 
 @pytest.mark.parametrize("width", [1400, 400])

@@ -60,8 +60,10 @@ MAX_FIELDS = 100
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Header that is "SI" if fields and messages are to have SI units.
 UNITS = "x-thud-units"
-# Maximum pause between two chunks of a body, s.
+# Maximum pause between two chunks of a body, s, and its maximum duration: a time, s, plus that of
+# its bytes at a rate, 1/s.
 BODY_TIMEOUT = 20.0
+BODY_TIME, BODY_RATE = 60.0, 50_000.0
 # Level of compression: higher ones save a few percent and take twice as long.
 COMPRESSION = 6
 # Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
@@ -344,17 +346,21 @@ class _Reports(StreamingResponse):
 
 
 async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None]:
-    """Yield the chunks of a body; raise HTTPException if it is too long or stops."""
+    """Yield the chunks of a body; raise HTTPException if it is too long, too slow or stops."""
     length = 0
+    start = anyio.current_time()
     chunks = request.stream()
     while True:
+        rest = start + BODY_TIME + length / BODY_RATE - anyio.current_time()
         try:
-            with anyio.fail_after(BODY_TIMEOUT):
+            with anyio.fail_after(min(BODY_TIMEOUT, rest)):
                 chunk = await anext(chunks)
         except StopAsyncIteration:
             return
         except TimeoutError:
-            message = f"no data received for {BODY_TIMEOUT:g} s; allowed: less"
+            slow = f"the data arrive too slowly; allowed: {BODY_RATE / 1e3:g} kB/s or more"
+            stop = f"no data received for {BODY_TIMEOUT:g} s; allowed: less"
+            message = slow if rest < BODY_TIMEOUT else stop
             raise HTTPException(408, message) from None
         length += len(chunk)
         if length > max_length:

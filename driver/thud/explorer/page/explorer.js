@@ -352,12 +352,21 @@ async function copyLink() {
   const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
   const isCopied = await copyText(address, "Copy this link");
   if (isCopied) flash("link", "Link copied");
-  if (kept.some(({ values }) => !values) || state.door === "recording") showMessage("The link holds the models; recordings are too large for a link: use “Save as HTML”");
+  const hasRecording = kept.some(({ values }) => !values) || state.door === "recording";
+  showNote(`The link works in browsers that have opened the full address shown in the terminal, while the server runs. For others use “Save as HTML”.${hasRecording ? " It holds the models; recordings are too large for a link." : ""}`);
+}
+
+/** Show a note in front of the page until it is closed. */
+function showNote(text) {
+  document.querySelector(".note")?.remove();
+  const note = element("div", { class: "task note", role: "status" }, element("span", {}, text), button("Close", () => note.remove()));
+  byId("tasks").append(note);
 }
 
 function flash(id, text) {
   const target = typeof id === "string" ? byId(id) : id;
   const before = target.textContent;
+  if (before === text) return;
   target.textContent = text;
   setTimeout(() => { target.textContent = before; }, 1500);
 }
@@ -529,6 +538,20 @@ function listen() {
   listenToBall();
 }
 
+/** Show nothing but the message until a token arrives, in this page or another one; then load the page with its link. */
+function awaitToken() {
+  document.body.classList.add("locked");
+  retryTimer = setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);
+  addEventListener("storage", ({ key }) => { if (key === "token") location.reload(); });
+  addEventListener("hashchange", () => {
+    const token = new URLSearchParams(location.hash.slice(1)).get("token");
+    if (!token) return;
+    localStorage.setItem("token", token);
+    history.replaceState(null, "", fragment.size ? `#${fragment}` : location.pathname);
+    location.reload();
+  });
+}
+
 async function main() {
   try {
     Object.assign(about, await firstAbout);
@@ -536,7 +559,7 @@ async function main() {
     byId("verdict").replaceChildren();
     setOutdated(true, false);
     showMessage(error.message);
-    if (error instanceof ConnectionError) retryTimer = setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);
+    if (error instanceof ConnectionError) awaitToken();
     return;
   }
   byId("tools").hidden = false;

@@ -11,7 +11,7 @@ export const firstVariant = findFirst();
 function findFirst() {
   // Empty if the command names a case, which this page must not show without its token.
   const content = JSON.parse(byId("first_answer").textContent || "null");
-  if (!content || fragment.has("case")) return null;
+  if (!content || fragment.has("case") || !localStorage.getItem("token")) return null;
   let stored = null;
   try { stored = JSON.parse(localStorage.getItem(STORE)); } catch { /* Not written by this page. */ }
   const variant = stored ? stored.start === "{}" && stored.shown : { door: "ball", style: 0, label: "Standard ball", ...content };

@@ -22,10 +22,12 @@ if (fragment.get("token")) {
   history.replaceState(null, "", fragment.size ? `#${fragment}` : location.pathname);
 }
 
-/** Units of the fields: "SI", or empty for mm, MPa and so on. */
+let ownUnits = localStorage.getItem("units") ?? "";
+
+/** Units of the fields: "SI", or empty for mm, MPa and so on; stored for the next page, as other open pages keep theirs. */
 export const units = {
-  get: () => localStorage.getItem("units") ?? "",
-  set: (name) => localStorage.setItem("units", name),
+  get: () => ownUnits,
+  set: (name) => { ownUnits = name; localStorage.setItem("units", name); },
 };
 
 /** Return the response; throw ServerError, ConnectionError or, if the request was cancelled, AbortError. */
