@@ -310,6 +310,55 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     assert any("ring" in warning for warning in warnings)
 
 
+WAV = (REPOSITORY / "inputs/recordings/drop_1.wav").read_bytes()
+LABORATORY = (REPOSITORY / "inputs/recordings/lab.toml").read_bytes()
+
+
+def measured_with(client: TestClient, *files: tuple[str, bytes], **fields: str) -> dict[str, Any]:
+    """Return the last report on several files."""
+    return last_report(client, "/measure", files=[("file", file) for file in files], data=fields)
+
+
+def test_file_of_the_laboratory_is_read_with_its_recordings(client: TestClient) -> None:
+    files = ("lab.toml", LABORATORY), ("drop_1.wav", WAV)
+    answer = measured_with(client, *files)["answer"]
+    config = REPOSITORY / "inputs/recordings/lab.toml"
+    known = thud.read_recording(REPOSITORY / "inputs/recordings/drop_1.wav", config=config)
+    assert answer["levels"]["level"] == pytest.approx(known.levels(), abs=1e-4)
+    assert answer["asks"] == []
+    # A field of the page replaces its value, and the others of the same table stay.
+    other = measured_with(client, *files, plate_Q="10")["answer"]
+    assert other["levels"]["level"] != answer["levels"]["level"]
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ([("lab.toml", LABORATORY)], "'lab.toml': is the file of a laboratory"),
+        ([("a.toml", b""), ("b.toml", b""), ("a.wav", WAV)], "2 files of laboratories"),
+        ([("lab.toml", b"mass = 'x'"), ("a.wav", WAV)], "'lab.toml': “Mass, kg”"),
+        (
+            [("lab.toml", b"[report]\naccreditation_mark = '/etc/x.png'"), ("a.wav", WAV)],
+            "accreditation_mark cannot be sent",
+        ),
+    ],
+)
+def test_bad_files_of_laboratories_get_a_sentence(
+    client: TestClient, files: list[tuple[str, bytes]], words: str
+) -> None:
+    assert words in measured_with(client, *files)["error"]
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "field"),
+    [(None, "a.wav", "calibration"), (b"force, N\n" + b"1\n2\n3\n" * 99, "a.csv", "sample_rate")],
+)
+def test_missing_value_of_a_recording_names_its_field(
+    client: TestClient, content: bytes | None, name: str, field: str
+) -> None:
+    assert measured(client, content or WAV, name=name)["field"] == field
+
+
 def table_of(force: np.ndarray, rate: float) -> bytes:
     """Return a recording as a table of text."""
     text = io.StringIO()
@@ -571,7 +620,6 @@ def unpacking_matlab() -> bytes:
     return content.getvalue()
 
 
-WAV = (REPOSITORY / "inputs/recordings/drop_1.wav").read_bytes()
 # Place of the length of its samples.
 LENGTH = WAV.index(b"data") + 4
 

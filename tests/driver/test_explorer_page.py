@@ -138,6 +138,35 @@ def predict(name: str) -> thud.RoomPrediction:
 # ---- The three questions.
 
 
+def test_missing_calibration_is_asked_for_and_the_laboratory_states_it(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "recording")
+    page.locator("#file").set_input_files(RECORDINGS / "drop_1.wav")
+    page.locator("#ask_calibration").fill(CALIBRATION)
+    page.locator("#assess").click()
+    settle(page)
+    sync_api.expect(page.locator("#recording_calibration")).to_have_value(CALIBRATION)
+    page.locator("#recording_calibration").fill("")
+    page.locator("#file").set_input_files(RECORDINGS / "lab.toml")
+    settle(page)
+    sync_api.expect(page.locator("#files")).to_contain_text("lab.toml (laboratory)")
+    sync_api.expect(page.locator("#verdict .subject")).to_have_text("drop_1.wav, 1 drop")
+
+
+def test_missing_sample_rate_opens_its_field(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "recording")
+    drop_file(page, b"force, N\n" + b"1\n2\n3\n" * 99, "record.csv")
+    sync_api.expect(page.locator("#message")).to_contain_text("“Sample rate, Hz”")
+    sync_api.expect(page.locator("#recording_sample_rate")).to_have_attribute(
+        "aria-invalid", "true"
+    )
+    for place in ("#recording_sample_rate", "#ask_sample_rate"):
+        sync_api.expect(page.locator(place)).to_be_visible()
+
+
 def test_does_my_recording_conform(browser: Browser, server: Served, tmp_path: Path) -> None:
     page = new_page(browser, server[0])
     drop_file(page, RECORDING.read_bytes(), RECORDING.name)

@@ -6,7 +6,7 @@ import { STORE, firstVariant } from "./first.js";
 import { listenToBall, showBall } from "./ball.js";
 import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
 import { closePress } from "./press.js";
-import { addFiles, buildDoor, recording, recordingBody, showAsks } from "./recording.js";
+import { addFiles, buildDoor, isLaboratory, recording, recordingBody, showAsks } from "./recording.js";
 import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
@@ -118,6 +118,7 @@ async function solve() {
     clearTimeout(dimming);
     if (job === thisJob) setOutdated(true, false);
     showError(error);
+    if (isRecording && state.door === door && about.recording.some((field) => field.name === error.field)) showAsks([{ reason: "", values: { [error.field]: "" } }], onChange);
   } finally {
     if (job === thisJob) {
       job = null;
@@ -134,7 +135,7 @@ function checkedBody(values) {
 }
 
 function recordedVariant(answer, body) {
-  const [{ name }, ...others] = recording.files;
+  const [{ name }, ...others] = recording.files.filter((file) => !isLaboratory(file));
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
   const stated = Object.entries(state.recording).map(([key, text]) => [about.recording.find((field) => field.name === key)?.label ?? key, text]);
   return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer, body };

@@ -10,7 +10,7 @@ export function buildRecording(onChange) {
   const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, onChange));
   byId("inputs").replaceChildren(
     element("div", { id: "drop_zone", class: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
-      element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS")),
+      element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS; with it the laboratory’s TOML file")),
     element("ul", { id: "files", "aria-label": "Files" }),
     element("fieldset", {}, element("legend", {}, "What the file does not say"), ...fields(false)),
     element("details", {}, element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
@@ -33,8 +33,11 @@ export function addFiles(files, onChange) {
   onChange();
 }
 
+/** Return whether a file is that of the laboratory, not a record. */
+export const isLaboratory = ({ name }) => /\.toml$/i.test(name);
+
 function showFiles(onChange) {
-  byId("files")?.replaceChildren(...recording.files.map((file) => element("li", {}, file.name,
+  byId("files")?.replaceChildren(...recording.files.map((file) => element("li", {}, isLaboratory(file) ? `${file.name} (laboratory)` : file.name,
     button("×", () => {
       recording.files = recording.files.filter((other) => other !== file);
       showFiles(onChange);
@@ -76,15 +79,15 @@ export function showAsks(asks, onChange) {
   form.hidden = !open.length;
   const cards = open.map(({ reason, values }) => {
     const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
-    const inputs = fields.map(({ name, label }) => {
+    const inputs = fields.map(({ name, label, kind, hint }) => {
       const id = `ask_${name}`;
       const value = String(state.recording[name] ?? values[name]);
-      const input = element("input", { id, name, type: "number", step: "any", value });
+      const input = element("input", { id, name, type: kind, step: kind === "number" && "any", value });
       const old = byId(id);
       if (old?.defaultValue === value) input.value = old.value;
-      return element("div", { class: "field" }, element("label", { for: id }, label), input);
+      return element("div", { class: "field" }, element("label", { for: id }, label + hint), input);
     });
-    return element("div", {}, element("p", {}, reason), ...inputs);
+    return element("div", {}, reason ? element("p", {}, reason) : "", ...inputs);
   });
   form.replaceChildren(...cards, ...(cards.length ? [button("Assess with this", () => {}, { class: "strong", type: "submit", id: "assess" })] : []));
   // After Enter the next value is missing.
