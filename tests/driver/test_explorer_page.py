@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shutil
 import time
@@ -769,16 +770,32 @@ def test_saved_page_holds_all_variants(browser: Browser, server: Served, tmp_pat
     page.locator("#keep").click()
     page.locator("#preset_shell").click()
     settle(page)
+    page.locator("#differences").check()
     with page.expect_download() as found:
         share(page, "#save_page")
     found.value.save_as(tmp_path / "thud.html")
-    saved = browser.new_page()
+    saved = browser.new_page(viewport={"width": 400, "height": 800})
     requests: list[str] = []
     saved.on("request", lambda request: requests.append(request.url))
     saved.goto(f"file://{tmp_path}/thud.html")
     for text in ("Ball of the paper", "Standard ball", "Criteria", "Loss factor", "does not"):
         sync_api.expect(saved.locator("body")).to_contain_text(text)
     assert saved.locator("svg[viewBox]").count() == 2
+    # The plots show the values of all variants, readable on a phone.
+    for plot in saved.locator("figure svg").all():
+        sync_api.expect(plot).to_contain_text("Ball of the paper")
+        sync_api.expect(plot).not_to_contain_text("Difference")
+        assert plot.evaluate("plot => plot.clientWidth / plot.viewBox.baseVal.width") > 0.85
+    sync_api.expect(page.locator("#levels")).to_contain_text("Difference")
+    assert saved.evaluate("document.documentElement.scrollWidth") == 400
+    # Main inputs and results of each variant.
+    inputs = saved.locator("table", has=saved.locator("caption"))
+    assert inputs.count() == 2
+    for table in inputs.all():
+        for name in ("Outer radius", "Wall thickness", "Mass", "Young's modulus", "Height"):
+            sync_api.expect(table).to_contain_text(name)
+    for text in ("peak force 1580 N", "peak elastic force 1574 N"):
+        sync_api.expect(saved.locator("body")).to_contain_text(text)
     assert saved.locator("button, script").count() == 0
     assert len(requests) == 1
 
@@ -797,9 +814,51 @@ def test_plots_are_saved(browser: Browser, server: Served, tmp_path: Path, schem
     assert "rgb(0, 114, 178)" in svg
     assert "class=" not in svg
     assert (tmp_path / "PNG").read_bytes().startswith(b"\x89PNG")
-    header, first, *_ = (tmp_path / "CSV").read_text().splitlines()
-    assert header == '"Octave band, Hz","Standard ball, dB"'
-    assert first.startswith("31.5,38.68")
+    assert "<title>Force exposure level</title>" in svg
+    header, first, *_, last = csv.reader((tmp_path / "CSV").read_text().splitlines())
+    assert header == [
+        "Octave band, Hz", "Standard ball, dB", "Standard ball, low (95 %), dB",
+        "Standard ball, high (95 %), dB", "lower limit, dB", "upper limit, dB",
+    ]  # fmt: skip
+    assert first[0] == "31.5"
+    assert first[1].startswith("38.68")
+    assert first[-2:] == ["38", "40"]
+    value, low, high = map(float, last[1:4])
+    assert low < value < high
+
+
+def test_names_are_neither_formulas_nor_hinder_an_image(
+    browser: Browser, server: Served, tmp_path: Path
+) -> None:
+    page = new_page(browser, server[0])
+    page.locator("#keep").click()
+    page.locator("#variants .name").first.click()
+    page.keyboard.type("=1+1\u0007")
+    page.evaluate("document.activeElement.value += '\\u0007'")
+    page.keyboard.press("Enter")
+    for kind in ("PNG", "CSV"):
+        page.locator("#levels_figure .menu summary").click()
+        with page.expect_download() as found:
+            page.locator("#levels_figure .menu button", has_text=kind).click()
+        found.value.save_as(tmp_path / kind)
+    assert (tmp_path / "PNG").read_bytes().startswith(b"\x89PNG")
+    header = next(csv.reader((tmp_path / "CSV").read_text().splitlines()))
+    assert header[1] == "'=1+1, dB"
+
+
+def test_case_with_an_error_is_not_downloaded(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    downloads: list[object] = []
+    page.on("download", lambda download: downloads.append(download))  # noqa: PLW0108
+    fill(page, "drop.height", "")
+    message = page.locator("#message")
+    sync_api.expect(message).to_contain_text("enter a number")
+    for entry in ("[data-file='case.nml']", "[data-copy='case.py']", "#link"):
+        share(page, entry)
+        sync_api.expect(field(page, "drop.height")).to_be_focused()
+        sync_api.expect(message).to_contain_text("enter a number")
+    page.wait_for_timeout(300)
+    assert downloads == []
 
 
 def test_case_is_copied_and_downloaded(browser: Browser, server: Served, tmp_path: Path) -> None:

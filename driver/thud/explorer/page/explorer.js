@@ -193,8 +193,7 @@ function showAll() {
   byId("force_figure").hidden = hasRoom;
   byId("force_figure").classList.toggle("second", !hasRoom);
   byId("criteria_section").hidden = door === "floor";
-  showRooms(variants, options);
-  if (!hasRoom) showForces(variants, options);
+  showPlots(variants, options);
   showFloors(variants);
   if (door !== "floor") showCriteria(variants);
   showBall(door === "recording" ? null : own.answer.motion);
@@ -203,6 +202,12 @@ function showAll() {
   if (door === "recording") byId("next").append(button("Calibration report", () => saveReport(own), { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
   if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
+}
+
+/** Show the plots of room or force. */
+function showPlots(variants, options) {
+  showRooms(variants, options);
+  if (!variants[0].answer.room) showForces(variants, options);
 }
 
 /** Show the result of the last fit, and its details folded; at first in sight. */
@@ -348,6 +353,7 @@ function restoreStored() {
 }
 
 async function copyLink() {
+  if (hasInvalidField()) return;
   const variants = kept.filter(({ values }) => values).map(({ door, values, title }) => ({ door, values, title }));
   const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, units: units.get() };
   const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
@@ -488,7 +494,22 @@ async function improve(title) {
   } catch (error) { showError(error); } finally { asked.disabled = false; }
 }
 
+/** Move to the field with an error, of which the message is shown; return whether there is one. */
+function hasInvalidField() {
+  const input = document.querySelector("#inputs [aria-invalid]");
+  input?.focus();
+  return Boolean(input);
+}
+
+/** Save the page of all variants; its plots show the values, not their differences. */
+function savePage(variants) {
+  showPlots(variants, { thirds: byId("thirds").checked });
+  saveFile("thud.html", pageOf(variants, about.version), "text/html");
+  showAll();
+}
+
 async function download(name, copyButton) {
+  if (hasInvalidField()) return;
   const values = caseValues();
   if (name === "study.toml") values.moved = state.moved;
   try {
@@ -512,7 +533,7 @@ function listen() {
   byId("units").addEventListener("click", switchUnits);
   byId("reset").addEventListener("click", reset);
   byId("link").addEventListener("click", copyLink);
-  byId("save_page").addEventListener("click", () => { const variants = variantsOfDoor(); if (variants.length) saveFile("thud.html", pageOf(variants, about.version), "text/html"); });
+  byId("save_page").addEventListener("click", () => { const variants = variantsOfDoor(); if (variants.length) savePage(variants); });
   for (const name of ["thirds", "differences"]) byId(name).addEventListener("change", showAll);
   for (const target of document.querySelectorAll("[data-file]")) target.addEventListener("click", () => download(target.dataset.file));
   for (const target of document.querySelectorAll("[data-copy]")) target.addEventListener("click", () => download(target.dataset.copy, target));
