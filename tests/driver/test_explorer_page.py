@@ -969,6 +969,115 @@ def test_keyboard_alone_opens_all_doors(browser: Browser, server: Served) -> Non
     sync_api.expect(page.locator("#file")).to_be_focused()
 
 
+# Whether the focus is in an element.
+HAS_FOCUS = "box => box.contains(document.activeElement)"
+
+
+def test_tab_goes_from_the_doors_through_the_inputs_to_the_results(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    inputs, panel = page.locator("#inputs"), page.locator("#panel")
+    for door in DOORS:
+        open_door(page, door)
+        page.locator(f"#door_{door}").focus()
+        stops = []
+        for _ in range(60):
+            page.keyboard.press("Tab")
+            if not page.evaluate("document.activeElement !== document.body"):
+                break
+            if panel.evaluate(HAS_FOCUS):
+                stops.append(inputs.evaluate(HAS_FOCUS))
+        assert stops[0]
+        assert stops == sorted(stops, reverse=True)
+
+
+def test_asked_values_follow_the_files_that_were_chosen(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "recording")
+    page.locator("#file").set_input_files(RECORDING)
+    settle(page)
+    page.locator("#file").focus()
+    for _ in range(2):
+        page.keyboard.press("Tab")
+    sync_api.expect(page.locator("#ask_plate_f0")).to_be_focused()
+    for _ in range(4):
+        page.keyboard.press("Tab")
+    sync_api.expect(page.locator("#assess")).to_be_focused()
+
+
+def test_chosen_preset_moves_no_other(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    places = """() => [...document.querySelectorAll(".choices button, #doors button")]
+        .map((box) => JSON.stringify(box.getBoundingClientRect()))"""
+    before = page.evaluate(places)
+    page.locator("#preset_shell").click()
+    settle(page)
+    assert page.evaluate(places) == before
+
+
+def test_column_of_inputs_ends_with_a_whole_row_and_its_folded_fields(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    more = page.locator("#inputs .folded summary")
+    sync_api.expect(more).to_be_in_viewport(ratio=1)
+    end = more.evaluate("box => box.getBoundingClientRect().top")
+    for row in page.locator("#inputs .field:visible").all():
+        box = row.bounding_box()
+        assert box
+        assert box["y"] >= end or box["y"] + box["height"] <= end
+
+
+def test_phone_shows_the_whole_answer_and_hides_no_field(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0], 400)
+    # A headline as long as they come.
+    fill(page, "drop.height", "0.6")
+    fill(page, "ball.mass", "3.5")
+    settle(page)
+    verdict = page.locator("#verdict")
+    assert verdict.evaluate("box => box.scrollHeight <= box.clientHeight + 1")
+    assert verdict.evaluate("box => box.getBoundingClientRect().bottom") < 90
+    name = page.locator("#detail").evaluate("box => getComputedStyle(box, '::before').content")
+    assert name.startswith('"Standard ball')
+    field(page, "ball.wall_thickness").click()
+    help_box = field(page, "ball.wall_thickness.help").bounding_box()
+    mass = field(page, "ball.mass").bounding_box()
+    assert help_box
+    assert mass
+    assert mass["y"] + mass["height"] <= help_box["y"]
+    page.evaluate("scrollTo(0, 0)")
+    open_door(page, "floor")
+    sync_api.expect(field(page, "room.required")).to_be_in_viewport(ratio=1)
+
+
+def test_field_at_the_bottom_stands_above_its_help(browser: Browser, server: Served) -> None:
+    for width in (1400, 400):
+        page = new_page(browser, server[0], width)
+        source = field(page, "limits.source")
+        source.evaluate("box => box.scrollIntoView({ block: 'end' })")
+        source.focus()
+        shown = field(page, "limits.source.help").bounding_box()
+        box = source.bounding_box()
+        assert shown
+        assert box
+        assert box["y"] + box["height"] <= shown["y"]
+
+
+def test_print_is_light_and_within_the_paper(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0], scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
+    page.set_viewport_size({"width": 700, "height": 1000})
+    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(27, 29, 31)"
+    limits = page.locator("#levels .limits").first
+    assert limits.evaluate("box => getComputedStyle(box).fill") == "rgb(223, 227, 231)"
+    assert page.evaluate("document.documentElement.scrollWidth") <= 700
+    for plot in page.locator(".plot svg:visible").all():
+        box = plot.bounding_box()
+        assert box
+        assert box["x"] + box["width"] <= 700
+
+
 def test_construction_is_chosen_by_typing_its_name(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     open_door(page, "floor")

@@ -223,6 +223,7 @@ function showNothing(door) {
   byId("verdict").className = "";
   byId("verdict").replaceChildren(element("b", {}, door === "recording" ? "Does my source conform?" : "Computing …"));
   byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
+  delete byId("detail").dataset.subject;
   byId("open_warnings").replaceChildren();
   for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
   for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
@@ -521,6 +522,7 @@ async function download(name, copyButton) {
 }
 
 function listen() {
+  byId("inputs").addEventListener("focusin", ({ target }) => target.closest(".field")?.scrollIntoView({ block: "nearest" }));
   byId("inputs").addEventListener("submit", (event) => event.preventDefault());
   for (const door of DOORS) byId(`door_${door}`).addEventListener("click", () => openDoor(door));
   byId("doors").addEventListener("keydown", (event) => {

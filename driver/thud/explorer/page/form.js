@@ -223,6 +223,9 @@ function floorInputs(handlers) {
   const kinds = [...new Set(about.constructions.map(({ kind }) => kind))];
   const options = [["", "None of the library"], ...kinds.map((kind) => [kind, about.constructions.filter((entry) => entry.kind === kind).map(({ name }) => [name, name])])];
   const sources = construction?.sources ?? {};
+  const rooms = groupsOf("room");
+  const isRequirement = ({ name }) => name.startsWith("required");
+  const withFields = (group, isOwn) => ({ ...group, fields: group.fields.filter(isOwn) });
   const balls = about.presets.filter((preset) => preset.door === "ball");
   const source = balls.find((preset) => isSame(sorted(preset.values), sorted(caseValues("ball"))));
   const box = element("input", { type: "checkbox", id: "has_room" });
@@ -234,8 +237,9 @@ function floorInputs(handlers) {
       element("p", { class: "help", id: "construction_text" }, construction?.text ?? "Changed values of a floor.")),
     choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls.map(({ name, title }) => [name, title])], source?.name ?? "",
       (name) => { takeValues(balls.find((preset) => preset.name === name).values); handlers.rebuild(); }),
+    ...(state.room ? rooms.map((group) => groupElement({ ...withFields(group, isRequirement), title: "Requirement" }, handlers)) : []),
     element("label", { class: "toggle" }, box, "Room below"),
-    ...(state.room ? groupsOf("room").map((group) => groupElement(group, handlers, sources)) : []),
+    ...(state.room ? rooms.map((group) => groupElement(withFields(group, (field) => !isRequirement(field)), handlers, sources)) : []),
     choiceOf("floor", "Kind of floor", about.floors.filter(({ name }) => name !== "rigid").map(({ name, title }) => [name, title]), state.floor, (name) => { setFloor(name); handlers.rebuild(); },
       element("p", { class: "help" }, `${factsOf("floor", state.floor).purpose}. `, element("em", {}, factsOf("floor", state.floor).validity))),
     groupElement(findGroup("floor", state.floor), handlers, sources),

@@ -4,6 +4,8 @@ import { about, buildInputs, state } from "./form.js";
 
 /** Files of the recording, drops of one measurement. */
 export const recording = { files: [] };
+/** What the answer asks for, between the files and the other fields. */
+const asked = element("div", { id: "asks", role: "group", "aria-label": "Missing values", hidden: true });
 
 /** Build the form of the recording; `onChange` is called when it has to be assessed again. */
 export function buildRecording(onChange) {
@@ -11,9 +13,9 @@ export function buildRecording(onChange) {
   byId("inputs").replaceChildren(
     element("div", { id: "drop_zone", class: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
       element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS; with it the laboratory’s TOML file")),
-    element("ul", { id: "files", "aria-label": "Files" }),
+    element("ul", { id: "files", "aria-label": "Files" }), asked,
     element("fieldset", {}, element("legend", {}, "What the file does not say"), ...fields(false)),
-    element("details", {}, element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
+    element("details", { class: "folded" }, element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
   showFiles(onChange);
 }
 
@@ -73,10 +75,9 @@ export function recordingBody(values) {
 
 /** Ask for what the answer lacks, with the values that it found; one button sends all, and what was typed stays. */
 export function showAsks(asks, onChange) {
-  const form = byId("asks");
   const open = (asks ?? []).filter(({ values }) => Object.keys(values).some((name) => !state.recording[name]));
-  const focus = form.contains(document.activeElement) ? document.activeElement.id : "";
-  form.hidden = !open.length;
+  const focus = asked.contains(document.activeElement) ? document.activeElement.id : "";
+  asked.hidden = !open.length;
   const cards = open.map(({ reason, values }) => {
     const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
     const inputs = fields.map(({ name, label, kind, hint }) => {
@@ -89,17 +90,16 @@ export function showAsks(asks, onChange) {
     });
     return element("div", {}, reason ? element("p", {}, reason) : "", ...inputs);
   });
-  form.replaceChildren(...cards, ...(cards.length ? [button("Assess with this", () => {}, { class: "strong", type: "submit", id: "assess" })] : []));
-  // After Enter the next value is missing.
-  if (focus) (byId(focus) ?? form.querySelector("input"))?.focus();
-  form.onsubmit = (event) => {
-    event.preventDefault();
-    for (const [name, value] of new FormData(form)) {
+  const send = () => {
+    for (const { name, value } of asked.querySelectorAll("input")) {
       if (value) state.recording[name] = value;
       byId(`recording_${name}`).value = state.recording[name] ?? "";
     }
     onChange();
   };
+  asked.replaceChildren(...cards, ...(cards.length ? [button("Assess with this", send, { class: "strong", type: "submit", id: "assess" })] : []));
+  // After Enter the next value is missing.
+  if (focus) (byId(focus) ?? asked.querySelector("input"))?.focus();
 }
 
 /** Build the inputs of the current door. */
