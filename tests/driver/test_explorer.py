@@ -430,7 +430,7 @@ def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ({}, "'ball 1.wav': enter a calibration"),
+        ({}, "'ball 1.wav': enter “Calibration”"),
         ({"filter_order": "4"}, "“Filter of the recorder” is not chosen; allowed: flat, Bessel"),
         (
             {"filter_kind": "bessel", "filter_order": "4"},
