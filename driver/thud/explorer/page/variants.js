@@ -145,12 +145,19 @@ export function showVariants(variants, { remove, rename }) {
 
 function renameIn(name, variant, rename) {
   const input = element("input", { type: "text", "aria-label": "Name", value: variant.label });
-  const finish = (text) => { if (input.isConnected) rename(variant, text); };
+  let isFinished = false;
+  const finish = (text, isLeft = false) => {
+    if (isFinished) return;
+    // Its removal is a blur, too.
+    isFinished = true;
+    rename(variant, text, isLeft);
+  };
   input.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") finish(input.value.trim());
+    // The name that gets the focus must not be pressed by the same key.
+    if (event.key === "Enter") { event.preventDefault(); finish(input.value.trim()); }
     if (event.key === "Escape") { event.stopPropagation(); finish(null); }
   });
-  input.addEventListener("blur", () => finish(input.value.trim()));
+  input.addEventListener("blur", () => finish(input.value.trim(), true));
   name.replaceWith(input);
   input.select();
 }
