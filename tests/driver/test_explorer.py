@@ -34,6 +34,7 @@ from thud.explorer import server
 from thud.explorer.answer import new_case
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.form import construction_form, form
+from thud.explorer.models import input_case
 from thud.impact.compute import compute
 from thud.level.assessment import Criterion
 from thud.level.estimate import Estimate
@@ -175,6 +176,45 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("path", ["/solve", "/improve", "/download/case.nml", "/press", "/fit"])
+def test_files_named_by_a_page_are_neither_opened_nor_quoted(
+    client: TestClient, tmp_path: Path, path: str
+) -> None:
+    (tmp_path / "secret").write_text("password 123\n")
+    floor = {"floor": {"name": "modal_floor"}}
+    messages = set()
+    for name in ("secret", "missing"):
+        case = SHELL | floor | {"modal_floor": {"file": str(tmp_path / name)}, "room": {}}
+        request: dict[str, Any] = {"json": case}
+        if path in {"/press", "/fit"}:
+            request = form_of(WAV, {"case": json.dumps(case)})
+        response = client.post(path, **request)
+        assert response.status_code == 400
+        messages.add(response.json()["error"])
+    # It does not even say whether a file exists.
+    (message,) = messages
+    assert message == "File cannot be chosen on the page; allowed: a file that it offers"
+
+
+def test_page_opens_files_of_the_command_and_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "modes.csv"
+    path.write_bytes((REPOSITORY / "inputs/floors/modal_slab.csv").read_bytes())
+    for file in (str(path), None):
+        values = input_case("floors/modal_slab.nml").to_namelist()
+        start = {group: dict(keys) for group, keys in values.items()}
+        if file:
+            start["modal_floor"]["file"] = file
+        application = server.new_application(
+            start if file else {}, token=TOKEN, hosts=("127.0.0.1",)
+        )
+        with TestClient(application, base_url="http://127.0.0.1", headers=HEAD) as own:
+            assert solved(own, start)["floor"]
+
+
+def test_every_key_of_a_text_is_treated_as_a_file() -> None:
+    assert server.FILE_KEYS == {"modal_floor": ["file"]}
+
+
 def test_slow_case_reports_and_answers(client: TestClient) -> None:
     values = {
         "model": {"name": "finite_element"},
@@ -294,6 +334,55 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     assert any("ring" in warning for warning in warnings)
 
 
+WAV = (REPOSITORY / "inputs/recordings/drop_1.wav").read_bytes()
+LABORATORY = (REPOSITORY / "inputs/recordings/lab.toml").read_bytes()
+
+
+def measured_with(client: TestClient, *files: tuple[str, bytes], **fields: str) -> dict[str, Any]:
+    """Return the last report on several files."""
+    return last_report(client, "/measure", files=[("file", file) for file in files], data=fields)
+
+
+def test_file_of_the_laboratory_is_read_with_its_recordings(client: TestClient) -> None:
+    files = ("lab.toml", LABORATORY), ("drop_1.wav", WAV)
+    answer = measured_with(client, *files)["answer"]
+    config = REPOSITORY / "inputs/recordings/lab.toml"
+    known = thud.read_recording(REPOSITORY / "inputs/recordings/drop_1.wav", config=config)
+    assert answer["levels"]["level"] == pytest.approx(known.levels(), abs=1e-4)
+    assert answer["asks"] == []
+    # A field of the page replaces its value, and the others of the same table stay.
+    other = measured_with(client, *files, plate_Q="10")["answer"]
+    assert other["levels"]["level"] != answer["levels"]["level"]
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ([("lab.toml", LABORATORY)], "'lab.toml': is the file of a laboratory"),
+        ([("a.toml", b""), ("b.toml", b""), ("a.wav", WAV)], "2 files of laboratories"),
+        ([("lab.toml", b"mass = 'x'"), ("a.wav", WAV)], "'lab.toml': “Mass, kg”"),
+        (
+            [("lab.toml", b"[report]\naccreditation_mark = '/etc/x.png'"), ("a.wav", WAV)],
+            "accreditation_mark cannot be sent",
+        ),
+    ],
+)
+def test_bad_files_of_laboratories_get_a_sentence(
+    client: TestClient, files: list[tuple[str, bytes]], words: str
+) -> None:
+    assert words in measured_with(client, *files)["error"]
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "field"),
+    [(None, "a.wav", "calibration"), (b"force, N\n" + b"1\n2\n3\n" * 99, "a.csv", "sample_rate")],
+)
+def test_missing_value_of_a_recording_names_its_field(
+    client: TestClient, content: bytes | None, name: str, field: str
+) -> None:
+    assert measured(client, content or WAV, name=name)["field"] == field
+
+
 def table_of(force: np.ndarray, rate: float) -> bytes:
     """Return a recording as a table of text."""
     text = io.StringIO()
@@ -365,7 +454,7 @@ def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ({}, "'ball 1.wav': enter a calibration"),
+        ({}, "'ball 1.wav': enter “Calibration”"),
         ({"filter_order": "4"}, "“Filter of the recorder” is not chosen; allowed: flat, Bessel"),
         (
             {"filter_kind": "bessel", "filter_order": "4"},
@@ -588,7 +677,6 @@ def unpacking_matlab() -> bytes:
     return content.getvalue()
 
 
-WAV = (REPOSITORY / "inputs/recordings/drop_1.wav").read_bytes()
 # Place of the length of its samples.
 LENGTH = WAV.index(b"data") + 4
 
@@ -1215,3 +1303,15 @@ def test_body_that_rests_is_ended(client: TestClient, monkeypatch: pytest.Monkey
         raise AssertionError
 
     assert call(client, rest)[0]["status"] == 408
+
+
+def test_body_that_trickles_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "BODY_TIME", 0.2)
+
+    async def trickle() -> dict[str, Any]:
+        await asyncio.sleep(0.01)
+        return {"type": "http.request", "body": b" ", "more_body": True}
+
+    start, body = call(client, trickle)
+    assert start["status"] == 408
+    assert "too slowly" in body["body"].decode()

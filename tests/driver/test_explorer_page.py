@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 import shutil
 import time
@@ -136,6 +137,35 @@ def predict(name: str) -> thud.RoomPrediction:
 
 
 # ---- The three questions.
+
+
+def test_missing_calibration_is_asked_for_and_the_laboratory_states_it(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "recording")
+    page.locator("#file").set_input_files(RECORDINGS / "drop_1.wav")
+    page.locator("#ask_calibration").fill(CALIBRATION)
+    page.locator("#assess").click()
+    settle(page)
+    sync_api.expect(page.locator("#recording_calibration")).to_have_value(CALIBRATION)
+    page.locator("#recording_calibration").fill("")
+    page.locator("#file").set_input_files(RECORDINGS / "lab.toml")
+    settle(page)
+    sync_api.expect(page.locator("#files")).to_contain_text("lab.toml (laboratory)")
+    sync_api.expect(page.locator("#verdict .subject")).to_have_text("drop_1.wav, 1 drop")
+
+
+def test_missing_sample_rate_opens_its_field(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "recording")
+    drop_file(page, b"force, N\n" + b"1\n2\n3\n" * 99, "record.csv")
+    sync_api.expect(page.locator("#message")).to_contain_text("“Sample rate, Hz”")
+    sync_api.expect(page.locator("#recording_sample_rate")).to_have_attribute(
+        "aria-invalid", "true"
+    )
+    for place in ("#recording_sample_rate", "#ask_sample_rate"):
+        sync_api.expect(page.locator(place)).to_be_visible()
 
 
 def test_does_my_recording_conform(browser: Browser, server: Served, tmp_path: Path) -> None:
@@ -350,13 +380,43 @@ def test_error_of_a_recording_is_at_its_field(browser: Browser, server: Served) 
     sync_api.expect(page.locator("#message")).to_contain_text("<b>note.wav")
 
 
-def test_missing_token_is_said_at_once(browser: Browser, server: Served) -> None:
-    page = browser.new_context().new_page()
-    page.goto(server[0].partition("#")[0])
+@pytest.mark.parametrize("is_same_page", [True, False])
+def test_link_without_a_token_shows_how_to_open_it_and_then_its_case(
+    browser: Browser, server: Served, *, is_same_page: bool
+) -> None:
+    sender = new_page(browser, server[0])
+    fill(sender, "drop.height", "0.7")
+    settle(sender)
+    share(sender, "#link")
+    note = sender.locator(".note")
+    sync_api.expect(note).to_contain_text("browsers that have opened the full address")
+    link = sender.evaluate("navigator.clipboard.readText()")
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(link)
     sync_api.expect(page.locator("#message")).to_contain_text("Open the full address")
-    assert "Loading" not in page.locator("#verdict").inner_text()
-    for part in ("#keep", "#tools"):
-        sync_api.expect(page.locator(part)).to_be_hidden()
+    shown = page.locator("main").inner_text()
+    assert shown == page.locator("#message").inner_text()
+    (page if is_same_page else context.new_page()).goto(server[0])
+    sync_api.expect(field(page, "drop.height")).to_have_value("0.7")
+
+
+def test_link_copied_twice_keeps_the_name_of_its_button(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    for _ in range(2):
+        share(page, "#link")
+    sync_api.expect(page.locator("#link")).to_have_text("Copy link")
+
+
+def test_each_tab_has_its_own_units(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    other = page.context.new_page()
+    other.goto(server[0])
+    other.locator("#preset_standard_ball").wait_for()
+    share(other, "#units")
+    sync_api.expect(field(other, "ball.wall_thickness")).to_have_value("0.032")
+    fill(page, "ball.wall_thickness", "200")
+    sync_api.expect(page.locator("#message")).to_contain_text("200 mm")
 
 
 @pytest.mark.parametrize("width", [1400, 400])
@@ -505,9 +565,9 @@ def test_variants_are_named_by_what_differs(browser: Browser, server: Served) ->
     assert names_of(page) == ["Wall 30 mm", "Wall 32 mm"]
     # A variant keeps its name while another model is computed.
     page.locator("#keep").click()
+    page.locator("#keep").click()
     page.route("**/solve", lambda _: None)
     page.locator("#model").select_option("hollow_sphere")
-    page.locator("#keep").click()
     assert names_of(page)[1:] == ["Wall 32 mm", "Wall 30 mm (2)", "Wall 30 mm (3)"]
     page.unroute("**/solve")
     page.reload()
@@ -703,12 +763,32 @@ def test_link_carries_all_variants(browser: Browser, server: Served) -> None:
 
 
 @pytest.mark.parametrize(
-    "case", ['{"model":{"name":"cube"}}', "3", '{"model":"x","drop":7}', "{", '{"floor":["a"]}']
+    "case",
+    [
+        "3",
+        "{",
+        '{"floor":["a"]}',
+        *(
+            f'{{"door":"ball","ball":{ball},"floor":{{"model":{{"name":"modal_ball"}}}},"variants":{kept}}}'
+            for ball, kept in (
+                ('{"model":{"name":"cube"}}', "[]"),
+                ('{"model":"modal_ball","drop":7}', "[]"),
+                ('{"model":{"name":"modal_ball"},"drop":{"height":{}}}', "[]"),
+                ('{"model":{"name":"modal_ball"}}', '[{"door":"ball","values":{}}]'),
+                (
+                    '{"model":{"name":"modal_ball"}}',
+                    '[{"door":"ball","values":{"model":{"name":"modal_ball"}},"title":{}}]',
+                ),
+            )
+        ),
+    ],
 )
 def test_link_without_a_case_is_said(browser: Browser, server: Served, case: str) -> None:
     page = new_page(browser, server[0])
     page.goto("about:blank")
     page.goto(f"{server[0].partition('#')[0]}#case={quote(case)}")
+    settle(page)
+    sync_api.expect(page.locator("#message")).to_be_visible()
     sync_api.expect(page.locator("#message")).to_contain_text("The link does not contain a case")
     sync_api.expect(page.locator("#verdict")).to_contain_text("Conforms")
 
@@ -729,6 +809,362 @@ def test_case_and_variants_return_after_a_reload(browser: Browser, server: Serve
     sync_api.expect(page.locator("#variants_section")).to_be_hidden()
 
 
+# ---- State of the page.
+
+
+def type_into(page: Page, selector: str, text: str) -> None:
+    """Select the text of a field and type another, without leaving the field."""
+    page.locator(selector).click()
+    page.keyboard.press("Control+a")
+    page.keyboard.type(text)
+
+
+def height_of(page: Page) -> str:
+    """Return the drop height in the table of criteria."""
+    return value_of(page, "Drop height").split(" ")[0]
+
+
+def load_recording(page: Page, **values: str) -> None:
+    """Choose the example recording after stating values."""
+    open_door(page, "recording")
+    for name, value in values.items():
+        page.locator(f"#recording_{name}").fill(value)
+    page.locator("#file").set_input_files(RECORDING)
+    settle(page)
+
+
+def slow_down(page: Page, path: str) -> None:
+    """Let requests of a path wait."""
+
+    def delay(route: Route) -> None:
+        time.sleep(0.7)
+        route.continue_()
+
+    page.route(f"**/{path}", delay)
+
+
+def test_answer_of_other_values_is_not_shown_as_current(
+    browser: Browser, server: Served, tmp_path: Path
+) -> None:
+    page = new_page(browser, server[0])
+    load_recording(page, height="1", mass="2.5")
+    outdated = re.compile("outdated")
+    field_of_height = page.locator("#recording_height")
+    assert height_of(page) == "1.000"
+    # (a) A value that was typed before the door changed.
+    type_into(page, "#recording_height", "1.5")
+    sync_api.expect(page.locator("body")).to_have_class(outdated)
+    for selector in ("#report", "#save_page", "#levels_figure .menu button >> nth=0"):
+        sync_api.expect(page.locator(selector)).to_be_disabled()
+    page.locator("#door_ball").click()
+    settle(page)
+    # A recording that is not assessed with its present values is in no comparison.
+    assert page.locator("#variants_section").is_hidden()
+    open_door(page, "recording")
+    assert (field_of_height.input_value(), height_of(page)) == ("1.5", "1.500")
+    sync_api.expect(page.locator("#report")).to_be_enabled()
+    # (b) Steps of Undo have the answers to their values.
+    for value in ("1", "1.2", "0.8"):
+        fill(page, "recording_height", value)
+        settle(page)
+        page.wait_for_timeout(500)
+    page.locator("#undo").click()
+    settle(page)
+    assert (field_of_height.input_value(), height_of(page)) == ("1.2", "1.200")
+    with page.expect_download() as found:
+        page.locator("#report").click()
+    found.value.save_as(tmp_path / "report.html")
+    assert re.search(r"1\.20* m|1\.200", (tmp_path / "report.html").read_text())
+    # (c, d) Files that come and go while the door changes.
+    page.locator("#file").set_input_files(RECORDINGS / "drop_2.wav")
+    page.locator("#door_ball").click()
+    page.locator("#door_recording").click()
+    sync_api.expect(page.locator("#message")).to_contain_text("drop_2.wav")
+    sync_api.expect(page.locator("body")).to_have_class(outdated)
+    page.get_by_label("Remove drop_2.wav").click()
+    page.locator("#door_ball").click()
+    open_door(page, "recording")
+    sync_api.expect(page.locator("#message")).to_be_hidden()
+    # (e) A cancelled assessment.
+    page.route("**/measure", lambda _: None)
+    fill(page, "recording_height", "0.9")
+    page.locator(".task button").click()
+    sync_api.expect(page.locator("body")).to_have_class(outdated)
+    page.locator("#door_ball").click()
+    page.unroute("**/measure")
+    page.locator("#door_recording").click()
+    sync_api.expect(page.locator("#verdict")).to_contain_text("drop_1.csv, 1 drop")
+    settle(page)
+    assert height_of(page) == "0.900"
+    # (f) An error returns with its door.
+    fill(page, "recording_calibration", "abc")
+    sync_api.expect(page.locator("#message")).to_contain_text("alibration")
+    page.locator("#door_ball").click()
+    page.locator("#door_recording").click()
+    sync_api.expect(page.locator("#message")).to_contain_text("alibration")
+    sync_api.expect(page.locator("body")).to_have_class(outdated)
+    sync_api.expect(page.locator("#report")).to_be_disabled()
+
+
+def test_undo_goes_one_step_and_keeps_what_was_just_changed(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    height = field(page, "drop.height")
+    fill(page, "drop.height", "0.9")
+    settle(page)
+    page.wait_for_timeout(600)
+    # Within the time in which changes become one step.
+    fill(page, "drop.height", "0.8")
+    page.locator("#undo").click()
+    sync_api.expect(height).to_have_value("0.9")
+    page.locator("#redo").click()
+    sync_api.expect(height).to_have_value("0.8")
+    # A button that is disabled gives the focus to its neighbor.
+    sync_api.expect(page.locator("#undo")).to_be_focused()
+    # The keys of a field are its own.
+    type_into(page, "[id='drop.height']", "0.7")
+    page.keyboard.press("Control+z")
+    page.wait_for_timeout(100)
+    assert field(page, "ball.wall_thickness").input_value() == "32"
+    assert page.locator("#undo").is_enabled()
+    # A change is stored at once when the page is left.
+    type_into(page, "[id='drop.height']", "0.6")
+    page.reload()
+    sync_api.expect(height).to_have_value("0.6")
+
+
+def test_removed_recording_returns_with_undo(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    load_recording(page, height="1", mass="2.5")
+    open_door(page, "ball")
+    # A name that is given in another door belongs to the recording.
+    page.get_by_label("Rename drop_1.csv, 1 drop").click()
+    page.get_by_label("Name", exact=True).fill("Plate 3")
+    page.keyboard.press("Enter")
+    assert names_of(page) == ["Standard ball", "Plate 3"]
+    sync_api.expect(page.locator("#variants .name").nth(1)).to_be_focused()
+    page.get_by_label("Remove Plate 3").click()
+    sync_api.expect(page.locator("#variants_section")).to_be_hidden()
+    page.locator("#undo").click()
+    settle(page)
+    assert names_of(page) == ["Standard ball", "Plate 3"]
+    open_door(page, "recording")
+    sync_api.expect(page.locator("#verdict")).to_contain_text("Plate 3")
+
+
+def test_fit_does_not_overwrite_changes(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    load_recording(page, height="1", mass="2.5", plate_f0="1100", plate_Q="25")
+    slow_down(page, "fit")
+    page.locator("#fit").click()
+    open_door(page, "ball")
+    fill(page, "ball.mass", "2.45")
+    sync_api.expect(page.locator("#message")).to_contain_text("The fit was not taken over")
+    assert field(page, "ball.mass").input_value() == "2.45"
+
+
+def test_typed_value_is_computed_after_a_pause(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    body, outdated = page.locator("body"), re.compile("outdated")
+    height = field(page, "drop.height")
+    # A digit that is taken back.
+    height.focus()
+    page.keyboard.press("End")
+    page.keyboard.type("0")
+    sync_api.expect(body).to_have_class(outdated)
+    page.keyboard.press("Backspace")
+    sync_api.expect(body).not_to_have_class(outdated)
+    # A value without Enter; its text stays as typed until the field is left.
+    type_into(page, "[id='drop.height']", "0.90")
+    settle(page)
+    assert (height_of(page), height.input_value()) == ("0.9", "0.90")
+    # A button that is clicked at once acts on the typed value.
+    fill(page, "modal_ball.loss_factor", "0.2")
+    settle(page)
+    sent: list[str] = []
+    page.on("request", lambda request: sent.append(f"{request.url} {request.post_data}"))
+    type_into(page, "[id='drop.height']", "1")
+    page.locator("#improve").click()
+    sync_api.expect(page.locator("#result li").first).to_contain_text("Loss factor")
+    (asked,) = [text for text in sent if "/improve" in text]
+    assert "height" not in asked
+    # The focus is on the verdict after the button has gone.
+    page.locator("#result button").first.click()
+    settle(page)
+    sync_api.expect(page.locator("#verdict")).to_be_focused()
+    page.locator("#next button").click()
+    sync_api.expect(page.locator("#door_floor")).to_be_focused()
+    # A recording, too.
+    load_recording(page, height="1", mass="2.5")
+    type_into(page, "#recording_height", "1.1")
+    sync_api.expect(body).to_have_class(outdated)
+    settle(page)
+    assert height_of(page) == "1.100"
+
+
+def test_numbers_are_read_or_refused_but_not_changed(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    height, message = field(page, "drop.height"), page.locator("#message")
+    type_into(page, "[id='drop.height']", "1,5")
+    page.keyboard.press("Tab")
+    settle(page)
+    assert (height.input_value(), height_of(page)) == ("1.5", "1.5")
+    for text, words in (
+        ("1,250", "“1,250” may mean 1.25 or 1250"),
+        ("0x10", "Height: enter a number, in m"),
+        ("1e", "Height: enter a number, in m"),
+        ("1 000", "Height: enter a number, in m"),
+    ):
+        type_into(page, "[id='drop.height']", text)
+        page.keyboard.press("Enter")
+        sync_api.expect(message).to_contain_text(words)
+        sync_api.expect(height).to_have_attribute("aria-invalid", "true")
+        sync_api.expect(page.locator("body")).to_have_class(re.compile("outdated"))
+        assert height.input_value() == text
+    # Keys begin with the last value, and the wheel changes none.
+    page.keyboard.press("ArrowUp")
+    settle(page)
+    sync_api.expect(height).to_have_value("1.51")
+    sync_api.expect(message).to_be_hidden()
+    height.hover()
+    page.mouse.wheel(0, 100)
+    page.wait_for_timeout(100)
+    assert height.input_value() == "1.51"
+    # Lists.
+    page.locator("#model").select_option("measured_modes")
+    settle(page)
+    for text, shown in (("24,5 30; 41", "24.5 30 41"), ("24.5, 30, 41", "24.5 30 41")):
+        fill(page, "measured_modes.frequency", text)
+        sync_api.expect(field(page, "measured_modes.frequency")).to_have_value(shown)
+    fill(page, "measured_modes.frequency", "24,30,41")
+    sync_api.expect(message).to_contain_text("“24,30,41” is not a list of numbers")
+    # A recording.
+    load_recording(page, height="1,0", mass="2.5")
+    assert height_of(page) == "1.000"
+    fill(page, "recording_height", "1e")
+    sync_api.expect(message).to_have_text("Drop height, m: enter a number")
+    sync_api.expect(page.locator("#recording_height")).to_have_attribute("aria-invalid", "true")
+    sync_api.expect(page.locator("#report")).to_be_disabled()
+
+
+def test_typed_value_wins_over_what_is_asked_for(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    load_recording(page)
+    page.route("**/measure", lambda _: None)
+    page.locator("#recording_plate_Q").fill("25")
+    sync_api.expect(page.locator("#ask_plate_Q")).to_have_value("25")
+    page.locator("#ask_mass").fill("2.4")
+    sync_api.expect(page.locator("#recording_mass")).to_have_value("2.4")
+    page.locator("#ask_height").fill("1")
+    page.unroute("**/measure")
+    page.locator("#assess").click()
+    settle(page)
+    for name, value in (("plate_f0", "1100"), ("plate_Q", "25"), ("mass", "2.4")):
+        sync_api.expect(page.locator(f"#recording_{name}")).to_have_value(value)
+    sync_api.expect(page.locator("#asks")).to_be_hidden()
+    assert page.evaluate("document.activeElement !== document.body")
+    # Values of an earlier recording are named beside their fields.
+    page.wait_for_timeout(500)
+    page.reload()
+    sync_api.expect(page.locator("#recording_plate_Q")).to_have_value("25")
+    page.locator("#file").set_input_files(RECORDING)
+    settle(page)
+    kept = page.locator("#earlier")
+    sync_api.expect(kept).to_contain_text("Kept from the last recording: Drop height, m: 1; Mass")
+    fill(page, "recording_height", "1.0")
+    sync_api.expect(kept).not_to_contain_text("height")
+    page.locator("#clear_earlier").click()
+    settle(page)
+    sync_api.expect(kept).to_be_hidden()
+    sync_api.expect(page.locator("#recording_mass")).to_have_value("")
+    sync_api.expect(page.locator("#recording_height")).to_have_value("1.0")
+
+
+def test_opened_link_is_a_step_and_restores_the_view(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    page.locator("#thirds").check()
+    page.locator("#keep").click()
+    page.locator("#differences").check()
+    fill(page, "drop.height", "0.4")
+    settle(page)
+    page.get_by_label("Rename Drop 0.4 m").click()
+    page.get_by_label("Name", exact=True).fill("Low")
+    page.keyboard.press("Enter")
+    share(page, "#link")
+    address = page.evaluate("navigator.clipboard.readText()")
+    # The name of the first variant and the view return after a reload.
+    page.reload()
+    settle(page)
+    assert names_of(page) == ["Low", "Drop 1 m"]
+    assert page.locator("#thirds").is_checked()
+    share(page, "#reset")
+    settle(page)
+    fill(page, "drop.height", "0.7")
+    page.locator("#thirds").uncheck()
+    # The address is entered into the open page.
+    page.evaluate("address => { location.href = address; }", address)
+    sync_api.expect(field(page, "drop.height")).to_have_value("0.4")
+    settle(page)
+    assert page.locator("#variants tbody tr").count() == 2
+    assert page.locator("#thirds").is_checked()
+    assert page.locator("#differences").is_checked()
+    page.locator("#undo").click()
+    sync_api.expect(field(page, "drop.height")).to_have_value("0.7")
+    settle(page)
+    assert page.locator("#variants_section").is_hidden()
+    # Another tab has a case of its own, and begins with the last one.
+    other = page.context.new_page()
+    page.wait_for_timeout(500)
+    other.goto(server[0])
+    sync_api.expect(field(other, "drop.height")).to_have_value("0.7")
+    fill(other, "drop.height", "0.5")
+    settle(other)
+    other.wait_for_timeout(500)
+    page.reload()
+    sync_api.expect(field(page, "drop.height")).to_have_value("0.7")
+
+
+def test_room_and_doors_keep_their_places(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "floor")
+    for floor in ("infinite_plate", "plate"):
+        page.locator("#floor").select_option(floor)
+        settle(page)
+        assert page.locator("#has_room").is_checked() == (floor == "plate")
+    page.locator("#door_floor").focus()
+    for key, door in (("Home", "recording"), ("End", "floor")):
+        page.keyboard.press(key)
+        sync_api.expect(page.locator(f"#door_{door}")).to_be_focused()
+
+
+@pytest.mark.parametrize("fault", ["denied", "full"])
+def test_page_works_without_storage(browser: Browser, server: Served, fault: str) -> None:
+    context = browser.new_context()
+    page = context.new_page()
+    page.on("pageerror", lambda error: pytest.fail(str(error)))
+    scripts = {
+        "denied": "for (const name of ['localStorage', 'sessionStorage']) Object.defineProperty("
+        "window, name, { get() { throw new DOMException('no', 'SecurityError'); } });",
+        "full": "Storage.prototype.setItem = () => { throw new DOMException('no', 'Quota'); };",
+    }
+    page.add_init_script(scripts[fault])
+    page.goto(server[0])
+    settle(page)
+    fill(page, "drop.height", "0.9")
+    settle(page)
+    assert height_of(page) == "0.9"
+    share(page, "#units")
+    settle(page)
+    sync_api.expect(field(page, "ball.wall_thickness")).to_have_value("0.032")
+    page.locator("#undo").click()
+    sync_api.expect(field(page, "drop.height")).to_have_value("1")
+    # The address keeps the token that cannot be stored.
+    page.reload()
+    settle(page)
+    sync_api.expect(page.locator("#verdict")).to_contain_text("Conforms")
+
+
 # ---- Files and texts.
 
 
@@ -737,16 +1173,32 @@ def test_saved_page_holds_all_variants(browser: Browser, server: Served, tmp_pat
     page.locator("#keep").click()
     page.locator("#preset_shell").click()
     settle(page)
+    page.locator("#differences").check()
     with page.expect_download() as found:
         share(page, "#save_page")
     found.value.save_as(tmp_path / "thud.html")
-    saved = browser.new_page()
+    saved = browser.new_page(viewport={"width": 400, "height": 800})
     requests: list[str] = []
     saved.on("request", lambda request: requests.append(request.url))
     saved.goto(f"file://{tmp_path}/thud.html")
     for text in ("Ball of the paper", "Standard ball", "Criteria", "Loss factor", "does not"):
         sync_api.expect(saved.locator("body")).to_contain_text(text)
     assert saved.locator("svg[viewBox]").count() == 2
+    # The plots show the values of all variants, readable on a phone.
+    for plot in saved.locator("figure svg").all():
+        sync_api.expect(plot).to_contain_text("Ball of the paper")
+        sync_api.expect(plot).not_to_contain_text("Difference")
+        assert plot.evaluate("plot => plot.clientWidth / plot.viewBox.baseVal.width") > 0.85
+    sync_api.expect(page.locator("#levels")).to_contain_text("Difference")
+    assert saved.evaluate("document.documentElement.scrollWidth") == 400
+    # Main inputs and results of each variant.
+    inputs = saved.locator("table", has=saved.locator("caption"))
+    assert inputs.count() == 2
+    for table in inputs.all():
+        for name in ("Outer radius", "Wall thickness", "Mass", "Young's modulus", "Height"):
+            sync_api.expect(table).to_contain_text(name)
+    for text in ("peak force 1580 N", "peak elastic force 1574 N"):
+        sync_api.expect(saved.locator("body")).to_contain_text(text)
     assert saved.locator("button, script").count() == 0
     assert len(requests) == 1
 
@@ -765,9 +1217,51 @@ def test_plots_are_saved(browser: Browser, server: Served, tmp_path: Path, schem
     assert "rgb(0, 114, 178)" in svg
     assert "class=" not in svg
     assert (tmp_path / "PNG").read_bytes().startswith(b"\x89PNG")
-    header, first, *_ = (tmp_path / "CSV").read_text().splitlines()
-    assert header == '"Octave band, Hz","Standard ball, dB"'
-    assert first.startswith("31.5,38.68")
+    assert "<title>Force exposure level</title>" in svg
+    header, first, *_, last = csv.reader((tmp_path / "CSV").read_text().splitlines())
+    assert header == [
+        "Octave band, Hz", "Standard ball, dB", "Standard ball, low (95 %), dB",
+        "Standard ball, high (95 %), dB", "lower limit, dB", "upper limit, dB",
+    ]  # fmt: skip
+    assert first[0] == "31.5"
+    assert first[1].startswith("38.68")
+    assert first[-2:] == ["38", "40"]
+    value, low, high = map(float, last[1:4])
+    assert low < value < high
+
+
+def test_names_are_neither_formulas_nor_hinder_an_image(
+    browser: Browser, server: Served, tmp_path: Path
+) -> None:
+    page = new_page(browser, server[0])
+    page.locator("#keep").click()
+    page.locator("#variants .name").first.click()
+    page.keyboard.type("=1+1\u0007")
+    page.evaluate("document.activeElement.value += '\\u0007'")
+    page.keyboard.press("Enter")
+    for kind in ("PNG", "CSV"):
+        page.locator("#levels_figure .menu summary").click()
+        with page.expect_download() as found:
+            page.locator("#levels_figure .menu button", has_text=kind).click()
+        found.value.save_as(tmp_path / kind)
+    assert (tmp_path / "PNG").read_bytes().startswith(b"\x89PNG")
+    header = next(csv.reader((tmp_path / "CSV").read_text().splitlines()))
+    assert header[1] == "'=1+1, dB"
+
+
+def test_case_with_an_error_is_not_downloaded(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    downloads: list[object] = []
+    page.on("download", lambda download: downloads.append(download))  # noqa: PLW0108
+    fill(page, "drop.height", "")
+    message = page.locator("#message")
+    sync_api.expect(message).to_contain_text("enter a number")
+    for entry in ("[data-file='case.nml']", "[data-copy='case.py']", "#link"):
+        share(page, entry)
+        sync_api.expect(field(page, "drop.height")).to_be_focused()
+        sync_api.expect(message).to_contain_text("enter a number")
+    page.wait_for_timeout(300)
+    assert downloads == []
 
 
 def test_case_is_copied_and_downloaded(browser: Browser, server: Served, tmp_path: Path) -> None:
@@ -876,6 +1370,115 @@ def test_keyboard_alone_opens_all_doors(browser: Browser, server: Served) -> Non
         if page.locator("#file").evaluate("box => box === document.activeElement"):
             break
     sync_api.expect(page.locator("#file")).to_be_focused()
+
+
+# Whether the focus is in an element.
+HAS_FOCUS = "box => box.contains(document.activeElement)"
+
+
+def test_tab_goes_from_the_doors_through_the_inputs_to_the_results(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    inputs, panel = page.locator("#inputs"), page.locator("#panel")
+    for door in DOORS:
+        open_door(page, door)
+        page.locator(f"#door_{door}").focus()
+        stops = []
+        for _ in range(60):
+            page.keyboard.press("Tab")
+            if not page.evaluate("document.activeElement !== document.body"):
+                break
+            if panel.evaluate(HAS_FOCUS):
+                stops.append(inputs.evaluate(HAS_FOCUS))
+        assert stops[0]
+        assert stops == sorted(stops, reverse=True)
+
+
+def test_asked_values_follow_the_files_that_were_chosen(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    open_door(page, "recording")
+    page.locator("#file").set_input_files(RECORDING)
+    settle(page)
+    page.locator("#file").focus()
+    for _ in range(2):
+        page.keyboard.press("Tab")
+    sync_api.expect(page.locator("#ask_plate_f0")).to_be_focused()
+    for _ in range(4):
+        page.keyboard.press("Tab")
+    sync_api.expect(page.locator("#assess")).to_be_focused()
+
+
+def test_chosen_preset_moves_no_other(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    places = """() => [...document.querySelectorAll(".choices button, #doors button")]
+        .map((box) => JSON.stringify(box.getBoundingClientRect()))"""
+    before = page.evaluate(places)
+    page.locator("#preset_shell").click()
+    settle(page)
+    assert page.evaluate(places) == before
+
+
+def test_column_of_inputs_ends_with_a_whole_row_and_its_folded_fields(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    more = page.locator("#inputs .folded summary")
+    sync_api.expect(more).to_be_in_viewport(ratio=1)
+    end = more.evaluate("box => box.getBoundingClientRect().top")
+    for row in page.locator("#inputs .field:visible").all():
+        box = row.bounding_box()
+        assert box
+        assert box["y"] >= end or box["y"] + box["height"] <= end
+
+
+def test_phone_shows_the_whole_answer_and_hides_no_field(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0], 400)
+    # A headline as long as they come.
+    fill(page, "drop.height", "0.6")
+    fill(page, "ball.mass", "3.5")
+    settle(page)
+    verdict = page.locator("#verdict")
+    assert verdict.evaluate("box => box.scrollHeight <= box.clientHeight + 1")
+    assert verdict.evaluate("box => box.getBoundingClientRect().bottom") < 90
+    name = page.locator("#detail").evaluate("box => getComputedStyle(box, '::before').content")
+    assert name.startswith('"Standard ball')
+    field(page, "ball.wall_thickness").click()
+    help_box = field(page, "ball.wall_thickness.help").bounding_box()
+    mass = field(page, "ball.mass").bounding_box()
+    assert help_box
+    assert mass
+    assert mass["y"] + mass["height"] <= help_box["y"]
+    page.evaluate("scrollTo(0, 0)")
+    open_door(page, "floor")
+    sync_api.expect(field(page, "room.required")).to_be_in_viewport(ratio=1)
+
+
+def test_field_at_the_bottom_stands_above_its_help(browser: Browser, server: Served) -> None:
+    for width in (1400, 400):
+        page = new_page(browser, server[0], width)
+        source = field(page, "limits.source")
+        source.evaluate("box => box.scrollIntoView({ block: 'end' })")
+        source.focus()
+        shown = field(page, "limits.source.help").bounding_box()
+        box = source.bounding_box()
+        assert shown
+        assert box
+        assert box["y"] + box["height"] <= shown["y"]
+
+
+def test_print_is_light_and_within_the_paper(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0], scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
+    page.set_viewport_size({"width": 700, "height": 1000})
+    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(27, 29, 31)"
+    limits = page.locator("#levels .limits").first
+    assert limits.evaluate("box => getComputedStyle(box).fill") == "rgb(223, 227, 231)"
+    assert page.evaluate("document.documentElement.scrollWidth") <= 700
+    for plot in page.locator(".plot svg:visible").all():
+        box = plot.bounding_box()
+        assert box
+        assert box["x"] + box["width"] <= 700
 
 
 def test_construction_is_chosen_by_typing_its_name(browser: Browser, server: Served) -> None:
@@ -996,7 +1599,8 @@ def test_two_users_do_not_meet(browser: Browser, server: Served) -> None:
         sync_api.expect(row).to_contain_text(height)
 
 
-def test_page_recovers_when_the_server_returns(browser: Browser) -> None:
+@pytest.mark.parametrize("tab", ["same", "other"])
+def test_page_recovers_when_the_server_returns(browser: Browser, tab: str) -> None:
     with serve() as (address, process):
         page = new_page(browser, address)
         page.locator("#model").select_option("finite_element")
@@ -1014,7 +1618,10 @@ def test_page_recovers_when_the_server_returns(browser: Browser) -> None:
     with serve("--port", port) as (address, _):
         sync_api.expect(page.locator("#message")).to_contain_text(re.compile("pen the full addr"))
         # A new server has a new token, which the address brings into this browser.
-        page.context.new_page().goto(address)
+        if tab == "same":
+            page.evaluate("address => { location.href = address; }", address)
+        else:
+            page.context.new_page().goto(address)
         sync_api.expect(page.locator("#message")).to_be_hidden()
         sync_api.expect(field(page, "mesh.polar_elements")).to_have_value("64")
 

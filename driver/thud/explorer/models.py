@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import f90nml
 
@@ -60,7 +60,7 @@ class Facts:
     fitted: tuple[str, ...] = ()
     has_room: bool = True
 
-    def data(self, name: str) -> dict[str, object]:
+    def data(self, name: str) -> dict[str, Any]:
         """Return the facts of a model or a floor with a name, for the page."""
         return {
             "name": name,
@@ -264,13 +264,13 @@ CONDITIONS: dict[str, dict[str, tuple[str, tuple[str, ...]]]] = {
 }
 
 
-def model_facts() -> list[dict[str, object]]:
+def model_facts() -> list[dict[str, Any]]:
     """Return the facts of all source models for the page, the most useful model first."""
     names = dict.fromkeys((*MODEL_FACTS, *MODELS))
     return [MODEL_FACTS.get(name, Facts()).data(name) for name in names]
 
 
-def floor_facts() -> list[dict[str, object]]:
+def floor_facts() -> list[dict[str, Any]]:
     """Return the facts of all floors for the page."""
     names = dict.fromkeys((*FLOOR_FACTS, *FLOORS))
     return [FLOOR_FACTS.get(name, Facts()).data(name) for name in names]

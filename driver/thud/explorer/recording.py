@@ -8,14 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import shown
+from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import recording_headline
 from thud.explorer.decisive import decisive_warnings
-from thud.explorer.recording_fields import name_fields
+from thud.explorer.recording_fields import TABLES, name_fields
 from thud.plot.impact_figures import contact_force
-from thud.recordings.config import config_from
+from thud.recordings.config import config_from, read_table
 from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
 from thud.report.contents import criteria_data, report_data
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 # Maximum length of a name of a file.
 MAX_NAME = 80
+# Ending of the name of the file on laboratory, instruments and calibration.
+LABORATORY = ".toml"
 
 
 def answer_recording(
@@ -39,7 +41,7 @@ def answer_recording(
     """Return the answer of recorded drops of one source.
 
     `paths` are copies of the files, `names` the names of the original files, and `table` is a table
-    of the configuration.
+    of the configuration. Its values replace those of a file of the laboratory among the files.
     """
     start = time.perf_counter()
     recording, in_words = read_copies(paths, names, table)
@@ -55,7 +57,8 @@ def answer_recording(
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording)
     # The page shows the name of a single file next to its warnings.
-    prefix = f"{names[0]}: " if len(names) == 1 else ""
+    signals = [name for name in names if not _is_laboratory(name)]
+    prefix = f"{signals[0]}: " if len(signals) == 1 else ""
     answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
     open_warnings = decisive_warnings(recording.warnings, verdict.criteria)
     answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
@@ -92,11 +95,14 @@ def read_copies(
             message = message.replace(path, title).replace(copy, title)
         return message
 
+    recorded = [path for path in paths if not _is_laboratory(path)]
     try:
-        config = config_from(table)
+        config = _config_of([path for path in paths if _is_laboratory(path)], table)
+        if not recorded:
+            refuse(f"{paths[0]}: is the file of a laboratory", "together with recordings")
         signals = (
             _renamed(signal, Path(path).name, titles[Path(path).name])
-            for path in paths
+            for path in recorded
             for signal in _open(path, config)
         )
         recording = Recording.from_signals(signals, config)
@@ -105,7 +111,26 @@ def read_copies(
         for path, (copy, title) in zip(paths, titles.items(), strict=True):
             message = message.replace(path, copy).replace(copy, shown(title))
         raise type(error)(message) from error
-    return replace(recording, name=Path(next(iter(titles.values()))).stem), in_words
+    return replace(recording, name=Path(titles[Path(recorded[0]).name]).stem), in_words
+
+
+def _is_laboratory(name: str) -> bool:
+    return Path(name).suffix.lower() == LABORATORY
+
+
+def _config_of(paths: Sequence[str], table: Mapping[str, object]) -> Config:
+    """Return the configuration of files of a laboratory, at most one, and of a table."""
+    if len(paths) > 1:
+        refuse(f"{', '.join(paths)}: are {len(paths)} files of laboratories", "one")
+    if not paths:
+        return config_from(table)
+    stated = read_table(paths[0])
+    config = config_from(stated, f"{paths[0]}: ")
+    if config.report.accreditation_mark:
+        refuse(f"{paths[0]}: accreditation_mark cannot be sent by a page", "thud-driver measure")
+    stated_tables = {name: stated[name] for name in TABLES if name in stated and name in table}
+    merged = {name: {**keys, **table[name]} for name, keys in stated_tables.items()}  # type: ignore[dict-item]
+    return config_from({**stated, **table, **merged})
 
 
 def _open(path: str, config: Config) -> Iterator[Signal]:

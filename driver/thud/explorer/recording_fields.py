@@ -168,6 +168,8 @@ def name_fields(message: str) -> str:
         message = re.sub(
             rf"(?<![\w“]){key}(?= = | and channels are| are stated)", item.quoted, message
         )
+    message = message.replace("sample_rate in Hz", _label("sample_rate"))
+    message = message.replace("enter a calibration:", f"enter {_label('calibration')}:")
     for table in TABLES:
         message = message.replace(f"[{table}]: f0 = ", f"[{table}]: {_label('plate_f0')} = ")
         message = message.replace(", Q = ", f", {_label('plate_Q')} = ")

@@ -22,6 +22,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from thud.base._schema import KEYS
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
@@ -36,7 +37,7 @@ from thud.explorer.presets import presets
 from thud.explorer.recording_fields import press_form, recording_form, recording_table
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping
 
     from starlette.requests import Request
     from starlette.types import Receive, Scope, Send
@@ -46,6 +47,12 @@ if TYPE_CHECKING:
 # Maximum size of a case and of the files of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
+# Keys that name files, by group: all texts but the name of the case and the lists of unknowns.
+FILE_KEYS = {
+    key.group: [other.name for other in KEYS if other.group == key.group and other.kind == "text"]
+    for key in KEYS
+    if key.kind == "text" and key.group != "case"
+}
 # Maximum number of files and of fields in a form.
 MAX_FILES = 100
 MAX_FIELDS = 100
@@ -53,8 +60,10 @@ MAX_FIELDS = 100
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Header that is "SI" if fields and messages are to have SI units.
 UNITS = "x-thud-units"
-# Maximum pause between two chunks of a body, s.
+# Maximum pause between two chunks of a body, s, and its maximum duration: a time, s, plus that of
+# its bytes at a rate, 1/s.
 BODY_TIMEOUT = 20.0
+BODY_TIME, BODY_RATE = 60.0, 50_000.0
 # Level of compression: higher ones save a few percent and take twice as long.
 COMPRESSION = 6
 # Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
@@ -136,6 +145,12 @@ def new_application(
     }
     # The page itself is sent without a token, and holds nothing of a user.
     application.state.page = new_page(None if start else presets()[0]["values"])
+    application.state.offered = {
+        path
+        for values in (start, *(facts["values"] for facts in floor_facts()))
+        for _, keys in _files_in(values)
+        for path in keys.values()
+    }
     application.state.token = token
     application.state.slow = slow
     application.state.quick = quick
@@ -181,13 +196,13 @@ async def _improve(request: Request) -> Response:
 
 async def _fit(request: Request) -> Response:
     return await _with_files(
-        request, "fit", lambda form: (recording_table(form), _groups(form.get("case", "")))
+        request, "fit", lambda form: (recording_table(form), _groups(request, form.get("case", "")))
     )
 
 
 async def _press(request: Request) -> Response:
     return await _with_files(
-        request, "press", lambda form: (dict(form), _groups(form.get("case", "")))
+        request, "press", lambda form: (dict(form), _groups(request, form.get("case", "")))
     )
 
 
@@ -331,17 +346,21 @@ class _Reports(StreamingResponse):
 
 
 async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None]:
-    """Yield the chunks of a body; raise HTTPException if it is too long or stops."""
+    """Yield the chunks of a body; raise HTTPException if it is too long, too slow or stops."""
     length = 0
+    start = anyio.current_time()
     chunks = request.stream()
     while True:
+        rest = start + BODY_TIME + length / BODY_RATE - anyio.current_time()
         try:
-            with anyio.fail_after(BODY_TIMEOUT):
+            with anyio.fail_after(min(BODY_TIMEOUT, rest)):
                 chunk = await anext(chunks)
         except StopAsyncIteration:
             return
         except TimeoutError:
-            message = f"no data received for {BODY_TIMEOUT:g} s; allowed: less"
+            slow = f"the data arrive too slowly; allowed: {BODY_RATE / 1e3:g} kB/s or more"
+            stop = f"no data received for {BODY_TIMEOUT:g} s; allowed: less"
+            message = slow if rest < BODY_TIMEOUT else stop
             raise HTTPException(408, message) from None
         length += len(chunk)
         if length > max_length:
@@ -352,18 +371,33 @@ async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None
 
 async def _values(request: Request) -> dict[str, dict[str, Any]]:
     """Return the values in the body of a request, by group and key."""
-    return _groups(b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+    return _groups(request, b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
 
 
-def _groups(content: bytes | str) -> dict[str, dict[str, Any]]:
-    """Return the values of JSON, by group and key."""
+def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]:
+    """Return the values of JSON, by group and key.
+
+    Raise InputError if they name a file that the server does not offer itself.
+    """
     try:
         values = json.loads(content)
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
     if not isinstance(values, dict):
         raise HTTPException(400, "the request does not contain groups of keys")
+    for group, keys in _files_in(values):
+        for name, path in keys.items():
+            if not isinstance(path, str) or path not in request.app.state.offered:
+                refuse(f"&{group}: {name} cannot be chosen on the page", "a file that it offers")
     return values
+
+
+def _files_in(values: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield groups with the files that they name, by key."""
+    for group, names in FILE_KEYS.items():
+        keys = values.get(group)
+        if isinstance(keys, dict):
+            yield group, {name: keys[name] for name in names if keys.get(name)}
 
 
 def start_with(path: Path | None) -> dict[str, Any]:

@@ -1,12 +1,13 @@
 // Main module of the page: sends the values of the form to the server and shows the latest answer.
 import { byId, button, element, saveFile } from "./page.js";
-import { ConnectionError, ServerError, ask, firstAbout, follow, fragment, requestAbout, units } from "./request.js";
+import { ConnectionError, ServerError, ask, firstAbout, follow, fragment, requestAbout, setFragment, takeFragment, units } from "./request.js";
 import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms, showWarnings } from "./results.js";
-import { STORE, firstVariant } from "./first.js";
+import { firstVariant } from "./first.js";
+import { storeCase, storedCase } from "./storage.js";
 import { listenToBall, showBall } from "./ball.js";
-import { about, caseValues, isCase, markField, state, takeValues } from "./form.js";
+import { about, caseValues, isCase, isTyping, markField, state, takeValues } from "./form.js";
 import { closePress } from "./press.js";
-import { addFiles, buildDoor, recording, recordingBody, showAsks } from "./recording.js";
+import { addFiles, buildDoor, isLaboratory, keepStated, recording, recordingBody, recordingRequest, showAsks, statedRows } from "./recording.js";
 import { freeStyle, nameVariants, showVariants } from "./variants.js";
 import { showSounds } from "./listen.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
@@ -22,10 +23,75 @@ const DOORS = ["recording", "ball", "floor"];
 const current = { recording: null, ball: null, floor: null };
 let kept = [];
 // Text on the last fit, and the values that it belongs to.
-let fitted = { text: "", details: "", values: "", name: "" };
+let fitted = { text: "", details: "", values: "" };
 let job = null;
 let timer = 0;
+let dimTimer = 0;
+// Whether the message is about the present values, and the variants on the page.
+let hasError = false;
+let shown = [];
 let retryTimer = 0;
+
+// ---- Requests: an answer is current as long as it answers the request of the present values and files.
+
+const fileIds = new WeakMap();
+let fileCount = 0;
+
+/** Return the number of a file, which no other one has. */
+function idOf(file) {
+  if (!fileIds.has(file)) fileIds.set(file, (fileCount += 1));
+  return fileIds.get(file);
+}
+
+/** Return what a name of the user belongs to: the files of a recording, or the values of a case. */
+const subjectOf = (door) => JSON.stringify(door === "recording" ? recording.files.map(idOf) : caseValues(door));
+
+/** Return the text of the request of a door with its present values and files. */
+const requestOf = (door) => JSON.stringify([subjectOf(door), door === "recording" ? recordingRequest().values : units.get()]);
+
+/** Return whether the answer of a door, if it needs one, is that to its present values and files. */
+function isCurrent(door) {
+  if (door === "recording" && !recording.files.length) return !current.recording;
+  return current[door]?.request === requestOf(door);
+}
+
+/** Return the name that the user has given to what a door shows. */
+const titleOfDoor = (door) => (state.titles[door]?.subject === subjectOf(door) ? state.titles[door].text : undefined);
+
+/** Dim results that are not those of the present values, after a delay in ms, and disable what would save them. */
+function showStatus(delay = 0) {
+  clearTimeout(dimTimer);
+  const isOutdated = isTyping() || !isCurrent(state.door);
+  byId("panel").setAttribute("aria-busy", String(Boolean(job || timer)));
+  const show = () => {
+    document.body.classList.toggle("outdated", isOutdated);
+    for (const target of [byId("report"), byId("save_page"), ...document.querySelectorAll(".figure .menu button")]) if (target) target.disabled = isOutdated;
+  };
+  if (isOutdated && delay) dimTimer = setTimeout(show, delay);
+  else show();
+}
+
+let released = Promise.resolve();
+
+/** Let changes of the page wait for the end of a click, which would otherwise miss a button that moves. */
+function holdForClicks() {
+  addEventListener("pointerdown", (event) => {
+    if (!event.target.closest?.("button, summary, label")) return;
+    released = new Promise((resolve) => {
+      for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => setTimeout(resolve), { once: true });
+    });
+  }, true);
+}
+
+/** Change the page; a focus on what has gone moves to what replaces it, or to the headline. */
+function changePage(change) {
+  const old = document.activeElement;
+  change();
+  const now = document.activeElement;
+  if (old === document.body || (old.isConnected && now === old) || (now && now !== document.body)) return;
+  const next = byId(old.id);
+  (next && !next.disabled ? next : byId("verdict")).focus({ preventScroll: true });
+}
 
 // ---- Messages.
 
@@ -36,22 +102,23 @@ function showMessage(message) {
 
 function hideMessage() {
   byId("message").hidden = true;
+  hasError = false;
   markField(null);
 }
 
-/** Mark the results as those of other values than the current ones. */
-function setOutdated(isOutdated, isBusy = isOutdated) {
-  document.body.classList.toggle("outdated", isOutdated);
-  byId("panel").setAttribute("aria-busy", String(isBusy));
+/** Show that a field is being typed. */
+function onTyping() {
+  if (!isTyping() && isCurrent(state.door)) hideMessage();
+  showStatus();
 }
 
-/** Show that a field has no valid value; without a name, that it is being typed. */
+/** Show that a field has no valid value. */
 function onInvalid(name, message) {
-  setOutdated(true, false);
-  if (!name) return;
   hideMessage();
   markField(name, message);
   showMessage(message);
+  hasError = true;
+  showStatus();
 }
 
 /** Show an error; if the server cannot be reached, try again later. */
@@ -62,8 +129,25 @@ function showError(error) {
   markField(error.field, error.message);
   if (error instanceof ConnectionError) {
     clearTimeout(retryTimer);
-    retryTimer = setTimeout(() => ask("about").then(() => { hideMessage(); solve(); }, showError), RETRY_INTERVAL);
+    retryTimer = setTimeout(reconnect, RETRY_INTERVAL);
   }
+  showStatus();
+}
+
+/** Go on if the server answers, or try again later. */
+function reconnect() {
+  clearTimeout(retryTimer);
+  ask("about").then(() => { hideMessage(); solve(); }, showError);
+}
+
+/** Return a function that shows the error of an action, and does nothing while that still runs. */
+function once(action) {
+  let isRunning = false;
+  return async (...values) => {
+    if (isRunning) return;
+    isRunning = true;
+    try { await action(...values); } catch (error) { showError(error); } finally { isRunning = false; }
+  };
 }
 
 // ---- Tasks of the server.
@@ -85,71 +169,81 @@ async function runTask(name, path, body, controller, { showNow = false, onReport
   }
 }
 
-/** Compute the case or assess the recording, after cancelling a slow computation or waiting for a quick one. */
+/** Compute the case or assess the recording, unless that is known, after cancelling a slow computation or waiting for a quick one. */
 async function solve() {
   clearTimeout(timer);
+  timer = 0;
   if (job && !job.slow) { job.repeat = true; return; }
   job?.controller.abort();
+  job = null;
   const { door } = state;
-  const isRecording = door === "recording";
-  if (isRecording && !recording.files.length) { current.recording = null; setOutdated(false); showAll(); return; }
-  const thisJob = { controller: new AbortController(), slow: isRecording, repeat: false, start: performance.now() };
+  if (door === "recording" && !recording.files.length) { current.recording = null; showAll(); }
+  if (isCurrent(door) && !current[door]?.isPartial) {
+    if (hasError && !isTyping()) hideMessage();
+    showStatus();
+    return;
+  }
+  const thisJob = { controller: new AbortController(), slow: door === "recording", repeat: false, start: performance.now(), request: requestOf(door) };
   job = thisJob;
-  byId("panel").setAttribute("aria-busy", "true");
+  thisJob.end = new Promise((resolve) => { thisJob.resolve = resolve; });
   // A quick answer comes before the eye would see the change.
-  const dimming = setTimeout(() => setOutdated(true), PAUSE);
+  showStatus(PAUSE);
   try {
-    const values = isRecording ? null : caseValues(door);
-    const body = isRecording ? checkedBody() : JSON.stringify(values);
-    const answer = isRecording
-      ? await runTask(`Assessing ${recording.files.map(({ name }) => name).join(", ")}`, "measure", body, thisJob.controller, { showNow: true })
-      : await runTask("Computing", "solve", body, thisJob.controller, { onReport: () => { thisJob.slow = true; setOutdated(true); } });
-    clearTimeout(dimming);
-    if (isRecording) current.recording = recordedVariant(answer, body);
-    else current[door] = { door, style: 0, values, chosen: state.chosen, answer, slow: thisJob.slow, ...(door === "ball" && fitted.name && JSON.stringify(values) === fitted.values ? { title: fitted.name } : {}) };
+    const variant = await (door === "recording" ? assess(thisJob) : compute(thisJob, door));
+    await released;
+    current[door] = { door, style: 0, request: thisJob.request, slow: thisJob.slow, ...variant };
     if (state.door !== door || job !== thisJob) return;
-    hideMessage();
-    setOutdated(false, thisJob.repeat);
+    if (hasError && !isTyping()) hideMessage();
     showAll();
     commitSoon();
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
-    clearTimeout(dimming);
-    if (job === thisJob) setOutdated(true, false);
-    showError(error);
+    if (job === thisJob && !thisJob.repeat) {
+      showError(error);
+      hasError = true;
+      const isMissing = door === "recording" && !state.recording[error.field] && about.recording.some((field) => field.name === error.field);
+      if (isMissing) showAsks([{ reason: "", values: { [error.field]: "" } }], { onChange, onTyping });
+    }
   } finally {
     if (job === thisJob) {
       job = null;
       if (thisJob.repeat) solve();
+      showStatus(PAUSE);
     }
+    thisJob.resolve();
   }
 }
 
-/** Return the body of a request with the recording; throw ServerError if a file is too large. */
-function checkedBody(values) {
-  const large = recording.files.find(({ size }) => size > about.max_recording);
-  if (large) throw new ServerError({ error: `${large.name} is larger than ${about.max_recording / 1e6} MB; allowed: less` });
-  return recordingBody(values);
+async function compute(thisJob, door) {
+  const [values, { chosen }] = [caseValues(door), state];
+  const answer = await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; showStatus(); } });
+  return { values, chosen, answer };
 }
 
-function recordedVariant(answer, body) {
-  const [{ name }, ...others] = recording.files;
+async function assess(thisJob) {
+  const [{ name }, ...others] = recording.files.filter((file) => !isLaboratory(file));
+  const stated = statedRows();
+  const { values } = recordingRequest();
+  const title = `Assessing ${recording.files.map((file) => file.name).join(", ")}`;
+  const answer = await runTask(title, "measure", recordingBody(), thisJob.controller, { showNow: true });
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
-  const stated = Object.entries(state.recording).map(([key, text]) => [about.recording.find((field) => field.name === key)?.label ?? key, text]);
-  return { door: "recording", style: 0, name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer, body };
+  const asks = answer.asks.filter((ask) => Object.keys(ask.values).some((key) => !(key in values)));
+  return { name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer: { ...answer, asks } };
 }
 
 /** Compute the case after a change of the form; a slow case only after a pause. */
 function onChange() {
   commitSoon();
-  hideMessage();
+  released.then(() => { if (!isTyping()) hideMessage(); });
+  if (job?.request === requestOf(state.door) && !job.repeat) { showStatus(PAUSE); return; }
   const isSlow = (job ?? current[state.door])?.slow || state.door === "recording";
   if (!isSlow) { solve(); return; }
   job?.controller.abort();
-  setOutdated(true);
+  job = null;
   clearTimeout(timer);
   timer = setTimeout(solve, PAUSE);
+  released.then(() => showStatus());
 }
 
 // ---- Results.
@@ -158,33 +252,40 @@ function onChange() {
 function variantsOfDoor() {
   const { door } = state;
   const own = current[door];
+  if (own) own.title = titleOfDoor(door);
   if (door === "floor") return [own, ...kept.filter((variant) => variant.door === "floor")].filter(Boolean);
   const others = kept.filter((variant) => variant.door !== "floor");
-  if (door === "ball" && current.recording) others.unshift({ ...current.recording, style: freeStyle(others) });
+  if (door === "ball" && current.recording && isCurrent("recording")) others.unshift({ ...current.recording, title: titleOfDoor("recording"), style: freeStyle(others) });
   return [own, ...others].filter(Boolean);
 }
 
 /** Show the answers of the current door. */
 function showAll() {
-  const { door } = state;
+  changePage(showAnswers);
+  showStatus(PAUSE);
+}
+
+function showAnswers() {
+  const { door, view } = state;
   const variants = variantsOfDoor();
   const own = current[door];
   const isEmpty = !own;
   document.body.dataset.door = door;
   document.body.classList.toggle("measured", Boolean(current.recording));
+  for (const name of Object.keys(view)) byId(name).checked = view[name];
   hideTip();
   byId("variants_section").hidden = variants.length < 2;
   byId("keep").hidden = isEmpty;
   byId("next").replaceChildren();
   byId("result").replaceChildren();
   byId("improvement").replaceChildren(...improveButton(own));
-  showAsks(own && door === "recording" ? own.answer.asks : [], onChange);
+  showAsks(own && door === "recording" ? own.answer.asks : [], { onChange, onTyping });
   if (isEmpty) {
     showNothing(door);
     return;
   }
+  shown = variants;
   nameVariants(variants);
-  const options = { thirds: byId("thirds").checked, differences: byId("differences").checked };
   showHeadline(own);
   showWarnings(own);
   const hasRoom = Boolean(own.answer.room);
@@ -192,16 +293,21 @@ function showAll() {
   byId("force_figure").hidden = hasRoom;
   byId("force_figure").classList.toggle("second", !hasRoom);
   byId("criteria_section").hidden = door === "floor";
-  showRooms(variants, options);
-  if (!hasRoom) showForces(variants, options);
+  showPlots(variants, view);
   showFloors(variants);
   if (door !== "floor") showCriteria(variants);
   showBall(door === "recording" ? null : own.answer.motion);
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(hasRoom ? variants : [], showError);
-  if (door === "recording") byId("next").append(button("Calibration report", () => saveReport(own), { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
+  if (door === "recording") byId("next").append(button("Calibration report", saveReport, { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
   if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
-  if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor")));
+  if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor", { focus: true })));
+}
+
+/** Show the plots of room or force. */
+function showPlots(variants, options) {
+  showRooms(variants, options);
+  if (!variants[0].answer.room) showForces(variants, options);
 }
 
 /** Show the result of the last fit, and its details folded; at first in sight. */
@@ -217,6 +323,7 @@ function showNothing(door) {
   byId("verdict").className = "";
   byId("verdict").replaceChildren(element("b", {}, door === "recording" ? "Does my source conform?" : "Computing …"));
   byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
+  delete byId("detail").dataset.subject;
   byId("open_warnings").replaceChildren();
   for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
   for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
@@ -224,7 +331,9 @@ function showNothing(door) {
 
 // ---- Variants.
 
-function keep() {
+/** Keep the variant that the form describes; while a slow case is computed, the one that is shown. */
+async function keep() {
+  if (job && !job.slow) await job.end;
   const own = current[state.door];
   if (!own) return;
   kept = [...kept, { ...own, style: freeStyle(variantsOfDoor()) }];
@@ -232,20 +341,30 @@ function keep() {
   commit();
 }
 
+/** Remove a kept variant, or the recording with its files. */
 function removeVariant(variant) {
   if (kept.includes(variant)) kept = kept.filter((other) => other !== variant);
-  else current.recording = null;
+  else {
+    recording.files = [];
+    current.recording = null;
+    keepStated();
+  }
   showAll();
   byId("keep").focus();
   commit();
 }
 
-/** Give a variant a name of the user; an empty one takes it back, and null changes nothing. */
-function renameVariant(variant, text) {
-  if (text === "") delete variant.title;
-  else if (text !== null && text !== variant.label) variant.title = text;
+/** Give a variant a name of the user; an empty one takes it back, and null changes nothing. The focus returns to the name unless it has left. */
+function renameVariant(variant, text, isLeft) {
+  const at = shown.indexOf(variant);
+  const title = text || undefined;
+  if (text !== null && text !== variant.label) {
+    if (kept.includes(variant)) kept = kept.map((other) => (other === variant ? { ...variant, title } : other));
+    else state.titles = { ...state.titles, [variant.door]: { text: title, subject: subjectOf(variant.door) } };
+  }
   showAll();
-  store();
+  if (!isLeft) document.querySelectorAll("#variants .name")[at]?.focus();
+  commit();
 }
 
 // ---- Doors, history, storage and link.
@@ -254,6 +373,8 @@ function renameVariant(variant, text) {
 function openDoor(door, { focus = false } = {}) {
   job?.controller.abort();
   job = null;
+  clearTimeout(timer);
+  timer = 0;
   state.door = door;
   for (const name of DOORS) {
     const tab = byId(`door_${name}`);
@@ -262,14 +383,12 @@ function openDoor(door, { focus = false } = {}) {
     if (name === door && focus) tab.focus();
   }
   byId("panel").setAttribute("aria-labelledby", `door_${door}`);
-  history.replaceState(null, "", `#${door}`);
+  setFragment(door);
   document.body.dataset.door = door;
-  buildDoor({ onChange, onInvalid, onPress });
+  changePage(() => buildDoor({ onChange, onTyping, onInvalid, onPress }));
   hideMessage();
-  const isCurrent = Boolean(current[door]) && (door === "recording" || JSON.stringify(current[door].values) === JSON.stringify(caseValues(door)));
   showAll();
-  setOutdated(!isCurrent && Boolean(current[door]), !isCurrent);
-  if (!isCurrent || current[door].isPartial) solve();
+  solve();
   commitSoon();
 }
 
@@ -287,34 +406,38 @@ function commit() {
   const [last, next] = [steps.list[steps.at], snapshot()];
   const isEqual = last && last.kept === next.kept && last.files === next.files && sameCase(last.state, next.state);
   store();
-  if (isEqual) return;
+  if (isEqual) { last.recorded = current.recording; return; }
   steps.list.splice(steps.at + 1, Infinity, next);
   steps.at = steps.list.length - 1;
   showSteps();
 }
 
 function sameCase(one, other) {
-  const text = (entry) => JSON.stringify({ ...JSON.parse(entry), moved: null, door: null });
+  const text = (entry) => JSON.stringify({ ...JSON.parse(entry), moved: null, door: null, earlier: null, view: null });
   return text(one) === text(other);
 }
 
 function showSteps() {
+  const isFocused = [byId("undo"), byId("redo")].includes(document.activeElement);
   byId("undo").disabled = steps.at <= 0;
   byId("redo").disabled = steps.at >= steps.list.length - 1;
+  // A button that is disabled loses the focus.
+  if (isFocused) [document.activeElement, byId("undo"), byId("redo")].find((target) => target?.matches("button:enabled"))?.focus();
 }
 
-function goTo(at) {
+/** Go to another step; a text that is no value is taken back first. */
+function move(count) {
+  if (isTyping()) { openDoor(state.door); return; }
   commit();
-  const step = steps.list[at];
+  const step = steps.list[steps.at + count];
   if (!step) return;
-  steps.at = at;
-  restore(JSON.parse(step.state));
+  steps.at += count;
+  restore({ ...JSON.parse(step.state), view: state.view });
   kept = step.kept;
   current.recording = step.recorded;
   recording.files = step.files;
+  openDoor(state.door);
   showSteps();
-  const { door } = state;
-  openDoor(door);
   store();
 }
 
@@ -322,60 +445,85 @@ function restore(values) {
   for (const name of Object.keys(state)) state[name] = values[name] ?? state[name];
 }
 
-const withoutMotion = (variant) => ({ ...variant, body: null, answer: { ...variant.answer, motion: null } });
+const withoutMotion = (variant) => ({ ...variant, answer: { ...variant.answer, motion: null } });
 
 /** Store case and variants in this browser; without room for the answers, only the case. */
 function store() {
   const own = current[state.door];
-  const entry = { start: JSON.stringify(about.start), state, shown: own?.values ? withoutMotion(own) : null, kept: kept.map(withoutMotion) };
-  for (const content of [entry, { ...entry, shown: null, kept: [] }]) {
-    try {
-      localStorage.setItem(STORE, JSON.stringify(content));
-      return;
-    } catch { /* The storage is full. */ }
-  }
+  const entry = { start: JSON.stringify(about.start), state, shown: own?.values && isCurrent(state.door) ? withoutMotion(own) : null, kept: kept.map(withoutMotion) };
+  storeCase(entry, { ...entry, shown: null, kept: [] });
 }
 
 /** Restore what this browser has stored for the same start of the page; return whether there was something. */
 function restoreStored() {
-  let stored = null;
-  try { stored = JSON.parse(localStorage.getItem(STORE)); } catch { /* Not written by this page. */ }
-  if (stored?.start !== JSON.stringify(about.start) || !about.models.some(({ name }) => name === stored.state?.model)) return false;
-  restore(stored.state);
-  kept = stored.kept;
+  const entry = storedCase();
+  if (entry?.start !== JSON.stringify(about.start) || !about.models.some(({ name }) => name === entry.state?.model)) return false;
+  restore(entry.state);
+  kept = entry.kept;
+  // The files are not stored.
+  keepStated();
   return true;
 }
 
 async function copyLink() {
-  const variants = kept.filter(({ values }) => values).map(({ door, values, title }) => ({ door, values, title }));
-  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, units: units.get() };
+  if (hasInvalidField()) return;
+  const variants = kept.filter(({ values }) => values).map(({ door, values, title, chosen }) => ({ door, values, title, chosen }));
+  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, units: units.get(), view: state.view };
   const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
   const isCopied = await copyText(address, "Copy this link");
   if (isCopied) flash("link", "Link copied");
-  if (kept.some(({ values }) => !values) || state.door === "recording") showMessage("The link holds the models; recordings are too large for a link: use “Save as HTML”");
+  const hasRecording = kept.some(({ values }) => !values) || state.door === "recording";
+  showNote(`The link works in browsers that have opened the full address shown in the terminal, while the server runs. For others use “Save as HTML”.${hasRecording ? " It holds the models; recordings are too large for a link." : ""}`);
+}
+
+/** Show a note in front of the page until it is closed. */
+function showNote(text) {
+  document.querySelector(".note")?.remove();
+  const note = element("div", { class: "task note", role: "status" }, element("span", {}, text), button("Close", () => note.remove()));
+  byId("tasks").append(note);
 }
 
 function flash(id, text) {
   const target = typeof id === "string" ? byId(id) : id;
   const before = target.textContent;
+  if (before === text) return;
   target.textContent = text;
   setTimeout(() => { target.textContent = before; }, 1500);
 }
 
-/** Take over the content of a link; return whether it is one of this page. */
-async function takeLink(text) {
+/** Take over the content of a link, as a step that can be undone; show a message if it is not one of this page. */
+const takeLink = once(async (text) => {
   let content = null;
-  try { content = JSON.parse(text); } catch { return false; }
-  const { door, ball, floor, variants, units: name } = content ?? {};
-  if (!DOORS.includes(door) || ![ball, floor].every(isCase) || !Array.isArray(variants) || !variants.every((variant) => isCase(variant?.values))) return false;
+  try { content = JSON.parse(text); } catch { /* Not a link of this page. */ }
+  const { door, ball, floor, variants, units: name, view } = content ?? {};
+  const isVariant = (variant) => ["ball", "floor"].includes(variant?.door) && isCase(variant.values) && [variant.title, variant.chosen].every((text) => ["string", "undefined"].includes(typeof text));
+  if (!DOORS.includes(door) || ![ball, floor].every(isCase) || !Array.isArray(variants) || !variants.every(isVariant)) {
+    showMessage("The link does not contain a case; allowed: links copied from this page");
+    return;
+  }
+  commit();
   await setUnits(name);
+  const taken = [];
+  for (const variant of variants) {
+    const answer = await runTask("Computing", "solve", JSON.stringify(variant.values), new AbortController());
+    taken.push({ ...variant, style: freeStyle(taken.filter((other) => (other.door === "floor") === (variant.door === "floor"))), answer });
+  }
   takeValues(floor);
   state.door = door;
-  for (const variant of variants) {
-    const answer = await runTask("Computing", "solve", JSON.stringify(variant.values), new AbortController()).catch(showError);
-    if (answer) kept = [...kept, { door: variant.door, style: freeStyle(kept.filter((other) => (other.door === "floor") === (variant.door === "floor"))), values: variant.values, title: variant.title, answer }];
-  }
-  return true;
+  for (const option of Object.keys(state.view)) state.view[option] = view?.[option] === true;
+  kept = taken;
+  openDoor(door);
+  commit();
+});
+
+/** Take over an address that was entered into this page: its token, case or door. */
+async function onAddress() {
+  const parameters = takeFragment();
+  hideMessage();
+  const door = DOORS.find((name) => parameters.has(name));
+  if (parameters.has("case")) await takeLink(parameters.get("case"));
+  else if (door) openDoor(door);
+  else reconnect();
 }
 
 /** Take over the units of the fields, "SI" or empty; the server describes the fields in them. */
@@ -393,13 +541,11 @@ async function switchUnits() {
   try {
     await setUnits(units.get() ? "" : "SI");
     openDoor(state.door);
-    // Warnings have the units of the fields; those of a recording are always SI units.
-    if (state.door !== "recording") solve();
   } catch (error) { showError(error); }
 }
 
 function reset() {
-  localStorage.removeItem(STORE);
+  commit();
   kept = [];
   recording.files = [];
   Object.assign(current, { recording: null, ball: null, floor: null });
@@ -409,7 +555,7 @@ function reset() {
 
 /** Begin with the values of a case, or with the first preset. */
 function begin(start) {
-  Object.assign(state, { values: {}, unknowns: {}, moved: {}, recording: {}, model: about.presets[0].values.model.name });
+  Object.assign(state, { values: {}, unknowns: {}, moved: {}, recording: {}, earlier: [], titles: {}, model: about.presets[0].values.model.name });
   const floors = about.presets.find((preset) => preset.door === "floor");
   takeValues(floors.values);
   if (Object.keys(start).length) takeValues(start);
@@ -418,37 +564,39 @@ function begin(start) {
 
 // ---- Actions.
 
-/** Save the calibration report of a recording, as it was assessed. */
-async function saveReport({ body }) {
-  byId("report").disabled = true;
-  try {
-    saveFile("calibration.html", await runTask("Calibration report", "report", body, new AbortController(), { showNow: true }), "text/html");
-  } catch (error) { showError(error); } finally { if (byId("report")) byId("report").disabled = false; }
-}
+/** Save the calibration report of the recording. */
+const saveReport = once(async () => {
+  saveFile("calibration.html", await runTask("Calibration report", "report", recordingBody(), new AbortController(), { showNow: true }), "text/html");
+});
 
-async function fit() {
-  byId("fit").disabled = true;
-  try {
-    showFit(await runTask("Fitting a ball to the recording", "fit", checkedBody(caseValues("ball")), new AbortController(), { showNow: true }));
-  } catch (error) { showError(error); } finally { if (byId("fit")) byId("fit").disabled = false; }
-}
-
-/** Take over the values of a fit, and show its result beside them. */
-function showFit({ values, text, details, name = "" }) {
-  takeValues(values);
-  fitted = { text, details, name, isNew: true, values: JSON.stringify(caseValues("ball")) };
-  openDoor("ball");
-}
+const fit = () => fitTo("Fitting a ball to the recording", "fit", () => recordingBody(caseValues("ball")));
 
 /** Fit the ball to the curve of a press. */
-async function onPress(body, name) {
+function onPress(body, name) {
   hideMessage();
   body.set("case", JSON.stringify(caseValues("ball")));
-  try {
-    const answer = await runTask(`Fitting the ball to ${name}`, "press", body, new AbortController());
-    closePress();
-    showFit(answer);
-  } catch (error) { showError(error); }
+  fitTo(`Fitting the ball to ${name}`, "press", () => body);
+}
+
+/** Fit the ball, and take over its values unless others were entered in the meantime. */
+const fitTo = once(async (title, path, newBody) => {
+  const requests = () => JSON.stringify([requestOf("ball"), requestOf("recording"), isTyping()]);
+  const before = requests();
+  const answer = await runTask(title, path, newBody(), new AbortController(), { showNow: true });
+  if (requests() !== before) {
+    showMessage("The fit was not taken over: values have changed since it began");
+    return;
+  }
+  closePress();
+  showFit(answer);
+});
+
+/** Take over the values of a fit, and show its result beside them. */
+function showFit({ values, text, details, name }) {
+  takeValues(values);
+  if (name) state.titles = { ...state.titles, ball: { text: name, subject: subjectOf("ball") } };
+  fitted = { text, details, isNew: true, values: JSON.stringify(caseValues("ball")) };
+  openDoor("ball");
 }
 
 /** Return the button that looks for a change with which a source conforms or a required level is met, if there is a need. */
@@ -458,27 +606,40 @@ function improveButton(own) {
   return [button(title, () => improve(title), { id: "improve" })];
 }
 
-async function improve(title) {
-  const asked = byId("improve");
+const improve = once(async (title) => {
   const { door } = state;
-  asked.disabled = true;
-  try {
-    const { changes, none, note } = await runTask(title, "improve", JSON.stringify(caseValues(door)), new AbortController(), { showNow: true });
-    if (!asked.isConnected) return;
-    const apply = ({ key, value }) => {
-      const [group, name] = key.split(".");
-      const values = caseValues(door);
-      (values[group] ??= {})[name] = value;
-      takeValues(values);
-      openDoor(door);
-    };
-    const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
-    byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
-    byId("result").scrollIntoView({ block: "nearest" });
-  } catch (error) { showError(error); } finally { asked.disabled = false; }
+  const request = requestOf(door);
+  const { changes, none, note } = await runTask(title, "improve", JSON.stringify(caseValues(door)), new AbortController(), { showNow: true });
+  await job?.end;
+  if (state.door !== door || requestOf(door) !== request) return;
+  const apply = ({ key, value }) => {
+    const [group, name] = key.split(".");
+    const values = caseValues(door);
+    (values[group] ??= {})[name] = value;
+    takeValues(values);
+    openDoor(door);
+  };
+  const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
+  byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
+  byId("result").scrollIntoView({ block: "nearest" });
+});
+
+/** Move to the field with an error, of which the message is shown; return whether there is one. */
+function hasInvalidField() {
+  const input = document.querySelector("#inputs [aria-invalid]");
+  input?.focus();
+  return Boolean(input);
+}
+
+/** Save the page of all variants; its plots show the values, not their differences. */
+function savePage(variants) {
+  showPlots(variants, { thirds: state.view.thirds });
+  saveFile("thud.html", pageOf(variants, about.version), "text/html");
+  showAll();
 }
 
 async function download(name, copyButton) {
+  if (hasInvalidField()) return;
   const values = caseValues();
   if (name === "study.toml") values.moved = state.moved;
   try {
@@ -490,31 +651,36 @@ async function download(name, copyButton) {
 }
 
 function listen() {
+  byId("inputs").addEventListener("focusin", ({ target }) => target.closest(".field")?.scrollIntoView({ block: "nearest" }));
   byId("inputs").addEventListener("submit", (event) => event.preventDefault());
   for (const door of DOORS) byId(`door_${door}`).addEventListener("click", () => openDoor(door));
   byId("doors").addEventListener("keydown", (event) => {
-    const move = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-    if (move) openDoor(DOORS[(DOORS.indexOf(state.door) + move + 3) % 3], { focus: true });
+    const at = DOORS.indexOf(state.door);
+    const next = { ArrowRight: (at + 1) % 3, ArrowLeft: (at + 2) % 3, Home: 0, End: 2 }[event.key];
+    if (next === undefined) return;
+    event.preventDefault();
+    openDoor(DOORS[next], { focus: true });
   });
   byId("keep").addEventListener("click", keep);
-  byId("undo").addEventListener("click", () => goTo(steps.at - 1));
-  byId("redo").addEventListener("click", () => goTo(steps.at + 1));
+  byId("undo").addEventListener("click", () => move(-1));
+  byId("redo").addEventListener("click", () => move(1));
   byId("units").addEventListener("click", switchUnits);
   byId("reset").addEventListener("click", reset);
   byId("link").addEventListener("click", copyLink);
-  byId("save_page").addEventListener("click", () => { const variants = variantsOfDoor(); if (variants.length) saveFile("thud.html", pageOf(variants, about.version), "text/html"); });
-  for (const name of ["thirds", "differences"]) byId(name).addEventListener("change", showAll);
+  byId("save_page").addEventListener("click", () => { const variants = variantsOfDoor(); if (variants.length) savePage(variants); });
+  for (const name of Object.keys(state.view)) byId(name).addEventListener("change", () => { state.view[name] = byId(name).checked; showAll(); });
   for (const target of document.querySelectorAll("[data-file]")) target.addEventListener("click", () => download(target.dataset.file));
   for (const target of document.querySelectorAll("[data-copy]")) target.addEventListener("click", () => download(target.dataset.copy, target));
   addEventListener("keydown", (event) => {
     if (event.key === "Escape") { hideTip(); for (const menu of document.querySelectorAll(".menu[open]")) { menu.open = false; menu.firstElementChild.focus(); } }
-    const isTyping = event.target.matches?.("textarea, [type=text], [type=number]") && document.body.classList.contains("outdated");
-    if (!(event.ctrlKey || event.metaKey) || isTyping) return;
+    // A field for text has steps of its own.
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches?.("input[type=text], textarea, [contenteditable]")) return;
     const isRedo = event.key === "y" || (event.key.toLowerCase() === "z" && event.shiftKey);
     if (event.key.toLowerCase() !== "z" && !isRedo) return;
     event.preventDefault();
-    goTo(steps.at + (isRedo ? 1 : -1));
+    move(isRedo ? 1 : -1);
   });
+  addEventListener("pagehide", () => { document.activeElement?.blur(); commit(); });
   addEventListener("click", (event) => { for (const menu of document.querySelectorAll(".menu[open]")) if (!menu.contains(event.target) || event.target.closest("button")) menu.open = false; });
   addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("dragging"); });
   addEventListener("dragleave", () => document.body.classList.remove("dragging"));
@@ -529,30 +695,44 @@ function listen() {
   listenToBall();
 }
 
+/** Show nothing but the message until a token arrives, in this page or another one; then load the page with its link. */
+function awaitToken() {
+  document.body.classList.add("locked");
+  retryTimer = setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);
+  addEventListener("storage", ({ key }) => { if (key === "token") location.reload(); });
+  addEventListener("hashchange", () => {
+    const parameters = takeFragment();
+    setFragment(String(parameters.size ? parameters : fragment));
+    location.reload();
+  });
+}
+
 async function main() {
   try {
     Object.assign(about, await firstAbout);
   } catch (error) {
     byId("verdict").replaceChildren();
-    setOutdated(true, false);
+    document.body.classList.add("outdated");
+    byId("panel").setAttribute("aria-busy", "false");
     showMessage(error.message);
-    if (error instanceof ConnectionError) retryTimer = setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);
+    if (error instanceof ConnectionError) awaitToken();
     return;
   }
   byId("tools").hidden = false;
   nameUnits();
   addPlotMenus();
   listen();
+  holdForClicks();
   const link = fragment.get("case");
   const door = DOORS.find((name) => fragment.has(name));
   if (firstVariant) current[firstVariant.door] = firstVariant;
-  const isRestored = link === null && restoreStored();
+  const isRestored = restoreStored();
   if (isRestored) openDoor(door ?? state.door);
   else begin(about.start);
-  if (link !== null) {
-    if (await takeLink(link)) openDoor(state.door);
-    else showMessage("The link does not contain a case; allowed: links copied from this page");
-  } else if (door && !isRestored) openDoor(door);
+  commit();
+  addEventListener("hashchange", onAddress);
+  if (link !== null) await takeLink(link);
+  else if (door && !isRestored) openDoor(door);
   commit();
 }
 

@@ -2,8 +2,7 @@
 import { byId } from "./page.js";
 import { fragment } from "./request.js";
 import { showCriteria, showForces, showHeadline, showRooms } from "./results.js";
-
-export const STORE = "explorer";
+import { stored, storedCase } from "./storage.js";
 
 /** Variant with which the page begins, of which the motion is not known; null if it has to be computed. */
 export const firstVariant = findFirst();
@@ -11,10 +10,9 @@ export const firstVariant = findFirst();
 function findFirst() {
   // Empty if the command names a case, which this page must not show without its token.
   const content = JSON.parse(byId("first_answer").textContent || "null");
-  if (!content || fragment.has("case")) return null;
-  let stored = null;
-  try { stored = JSON.parse(localStorage.getItem(STORE)); } catch { /* Not written by this page. */ }
-  const variant = stored ? stored.start === "{}" && stored.shown : { door: "ball", style: 0, label: "Standard ball", ...content };
+  if (!content || fragment.has("case") || !stored("token")) return null;
+  const own = storedCase();
+  const variant = own ? own.start === "{}" && own.shown : { door: "ball", style: 0, label: "Standard ball", ...content };
   const isOther = ["recording", "ball", "floor"].some((door) => fragment.has(door) && door !== variant?.door);
   return variant && !isOther ? { ...variant, isPartial: true } : null;
 }

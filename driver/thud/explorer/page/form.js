@@ -1,19 +1,21 @@
 // The case and its form: fields from the declarations of the keys, presets, models, constructions and the room.
-import { button, byId, capitalize, element, scaled } from "./page.js";
+import { button, byId, capitalize, element, numberOf, numberProblem, scaled } from "./page.js";
 import { pressInputs } from "./press.js";
 
-/** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, ranges of moved fields, and what is not known, by model. */
+/** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, ranges of moved fields, what is not known, by model, fields of the recording and those that were stated for an earlier one, names of the user, and what the plots show. */
 export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [], press: [] };
-export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {} };
+export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false, differences: false } };
 
 // Digits of a number in its field.
 const DIGITS = 6;
+// Pause of typing after which a value is taken over, ms.
+const TYPING_PAUSE = 600;
 
 const groupsOf = (part) => about.form.filter((group) => group.part === part);
 const commonGroups = () => about.form.filter((group) => group.part === group.name && group.part !== "room");
 const findGroup = (part, name) => groupsOf(part).find((group) => group.name === name);
 const sourceGroups = () => [...commonGroups(), findGroup("model", state.model)].filter(Boolean);
-const floorGroups = () => [...(state.floor ? [findGroup("floor", state.floor)] : []), ...(state.room ? groupsOf("room") : [])];
+const floorGroups = () => [...(state.floor ? [findGroup("floor", state.floor)] : []), ...(showsRoom() ? groupsOf("room") : [])];
 
 /** Return what the server says of a model or a floor. */
 export const factsOf = (part, name) => about[`${part}s`].find((facts) => facts.name === name) ?? { title: name, values: {} };
@@ -55,16 +57,19 @@ export function caseValues(door = state.door) {
       if (value !== undefined && isUsed(field)) (values[field.group] ??= {})[field.name] = value;
     }
   }
-  if (hasFloor && state.room) values.room ??= {};
+  if (hasFloor && showsRoom()) values.room ??= {};
   if (state.unknowns[state.model]) values.unknowns = state.unknowns[state.model];
   return structuredClone(values);
 }
 
-/** Return whether values are a case with a known model and floor. */
+const isTable = (values) => Boolean(values) && typeof values === "object" && !Array.isArray(values);
+
+/** Return whether values are a case with a known model and floor, and have the kinds of their fields. */
 export function isCase(values) {
-  if (!values || typeof values !== "object" || Array.isArray(values)) return false;
-  const isKnown = (part) => !values[part] || findGroup(part, values[part].name);
-  return Boolean(isKnown("model") && isKnown("floor")) && Object.values(values).every((group) => group && typeof group === "object" && !Array.isArray(group));
+  if (!isTable(values) || !Object.values(values).every(isTable)) return false;
+  const hasKind = (value, field) => !field || (Array.isArray(field.default) ? [value].flat().every((item) => typeof item === "number") : typeof value === typeof field.default);
+  const hasKinds = ([group, own]) => Object.entries(own).every(([name, value]) => value !== null && hasKind(value, findField(group, name)));
+  return Boolean(findGroup("model", values.model?.name) && (!values.floor || findGroup("floor", values.floor.name))) && Object.entries(values).every(hasKinds);
 }
 
 /** Take over the source of a case, or all of it. */
@@ -74,8 +79,8 @@ export function takeValues(values) {
   state.model = model.name;
   if (floor) setFloor(floor.name);
   if (floor || rest.room) {
-    state.room = Boolean(rest.room);
     state.floor = floor?.name ?? "plate";
+    if (hasRoom()) state.room = Boolean(rest.room);
     for (const { fields } of floorGroups()) for (const field of fields) delete state.values[field.group];
   }
   if (rest.unknowns) state.unknowns[model.name] = rest.unknowns;
@@ -104,6 +109,8 @@ function exchange(old, next) {
 
 /** Return whether the floor has a plate that radiates into a room. */
 const hasRoom = () => factsOf("floor", state.floor).has_room !== false;
+/** The room remains chosen while a floor has none. */
+const showsRoom = () => state.room && hasRoom();
 
 function setModel(name) {
   exchange(factsOf("model", state.model).values, factsOf("model", name).values);
@@ -113,7 +120,6 @@ function setModel(name) {
 function setFloor(name) {
   exchange(factsOf("floor", state.floor).values, factsOf("floor", name).values);
   state.floor = name;
-  state.room &&= hasRoom();
 }
 
 // ---- Constructions.
@@ -126,7 +132,7 @@ const ceilingFields = () => findGroup("room", "room").fields.filter((field) => f
 function findConstruction() {
   const hasValues = (fields, values) => fields.every((field) => isSame(valueOf(field), values[field.name] ?? field.default));
   const equal = about.constructions.filter((construction) => construction.floor === state.floor && hasValues(filledFields(construction), construction.keys)
-    && (state.room ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
+    && (showsRoom() ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
   const construction = equal.find(({ name }) => name === state.chosen) ?? equal[0];
   if (construction) state.chosen = construction.name;
   return construction;
@@ -143,7 +149,7 @@ export function fillConstruction(name) {
 
 // ---- Form.
 
-/** Build the form of the current door; `onChange` is called after each change, `onInvalid` when a field has no valid or no current value, `onPress` with the curve of a press. */
+/** Build the form of the current door; `onChange` is called after each change, `onTyping` while one is typed, `onInvalid` when what was typed is no value, `onPress` with the curve of a press. */
 export function buildInputs(handlers) {
   const { onChange } = handlers;
   const focus = document.activeElement?.id;
@@ -215,7 +221,7 @@ function agingElement(handlers) {
   const setModulus = (percent) => {
     byId("ball.youngs_modulus").send(Number(scaled(modulus * (1 + percent / 100), -own.power).toPrecision(DIGITS)));
   };
-  return newField(field, numberInput(field, "aging.percent", setModulus, handlers.onInvalid));
+  return newField(field, numberInput(field, "aging.percent", setModulus, handlers));
 }
 
 function floorInputs(handlers) {
@@ -223,10 +229,13 @@ function floorInputs(handlers) {
   const kinds = [...new Set(about.constructions.map(({ kind }) => kind))];
   const options = [["", "None of the library"], ...kinds.map((kind) => [kind, about.constructions.filter((entry) => entry.kind === kind).map(({ name }) => [name, name])])];
   const sources = construction?.sources ?? {};
+  const rooms = groupsOf("room");
+  const isRequirement = ({ name }) => name.startsWith("required");
+  const withFields = (group, isOwn) => ({ ...group, fields: group.fields.filter(isOwn) });
   const balls = about.presets.filter((preset) => preset.door === "ball");
   const source = balls.find((preset) => isSame(sorted(preset.values), sorted(caseValues("ball"))));
   const box = element("input", { type: "checkbox", id: "has_room" });
-  box.checked = state.room;
+  box.checked = showsRoom();
   box.disabled = !hasRoom();
   box.addEventListener("change", () => { state.room = box.checked; handlers.rebuild(); });
   return [
@@ -234,8 +243,9 @@ function floorInputs(handlers) {
       element("p", { class: "help", id: "construction_text" }, construction?.text ?? "Changed values of a floor.")),
     choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls.map(({ name, title }) => [name, title])], source?.name ?? "",
       (name) => { takeValues(balls.find((preset) => preset.name === name).values); handlers.rebuild(); }),
+    ...(showsRoom() ? rooms.map((group) => groupElement({ ...withFields(group, isRequirement), title: "Requirement" }, handlers)) : []),
     element("label", { class: "toggle" }, box, "Room below"),
-    ...(state.room ? groupsOf("room").map((group) => groupElement(group, handlers, sources)) : []),
+    ...(showsRoom() ? rooms.map((group) => groupElement(withFields(group, (field) => !isRequirement(field)), handlers, sources)) : []),
     choiceOf("floor", "Kind of floor", about.floors.filter(({ name }) => name !== "rigid").map(({ name, title }) => [name, title]), state.floor, (name) => { setFloor(name); handlers.rebuild(); },
       element("p", { class: "help" }, `${factsOf("floor", state.floor).purpose}. `, element("em", {}, factsOf("floor", state.floor).validity))),
     groupElement(findGroup("floor", state.floor), handlers, sources),
@@ -285,30 +295,33 @@ function fieldElement(field, handlers, source) {
       state.moved[id] = [Math.min(ends[0], value), Math.max(ends[1], value)];
     }
     setValue(field, value);
-    byId(`${id}.help`).textContent = `${field.help}.`;
+    byId(`${id}.help`).textContent = helpOf(field);
     if (changesFields) handlers.rebuild();
     else handlers.onChange();
     showChoices();
   };
   const newInputs = { choice: choiceInput, flag: flagInput, list: listInput, text: textInput }[field.kind] ?? numberInput;
-  return newField(field, newInputs(field, id, onInput, handlers.onInvalid), source);
+  return newField(field, newInputs(field, id, onInput, handlers), source);
 }
 
 /** Return a field with label, inputs, help and error. */
-function newField({ label, unit, help }, inputs, source) {
-  const { id } = inputs[0];
+function newField(field, inputs, source) {
+  const [{ label, unit }, [{ id }]] = [field, inputs];
   for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help ${id}.error`);
   return element("div", { class: "field" }, element("label", { for: id }, unit ? `${label}, ${unit}` : label), ...inputs,
-    element("p", { class: "help", id: `${id}.help` }, source ? `${help}. Source of the value: ${source}.` : `${help}.`),
+    element("p", { class: "help", id: `${id}.help` }, source ? `${helpOf(field)} Source of the value: ${source}.` : helpOf(field)),
     element("p", { class: "error", id: `${id}.error` }));
 }
+
+const helpOf = ({ help, kind }) => `${help}.${kind === "list" ? " Blanks or semicolons separate values; 24,5 is 24.5." : ""}`;
 
 /** Show which preset, aging or construction the form has. */
 function showChoices() {
   const current = sorted(caseValues("ball"));
   for (const preset of about.presets) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isSame(sorted(preset.values), current)));
   const modulus = newModulus();
-  if (modulus !== null) byId("aging.percent")?.show(agingOf(modulus));
+  const aging = byId("aging.percent");
+  if (modulus !== null && aging !== document.activeElement) aging?.show(agingOf(modulus));
   if (!byId("construction")) return;
   const construction = findConstruction();
   byId("construction").value = construction?.name ?? "";
@@ -336,43 +349,91 @@ function textInput(field, id, onInput) {
   return [text];
 }
 
-function listInput(field, id, onInput, onInvalid) {
-  const text = element("input", { id, type: "text", value: [valueOf(field)].flat().join(" "), placeholder: "such as 10 20" });
-  text.addEventListener("input", () => onInvalid(null));
-  text.addEventListener("change", () => {
-    const numbers = text.value.split(/[\s;,]+/).filter(Boolean).map(Number);
-    if (numbers.some(Number.isNaN)) onInvalid(id, `${field.label}: “${text.value}” is not a list of numbers`);
-    else onInput(numbers);
+/** Call a function when an input is left after typing, with true, and after a pause of typing, with false. */
+export function listenToTyping(input, act) {
+  let timer = 0;
+  input.addEventListener("input", () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => { if (input.isConnected) act(false); }, TYPING_PAUSE);
   });
+  for (const name of ["change", "blur"]) input.addEventListener(name, () => {
+    clearTimeout(timer);
+    if (input.isConnected) act(true);
+  });
+}
+
+/** Return whether a field of the form has a text that is not its value. */
+export const isTyping = () => Boolean(document.querySelector("#inputs [data-typed]"));
+
+/** Take over what is typed into an input: `read` returns its value, undefined if it has none; `send` takes it and `show` shows it. */
+function takeTyping(input, { read, isTaken, send, show, problem }, { onTyping, onInvalid }) {
+  input.addEventListener("input", () => {
+    input.toggleAttribute("data-typed", !isTaken());
+    input.removeAttribute("aria-invalid");
+    onTyping();
+  });
+  listenToTyping(input, (isLeft) => {
+    if (!input.hasAttribute("data-typed")) { if (isLeft) show(); return; }
+    const value = read(input.value);
+    if (value === undefined) {
+      if (isLeft && !input.hasAttribute("aria-invalid")) onInvalid(input.id, problem(input.value));
+      return;
+    }
+    input.removeAttribute("data-typed");
+    send(value, isLeft);
+  });
+}
+
+function listInput(field, id, onInput, handlers) {
+  const textOf = () => [valueOf(field)].flat().join(" ");
+  const text = element("input", { id, type: "text", value: textOf(), placeholder: "such as 10 20" });
+  const show = () => { text.value = textOf(); };
+  const read = (list) => {
+    const numbers = list.trim().split(/\s*;\s*|,?\s+/).filter(Boolean).map(numberOf);
+    return numbers.some(Number.isNaN) ? undefined : numbers;
+  };
+  takeTyping(text, {
+    read, show, isTaken: () => isSame(read(text.value), [valueOf(field)].flat()),
+    send: (numbers, isLeft) => { onInput(numbers); if (isLeft) show(); },
+    problem: (list) => `${field.label}: “${list}” is not a list of numbers; blanks or semicolons separate them`,
+  }, handlers);
   return [text];
 }
 
-function numberInput(field, id, onInput, onInvalid) {
+function numberInput(field, id, onInput, handlers) {
   let current = scaled(valueOf(field), -field.power);
   // A zero that is not a number, such as "none", is an empty field.
   const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;,]+)/) ?? [];
-  const textOf = (value) => (zero && value === 0 ? "" : Number(value.toPrecision(DIGITS)));
-  const number = element("input", { id, type: "number", step: "any", value: textOf(current), placeholder: zero, class: zero && "open" });
-  number.show = (entered) => {
+  const textOf = (value) => (zero && value === 0 ? "" : String(Number(value.toPrecision(DIGITS))));
+  const number = element("input", { id, type: "text", inputmode: "decimal", value: textOf(current), placeholder: zero, class: `number${zero ? " open" : ""}` });
+  const take = (entered) => {
     current = entered;
-    number.value = textOf(entered);
     slider?.moveTo(entered);
+  };
+  number.show = (entered) => {
+    number.removeAttribute("data-typed");
+    number.value = textOf(entered);
+    take(entered);
   };
   number.send = (entered) => {
     number.show(entered);
     onInput(scaled(entered, field.power));
   };
+  const read = (text) => {
+    const entered = zero && !text.trim() ? 0 : numberOf(text);
+    return Number.isNaN(entered) ? undefined : entered;
+  };
   const { send } = number;
   const step = field.step ?? (field.kind === "whole" ? 1 : null);
   const slider = field.slider && step ? sliderInput(field, current, step, send) : null;
-  // The results belong to the value before.
-  number.addEventListener("input", () => { if (number.value !== String(textOf(current))) onInvalid(null); });
-  number.addEventListener("change", () => {
-    if (zero && number.value === "" && !number.validity.badInput) send(0);
-    else if (number.value === "" || !Number.isFinite(Number(number.value))) onInvalid(id, `${field.label}: enter a number${field.unit ? `, in ${field.unit}` : ""}`);
-    else send(Number(number.value));
-  });
-  if (step) number.addEventListener("keydown", (event) => moveByKey(event, Number(number.value), step, field.lower, field.upper, send));
+  takeTyping(number, {
+    read, isTaken: () => number.value === textOf(current) || read(number.value) === current,
+    show: () => { number.value = textOf(current); },
+    // The text remains as it is while it is typed.
+    send: (entered, isLeft) => { if (isLeft) send(entered); else { take(entered); onInput(scaled(entered, field.power)); } },
+    problem: (text) => `${field.label}: ${numberProblem(text, field.unit)}`,
+  }, handlers);
+  if (step) number.addEventListener("keydown", (event) => moveByKey(event, read(number.value) ?? current, step, field.lower, field.upper, send));
   return slider ? [number, slider] : [number];
 }
 

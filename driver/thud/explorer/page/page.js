@@ -34,6 +34,24 @@ export function scaled(value, power) {
   return Number(`${digits}e${Number(exponent) + power}`);
 }
 
+const NUMBER = /^[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i;
+// A comma before three digits may also be one between thousands.
+const AMBIGUOUS = /^[+-]?[1-9]\d{0,2},\d{3}$/;
+
+/** Return the number that a text states, with a point or a comma before its decimals; NaN if it states none. */
+export function numberOf(text) {
+  const trimmed = text.trim().replace("−", "-");
+  const number = NUMBER.test(trimmed) && !AMBIGUOUS.test(trimmed) ? Number(trimmed.replace(",", ".")) : NaN;
+  return Number.isFinite(number) ? number : NaN;
+}
+
+/** Return what to enter in place of a text that states no number. */
+export function numberProblem(text, unit = "") {
+  const digits = text.trim();
+  if (AMBIGUOUS.test(digits)) return `“${digits}” may mean ${numberOf(`${digits}0`)} or ${digits.replace(",", "")}; enter one of them`;
+  return `enter a number${unit ? `, in ${unit}` : ""}`;
+}
+
 /** Return the text of a number with its unit: levels with two decimals, others with four digits. */
 export function rounded(value, unit = "") {
   if (value === null || value === undefined) return "not known";

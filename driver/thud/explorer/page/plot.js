@@ -111,7 +111,7 @@ function drawCurves(content, width, height) {
   const box = { left, right: width - 10, top: 24, bottom: height - 36 };
   const toX = (value) => box.left + ((value - across[0]) / (across[1] - across[0])) * (box.right - box.left);
   const toY = (value) => box.bottom - ((value - up[0]) / (up[1] - up[0])) * (box.bottom - box.top);
-  const image = svgElement("svg", { width, height, role: "img", "aria-label": describeCurves(content) });
+  const image = svgElement("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describeCurves(content) });
   for (const [i, [lower, upper]] of (content.limits ?? []).entries())
     image.append(svgElement("rect", { class: `limits ${content.results?.[i] ?? ""}`, x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
   for (const value of marksUp) {
@@ -152,7 +152,7 @@ function drawBars(content, width, height) {
   const left = isWide ? 14 + LETTER * Math.max(...content.rows.map(([title]) => title.length)) : 14;
   const toX = (value) => left + ((value - low) / (high - low)) * (width - 50 - left);
   const room = (height - 44) / content.rows.length;
-  const image = svgElement("svg", { width, height, role: "img", "aria-label": describeRows(content) });
+  const image = svgElement("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describeRows(content) });
   for (const value of ticks([low, high], (width - left) / 60)) {
     image.append(svgElement("line", { class: value === 0 ? "axis" : "grid", x1: toX(value), x2: toX(value), y1: 4, y2: height - 36 }));
     image.append(svgElement("text", { class: "quiet", x: toX(value), y: height - 20, "text-anchor": "middle" }, minus(value)));

@@ -1,4 +1,5 @@
 // Requests to the server. Each has the token; long computations answer with a stream of reports.
+import { storeText, stored } from "./storage.js";
 
 /** Error that the server reports; `field` is the field it is about, or null. */
 export class ServerError extends Error {
@@ -14,24 +15,41 @@ export class ConnectionError extends Error {}
 const MISSING_TOKEN = "Open the full address shown in the terminal: it holds the token";
 const restart = () => `start it again with: thud-driver explore --port ${location.port}`;
 
-/** Parameters of the address; the token moves to the storage of the browser. */
-export const fragment = new URLSearchParams(location.hash.slice(1));
-if (fragment.get("token")) {
-  localStorage.setItem("token", fragment.get("token"));
-  fragment.delete("token");
-  history.replaceState(null, "", fragment.size ? `#${fragment}` : location.pathname);
+let tokenInAddress = "";
+
+/** Return the parameters of the address; the token moves to the storage of the browser, if that takes it. */
+export function takeFragment() {
+  const parameters = new URLSearchParams(location.hash.slice(1));
+  const token = parameters.get("token");
+  if (token) {
+    tokenInAddress = storeText("token", token) ? "" : `token=${token}`;
+    parameters.delete("token");
+    setFragment(String(parameters));
+  }
+  return parameters;
 }
 
-/** Units of the fields: "SI", or empty for mm, MPa and so on. */
+/** Set the parameters of the address. */
+export function setFragment(text) {
+  const all = [text, tokenInAddress].filter(Boolean).join("&");
+  history.replaceState(null, "", all ? `#${all}` : location.pathname);
+}
+
+/** Parameters with which the page was opened. */
+export const fragment = takeFragment();
+
+let ownUnits = stored("units") ?? "";
+
+/** Units of the fields: "SI", or empty for mm, MPa and so on; stored for the next page, as other open pages keep theirs. */
 export const units = {
-  get: () => localStorage.getItem("units") ?? "",
-  set: (name) => localStorage.setItem("units", name),
+  get: () => ownUnits,
+  set: (name) => { ownUnits = name; storeText("units", name); },
 };
 
 /** Return the response; throw ServerError, ConnectionError or, if the request was cancelled, AbortError. */
 export async function ask(path, options = {}) {
   // Another page in this browser may have stored the token of a new server.
-  const token = localStorage.getItem("token");
+  const token = stored("token");
   if (!token) throw new ConnectionError(MISSING_TOKEN);
   let response = null;
   try {

@@ -30,6 +30,9 @@ export function showHeadline({ label, answer }) {
     element("span", { class: "subject" }, `${label} `),
     element("b", {}, capitalize(first.trim())), element("span", { class: "why" }, rest.replace(/^\(/, " (")));
   byId("detail").replaceChildren(...withSymbols(detail ?? ""));
+  // Narrow screens name the case here.
+  if (SIGNS[result]) byId("detail").dataset.subject = label;
+  else delete byId("detail").dataset.subject;
   byId("numbers").textContent = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`).join(" · ");
 }
 

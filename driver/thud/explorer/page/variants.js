@@ -2,7 +2,7 @@
 import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
 import { STYLES, swatch } from "./plot.js";
 import { headlineText } from "./results.js";
-import { about, factsOf, findField, sorted } from "./form.js";
+import { about, factsOf, findField } from "./form.js";
 
 // Words of keys in names, if shorter than their labels.
 const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
@@ -34,6 +34,8 @@ export function nameVariants(variants) {
     variant.label = variant.title ?? capitalize(shown.join(", "));
   }
   for (const variant of variants) if (!variant.values) variant.label = variant.title ?? variant.name;
+  // An image of a plot holds neither control characters nor halves of characters.
+  for (const variant of variants) variant.label = variant.label.replace(/[\p{Cc}\p{Cs}\uFFFE\uFFFF]/gu, "");
   const seen = new Map();
   for (const variant of variants) {
     const count = (seen.get(variant.label) ?? 0) + 1;
@@ -99,15 +101,16 @@ function wordsOf(key, values, hasBase) {
   return `${WORDS[key] ?? `${owner}${label?.toLowerCase() ?? name}`}${changed} ${valueText(values, key)}`;
 }
 
-/** Return values as rows: group, label and text, for pages. */
+/** Return values as rows of label and text, for pages: the main ones, and those that differ from their defaults. */
 export function inputRows(values) {
   const rows = [["Source", factsOf("model", values.model.name).title]];
   if (values.floor) rows.push(["Floor", factsOf("floor", values.floor.name).title]);
-  for (const [group, own] of Object.entries(sorted(values))) {
-    for (const name of Object.keys(own)) {
-      const field = findField(group, name);
-      if (field) rows.push([field.label, valueText(values, `${group}.${name}`)]);
-    }
+  const stated = ({ group, name }) => values[group]?.[name];
+  const isMain = ({ advanced, models, condition }) => !advanced && models?.includes(values.model.name) !== false
+    && (!condition || condition.values.includes(stated(condition) ?? findField(condition.group, condition.name).default));
+  for (const { part, name, title, fields } of about.form) {
+    if (!(part === "room" ? values.room : part === name || values[part]?.name === name)) continue;
+    for (const field of fields) if (stated(field) !== undefined || isMain(field)) rows.push([`${field.label} (${title.toLowerCase()})`, valueText(values, `${field.group}.${field.name}`)]);
   }
   return rows;
 }
@@ -149,12 +152,19 @@ export function showVariants(variants, { remove, rename }) {
 
 function renameIn(name, variant, rename) {
   const input = element("input", { type: "text", "aria-label": "Name", value: variant.label });
-  const finish = (text) => { if (input.isConnected) rename(variant, text); };
+  let isFinished = false;
+  const finish = (text, isLeft = false) => {
+    if (isFinished) return;
+    // Its removal is a blur, too.
+    isFinished = true;
+    rename(variant, text, isLeft);
+  };
   input.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") finish(input.value.trim());
+    // The name that gets the focus must not be pressed by the same key.
+    if (event.key === "Enter") { event.preventDefault(); finish(input.value.trim()); }
     if (event.key === "Escape") { event.stopPropagation(); finish(null); }
   });
-  input.addEventListener("blur", () => finish(input.value.trim()));
+  input.addEventListener("blur", () => finish(input.value.trim(), true));
   name.replaceWith(input);
   input.select();
 }
