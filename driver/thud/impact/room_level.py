@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from thud.base._schema import RATINGS
 from thud.base.bridge import text
+from thud.base.errors import NumericalError
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from thud.base._schema import RoomRequiredRating
@@ -148,6 +150,14 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
     if "room" not in answer:
         return None
     bands = {**answer["room_bands"]}
+    for name in ("level", "modal_level", "simple_level", "clamped_level"):
+        if not (is_known := np.isfinite(bands[name])).all():
+            frequencies = ", ".join(f"{f:g}" for f in bands["frequency"][~is_known])
+            message = (
+                f"&room: the level in the room is not finite at {frequencies} Hz: a value of the "
+                "floor or the room is too extreme to be computed"
+            )
+            raise NumericalError(message)
     return RoomLevel(
         time_of_maximum=bands.pop("time"),
         **bands,
