@@ -493,7 +493,8 @@ def test_floor_of_own_modes_has_no_contribution_of_its_edges(tmp_path: Path) -> 
     grid = {"x": np.linspace(0, 5, 11), "y": np.linspace(0, 4, 9)}
     shape = np.outer(np.sin(np.pi * grid["x"] / 5), np.sin(np.pi * grid["y"] / 4)) / 48
     path = tmp_path / "modes.csv"
-    thud.write_floor_modes(path, [30.0], 0.05, **grid, shape=[shape])
+    frequencies = [30.0, 60.0, 100.0, 200.0]
+    thud.write_floor_modes(path, frequencies, 0.05, **grid, shape=[shape] * 4)
     own = thud.ModalFloor(file=str(path), thickness=0.2)
     prediction = thud.predict_level(floor=own, room=thud.Room(length=5, width=4))
     floor = PredictedFloor("own", "own", prediction)

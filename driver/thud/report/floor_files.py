@@ -13,7 +13,13 @@ from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.workbooks import workbook
 from thud.level.rating import rated_bands
-from thud.report.predicted_floor import contribution_title, deviation_text, sheets, tables
+from thud.report.predicted_floor import (
+    contribution_title,
+    deviation_text,
+    number_text,
+    sheets,
+    tables,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -41,7 +47,7 @@ def screen_text(floor: PredictedFloor) -> str:
         *(f"    {text:>6}  {title}" for title, _, _, text in others),
         f"  Of octaves{korean and f', {korean}'}: {octaves}",
         *(
-            f"    {title}: {', '.join(f'{level:.1f}' for level in levels)} dB at "
+            f"    {title}: {', '.join(number_text(level, '.1f') for level in levels)} dB at "
             f"{', '.join(f'{f:g}' for f in rated_bands('octave'))} Hz"
             for title, (*levels, _) in floor.octaves.items()
         ),

@@ -187,7 +187,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
             [
                 ("Maximum Fast levels, octaves", *octave_titles()),
                 *(
-                    (title, *(f"{level:.1f}" for level in levels))
+                    (title, *(number_text(level, ".1f") for level in levels))
                     for title, levels in floor.octaves.items()
                 ),
             ],
