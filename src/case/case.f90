@@ -15,7 +15,7 @@ module thud_case
    use thud_room, only: check_below_subceiling, check_room, get_room_bands, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
-   use thud_text, only: is_utf8, lower_case, quoted, to_text
+   use thud_text, only: is_utf8, join_quoted, lower_case, quoted, to_text
    use thud_unknowns, only: check_unknowns, get_unknowns_fields, unknowns_type
    implicit none (type, external)
    private
@@ -245,11 +245,18 @@ contains
       type(band_type), allocatable :: bands(:)
       type(plate_type) :: plate
       real(wp), allocatable :: conductance(:)
+      integer :: i
 
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%check(error)
          if (.not. allocated(error)) call floor%check_points(case%floor, error)
          if (allocated(error) .or. .not. case%has_room) return
+         if (.not. floor%has_radiator()) then
+            error = input_error('&floor: name = '//quoted(trim(case%floor))//' has no plate that radiates into a room; ' &
+               //'allowed with &room: '//join_quoted(pack(floor_names, [(case%floors(i)%model%has_radiator(), &
+               i=1, size(floor_names))])))
+            return
+         end if
          call get_room_bands(bands, error)
          allocate (conductance(size(bands)))
          call floor%get_radiator(bands%center, plate, conductance, error)

@@ -14,9 +14,9 @@ module thud_room_prediction
    use thud_modal_room, only: box_type, get_crossover, get_highest_frequency, get_modal_room, &
       get_standard_positions, modal_room_type, n_standard
    use thud_plate, only: get_plate_radiation, plate_type
-   use thud_rating, only: get_a_weighted_level
-   use thud_room, only: check_below, get_completed_room, get_reverberation_times, get_room_bands, get_room_level, &
-      modal_radiation, room_level_type, room_type, standard_positions
+   use thud_rating, only: rating_names
+   use thud_room, only: check_below, get_completed_room, get_ratings, get_reverberation_times, get_room_bands, &
+      get_room_level, modal_radiation, room_level_type, room_type, standard_positions
    use thud_source_limits, only: get_source_limits, source_limits_type
    implicit none (type, external)
    private
@@ -248,7 +248,7 @@ contains
          [3, n_even])
    end subroutine get_positions
 
-   !> Contributions to the interval of the A-weighted level, as differences from the mean of both predictions.
+   !> Contributions to the intervals of the ratings, as differences from the means of both predictions.
    subroutine add_contributions(case, plate, radiation, level, prediction)
       type(case_type), intent(in) :: case
       type(plate_type), intent(in) :: plate
@@ -260,61 +260,64 @@ contains
       type(error_type), allocatable :: error
       type(room_level_type) :: changed
       type(room_type) :: room
-      real(wp) :: modal
+      real(wp), dimension(size(rating_names)) :: modal, simple, clamped
+      real(wp) :: source_level(size(level))
       integer :: i, octave
 
-      allocate (prediction%contribution(2, size(contribution_names)), source=0.0_wp)
-      modal = get_weighted(prediction%modal_level)
-      associate (source => prediction%contribution(:, 1), edges => prediction%contribution(:, 2), &
-         time => prediction%contribution(:, 3), positions => prediction%contribution(:, 4), &
-         model => prediction%contribution(:, 5))
+      allocate (prediction%contribution(2, size(contribution_names), size(rating_names)), source=0.0_wp)
+      modal = get_ratings(prediction, prediction%modal_level)
+      associate (statistical => prediction%rating, source => prediction%contribution(:, 1, :), &
+         edges => prediction%contribution(:, 2, :), time => prediction%contribution(:, 3, :), &
+         positions => prediction%contribution(:, 4, :), model => prediction%contribution(:, 5, :))
          ! Another source that conforms: half the range of its octave, the octave of 31.5 Hz being the first.
          call get_source_limits(case%source, limits, error)
-         changed%level = prediction%level
          do i = 1, size(level)
             octave = min(2 + (i - 1)/3, octave_count)
-            changed%level(i) = prediction%level(i) + (limits%upper_level(octave) - limits%lower_level(octave))/2
+            source_level(i) = prediction%level(i) + (limits%upper_level(octave) - limits%lower_level(octave))/2
          end do
-         source = (get_weighted(changed%level) - get_weighted(prediction%level))*[-1, 1]
-         edges = [(get_weighted(prediction%edge_level(:, i)) - modal, i=1, 2)]
-         edges = [min(minval(edges), 0.0_wp), max(maxval(edges), 0.0_wp)]
+         source = get_ends(get_ratings(prediction, source_level) - statistical)
+         simple = get_ratings(prediction, prediction%edge_level(:, 1)) - modal
+         clamped = get_ratings(prediction, prediction%edge_level(:, 2)) - modal
+         edges(1, :) = min(simple, clamped, 0.0_wp)
+         edges(2, :) = max(simple, clamped, 0.0_wp)
          do i = 1, 2
             room = case%room
             room%reverberation_time%values = room%reverberation_time%values*time_ratio**(2*i - 3)
             call get_room_level(plate, radiation, room, prediction%bands, level, changed)
-            time(i) = get_weighted(changed%level) - get_weighted(prediction%level)
+            time(i, :) = changed%rating - statistical
          end do
-         positions = coverage*get_weighted_spread(prediction)*[-1, 1]
-         model = abs(modal - get_weighted(prediction%level))/2*[-1, 1]
+         positions = get_ends(coverage*get_rated_spread(prediction))
+         model = get_ends(abs(modal - statistical)/2)
+         prediction%rated = (modal + statistical)/2
       end associate
-      prediction%rated = (modal + get_weighted(prediction%level))/2
       ! The contributions are independent of each other.
-      prediction%interval = prediction%rated + [-1, 1]*norm2(prediction%contribution, dim=2)
+      prediction%interval = spread(prediction%rated, 1, 2) + get_ends([(1.0_wp, i=1, size(rating_names))]) &
+         *norm2(prediction%contribution, dim=2)
    end subroutine add_contributions
 
-   !> A-weighted level of one-third-octave bands, dB.
-   pure function get_weighted(level) result(weighted)
-      real(wp), intent(in) :: level(:)
-      real(wp) :: weighted
+   !> Lower and upper ends of symmetric deviations, dB: [2, n].
+   pure function get_ends(deviation) result(ends)
+      real(wp), intent(in) :: deviation(:)
+      real(wp) :: ends(2, size(deviation))
 
-      weighted = get_a_weighted_level('third', level)
-   end function get_weighted
+      ends(1, :) = -deviation
+      ends(2, :) = deviation
+   end function get_ends
 
-   !> Standard deviation of the A-weighted mean level: that of the bands, weighted by their energies, as if their deviations
-   !> were independent, dB.
-   pure function get_weighted_spread(prediction) result(deviation)
+   !> Standard deviations of the ratings of the mean levels: that of the bands, weighted by their energies, as if their
+   !> deviations were independent, dB.
+   pure function get_rated_spread(prediction) result(deviation)
       type(room_level_type), intent(in) :: prediction
-      real(wp) :: deviation
-      real(wp) :: share(size(prediction%modal_level))
+      real(wp) :: deviation(size(rating_names))
+      real(wp) :: share(size(rating_names), size(prediction%modal_level))
       integer :: i
 
-      do i = 1, size(share)
-         share(i) = 10**(0.1_wp*(get_weighted(prediction%modal_level) &
-            - get_weighted(without_band(prediction%modal_level, i))))
+      do i = 1, size(share, 2)
+         share(:, i) = 1 - 10**(0.1_wp*(get_ratings(prediction, without_band(prediction%modal_level, i)) &
+            - get_ratings(prediction, prediction%modal_level)))
       end do
-      share = 1 - 1/share
-      deviation = norm2(share*prediction%mean_spread)
-   end function get_weighted_spread
+      deviation = norm2(share*spread(prediction%mean_spread, 1, size(rating_names)), dim=2)
+   end function get_rated_spread
 
    !> Levels with one band silent, dB.
    pure function without_band(level, band) result(others)

@@ -37,6 +37,7 @@ module thud_floor_model
       procedure(get_receiver), deferred, pass(options) :: get_receiver
       procedure, pass(options) :: check
       procedure, pass(options) :: get_transfer
+      procedure, pass(options) :: has_radiator
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: get_room_modes
@@ -129,6 +130,14 @@ contains
       error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a ' &
          //'rectangular floor')
    end subroutine get_transfer
+
+   !> Whether the floor has a plate that radiates into a room below; by default it has.
+   pure function has_radiator(options) result(yes)
+      class(floor_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function has_radiator
 
    !> The plate that radiates into the room below, and its conductance: the power into this plate per mean-square force,
    !> averaged over force positions. Floors without such a plate return an error.

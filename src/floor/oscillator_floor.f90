@@ -26,6 +26,7 @@ module thud_oscillator_floor
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: has_radiator
    end type oscillator_floor_type
 
 contains
@@ -66,5 +67,13 @@ contains
          receiver%residue = [2*pole/(options%mass*cmplx(0.0_wp, 2*pole%im, wp))]
       end if
    end subroutine get_receiver
+
+   !> No plate radiates into a room.
+   pure function has_radiator(options) result(yes)
+      class(oscillator_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_radiator
 
 end module thud_oscillator_floor

@@ -185,6 +185,10 @@ contains
       else if (options%covering_improvement%count > 0 .and. options%covering_stiffness > 0.0_wp) then
          error = input_error('&'//trim(base%group)//': covering_stiffness and covering_improvement describe the same ' &
             //'covering twice; allowed: one of them')
+      else if (options%support == 'elastic' .and. options%support_stiffness%count == 0 &
+         .and. options%support_rotation%count == 0) then
+         error = input_error('&'//trim(base%group)//': support = elastic without support_stiffness and support_rotation; ' &
+            //'allowed: at least one of them')
       else if (is_loose() .and. options%line_x%count + options%line_y%count == 0) then
          error = input_error('&'//trim(base%group)//': support = '//trim(options%support) &
             //' without any stiffness needs supports at line_x or line_y; allowed: at least one')
@@ -194,6 +198,9 @@ contains
       else if (options%has_subceiling() .and. options%subceiling%thickness < min_subceiling) then
          error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(options%subceiling%thickness) &
             //' m; allowed: 0, or 0.0005 to 0.2 m')
+      else if (options%screed%bridge_x%count > 0 .and. options%screed%thickness <= 0.0_wp) then
+         error = input_error('&'//trim(base%group)//': bridge_x and bridge_y without a floating plate; allowed: bridges ' &
+            //'with screed_thickness > 0')
       end if
    contains
 

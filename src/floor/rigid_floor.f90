@@ -14,6 +14,7 @@ module thud_rigid_floor
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: has_radiator
    end type rigid_floor_type
 
 contains
@@ -33,5 +34,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine get_receiver
+
+   !> No plate radiates into a room.
+   pure function has_radiator(options) result(yes)
+      class(rigid_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_radiator
 
 end module thud_rigid_floor

@@ -23,7 +23,8 @@ module thud_room
    private
 
    public :: check_below, check_below_subceiling, check_room, few_modes, get_completed_room, get_reverberation_times
-   public :: get_rated, get_room_bands, get_room_fields, get_room_level, judge_requirement, modal_radiation
+   public :: get_octave_levels, get_rated, get_ratings, get_room_bands, get_room_fields, get_room_level, &
+      judge_requirement, modal_radiation
    public :: room_level_type, room_type, standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
@@ -141,11 +142,12 @@ module thud_room
       real(wp), allocatable :: mean_spread(:)
       !> The same for simply supported and for clamped edges: [n_band, 2].
       real(wp), allocatable :: edge_level(:, :)
-      !> Contributions to the interval of the A-weighted level, differences from it, dB: [2, n_contribution].
-      real(wp), allocatable :: contribution(:, :)
-      !> Mean of the A-weighted levels of both predictions, dB, and the ends of its interval, dB: [2].
-      real(wp) :: rated = 0.0_wp
-      real(wp) :: interval(2) = 0.0_wp
+      !> Contributions to the intervals of the ratings, differences from them, dB: [2, n_contribution, n_rating].
+      real(wp), allocatable :: contribution(:, :, :)
+      !> Means of the ratings of both predictions in the order of `rating_names`, not rounded, dB, and the ends of their
+      !> intervals, dB: [2, n_rating].
+      real(wp) :: rated(size(rating_names)) = 0.0_wp
+      real(wp) :: interval(2, size(rating_names)) = 0.0_wp
       !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
       real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
@@ -355,14 +357,45 @@ contains
       end do
       prediction%level = 10*log10(maximum/reference_pressure**2)
       call add_octaves(energies, prediction)
-      prediction%rating = [get_a_weighted_level(octave_set, prediction%octave_level), &
-         get_a_weighted_level(third_set, prediction%level), get_a_weighted_level(third_set, prediction%level &
-         + get_standardization(prediction%reverberation_time, prediction%volume))]
+      prediction%rating = get_ratings(prediction, prediction%level)
       call add_history(energies, prediction)
    end subroutine get_room_level
 
-   !> A rating by the mean of both predictions, and the ends of its interval, not rounded, dB: those of `rated`, moved by the
-   !> difference of the statistical ratings.
+   !> Levels of octaves that belong to levels of one-third-octave bands, dB: energy sums, less what the sums of the
+   !> statistical levels exceed the maxima of their sum.
+   pure function get_octave_levels(prediction, level) result(octave_level)
+      !> A prediction with its statistical levels.
+      type(room_level_type), intent(in) :: prediction
+      !> Levels of the one-third-octave bands, such as those by the modes, dB: [n_band].
+      real(wp), intent(in) :: level(:)
+      real(wp) :: octave_level(size(level)/bands_per_octave)
+
+      octave_level = prediction%octave_level + 10*log10(get_sums(level)/get_sums(prediction%level))
+   contains
+
+      !> Energy sums of the bands of each octave: [n_octave].
+      pure function get_sums(level) result(energy)
+         real(wp), intent(in) :: level(:)
+         real(wp) :: energy(size(level)/bands_per_octave)
+
+         energy = sum(reshape(10**(level/10), [bands_per_octave, size(energy)]), dim=1)
+      end function get_sums
+   end function get_octave_levels
+
+   !> Ratings of levels in the room, in the order of `rating_names`, not rounded, dB.
+   pure function get_ratings(prediction, level) result(rating)
+      !> A prediction for the same room, with its statistical levels.
+      type(room_level_type), intent(in) :: prediction
+      !> Levels of the one-third-octave bands, such as those by the modes, dB: [n_band].
+      real(wp), intent(in) :: level(:)
+      real(wp) :: rating(size(rating_names))
+
+      rating = [get_a_weighted_level(octave_set, get_octave_levels(prediction, level)), &
+         get_a_weighted_level(third_set, level), get_a_weighted_level(third_set, level &
+         + get_standardization(prediction%reverberation_time, prediction%volume))]
+   end function get_ratings
+
+   !> A rating by the mean of both predictions, and the ends of its interval, not rounded, dB.
    pure function get_rated(prediction, name) result(rated)
       type(room_level_type), intent(in) :: prediction
       !> One of `rating_names`.
@@ -370,16 +403,9 @@ contains
       !> Mean, lower and upper end.
       real(wp) :: rated(3)
 
-      rated = [prediction%rated, prediction%interval] + get_statistical(name) - get_statistical('thirds')
-   contains
-
-      !> A statistical rating, dB.
-      pure function get_statistical(name) result(level)
-         character(len=*), intent(in) :: name
-         real(wp) :: level
-
-         level = prediction%rating(findloc(rating_names == name, .true., dim=1))
-      end function get_statistical
+      associate (i => findloc(rating_names == name, .true., dim=1))
+         rated = [prediction%rated(i), prediction%interval(:, i)]
+      end associate
    end function get_rated
 
    !> Verdict on the requirement of a room: whether all levels of the interval, rounded, are at most the required one.

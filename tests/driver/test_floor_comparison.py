@@ -149,10 +149,16 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
     )
     assert rows["of octaves (KS F 2863-2)"] == (thin.octave_text, thick.octave_text)
     assert rows["class (KS F 2863-2)"] == ("no class", "no class")
-    assert rows["63 Hz octave, dB"] == (
+    assert rows["63 Hz octave, statistical, dB"] == (
         f"{thin.octave_level[0]:.1f}",
         f"{thick.octave_level[0]:.1f}",
     )
+    assert rows["63 Hz octave, by modes, dB"] == (
+        f"{thin.modal_octave_level[0]:.1f}",
+        f"{thick.modal_octave_level[0]:.1f}",
+    )
+    assert rows["of octaves by modes, dB"][0] == str(thin.modal_ratings["octaves"].rounded)
+    assert rows["of octaves statistical, dB"][0] == str(thin.octave_rating.rounded)
     assert re.search(naming("thin", "modes", "Hz"), found.warnings[0])
 
 
@@ -332,7 +338,7 @@ def test_class_is_that_of_the_mean_rating_with_its_interval() -> None:
     low, high = required.interval
     assert prediction.octave_text == f"{required.level:.0f} dB ({low:.0f} to {high:.0f})"
     assert low < 49 < high
-    assert prediction.class_text == "no class; interval: class 4 to no class"
+    assert prediction.class_text == "no class; interval: class 3 to no class"
     assert "no class" in repr(prediction.octave_rating)
 
 

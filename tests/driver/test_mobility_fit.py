@@ -166,8 +166,8 @@ def test_other_universal_files_are_refused(
         (FREQUENCY, np.where(S.imag > 900, 0, MOBILITY), naming("Hz", 0)),
         (FREQUENCY[:1], MOBILITY[:1], naming(1, "0 Hz")),
         (FREQUENCY, MOBILITY[:5], naming(300, 5)),
-        (-FREQUENCY[::-1], MOBILITY, naming("point 1", "Hz")),
-        (1e5 * FREQUENCY, MOBILITY, naming("pole_frequency", "1.0e7 Hz")),
+        (-FREQUENCY[::-1], MOBILITY, naming(300, "octave", "500 Hz")),
+        (1e5 * FREQUENCY, MOBILITY, naming(300, "octave", "500 Hz")),
     ],
 )
 def test_tables_of_no_floor_are_refused(
@@ -444,9 +444,25 @@ def test_exact_fit_ends_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
     assert mobility_fit._best_fit("a", np.arange(1.0, 3), np.ones(2, complex)).order == 1  # type: ignore[attr-defined]  # noqa: SLF001
 
 
-def test_line_at_0_hz_is_left_out_and_two_are_enough(exact: thud.MobilityFit) -> None:
+def test_tables_that_cover_no_octave_are_refused() -> None:
+    """Two frequencies 0.08 Hz apart gave a floor with an error of 0.085 %."""
+    frequency = np.array([10.0, 10.08])
+    values = [1e-5 + 1e-6j, 1e-5 + 1e-6j]
+    for table in (frequency, 100 * frequency / 10, [30.0, 60.0], [40.0, 50.0, 60.0]):
+        with pytest.raises(thud.InputError, match=naming(len(table), "octave", "31.5")):
+            thud.fit_mobility((table, np.resize(values, len(table))))
+    with pytest.raises(thud.InputError, match=naming(1, "two or more")):
+        thud.fit_mobility(([100.0], [1e-5]))
+
+
+def test_number_of_poles_agrees_with_its_noun() -> None:
+    found = thud.fit_mobility(([20.0, 30.0, 40.0, 50.0], [1e-4] * 4), order=1)
+    assert " 1 pole," in repr(found)
+
+
+def test_line_at_0_hz_is_left_out_and_few_are_enough(exact: thud.MobilityFit) -> None:
     found = thud.fit_mobility((np.append(0, FREQUENCY), np.append(0, MOBILITY)), order=8)
     assert len(found.frequency) == 300
     assert found.mobility([100.0]) == pytest.approx(exact.mobility([100.0]))
-    two = thud.fit_mobility(([20.0, 40.0], [1e-4, 1e-4]))
-    assert two.frequency.tolist() == [20, 40]
+    few = thud.fit_mobility(([20.0, 25.0, 40.0, 50.0], [1e-4] * 4))
+    assert few.frequency.tolist() == [20, 25, 40, 50]

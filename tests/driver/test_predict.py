@@ -23,6 +23,7 @@ from thud.floors.resonances import resonances
 from thud.plot.room_figures import draw_ranges
 from thud.report.floor_files import contents, page_contents, screen_text
 from thud.report.floor_page import floor_page
+from thud.report.markup import inline_svg
 from thud.report.predicted_floor import (
     COLUMNS,
     PredictedFloor,
@@ -34,7 +35,7 @@ from thud.report.predicted_floor import (
 if TYPE_CHECKING:
     from conftest import ErrorsOf
 
-TABLES = ["bands.csv", "contributions.csv", "paths.csv", "ratings.csv"]
+TABLES = ["bands.csv", "contributions.csv", "octaves.csv", "paths.csv", "ratings.csv"]
 DECK = "concrete 180, screed on 15 MN/m3, ceiling"
 
 
@@ -109,10 +110,25 @@ def test_tables_have_the_numbers_of_the_prediction(floor: PredictedFloor, tmp_pa
     assert float(ratings["statistical prediction"]["value, dB"]) == prediction.rating.a_weighted
     assert float(ratings["prediction by modes"]["value, dB"]) == prediction.modal_rating.a_weighted
     for title, name in (("of octaves", "octaves"), ("standardized", "standardized")):
-        assert float(ratings[title]["value, dB"]) == prediction.rated_of(name)
-        # The mean of both predictions, moved by the difference of the statistical ratings.
-        moved = prediction.ratings[name].a_weighted - prediction.rating.a_weighted
-        assert prediction.rated_of(name) == pytest.approx(prediction.rated + moved)
+        stated = float(ratings[title]["value, dB"])
+        both = [float(ratings[f"{title}, {of}"]["value, dB"]) for of in ("statistical", "by modes")]
+        assert stated == pytest.approx(np.mean(both))
+        assert both == [
+            prediction.ratings[name].a_weighted, prediction.modal_ratings[name].a_weighted
+        ]  # fmt: skip
+        ends = [
+            float(ratings[f"{title}, {end} end of the interval"]["value, dB"])
+            for end in ("lower", "upper")
+        ]
+        assert ends == [*prediction.interval_of(name)]
+    # The rating of octaves follows from their stated levels.
+    weights = [-26.2, -16.2, -8.7, -3.2]
+    for row in read_table(files["octaves.csv"]):
+        levels = np.array([float(row[f"{f} Hz, dB"]) for f in (63, 125, 250, 500)])
+        total = 10 * np.log10(np.sum(10 ** ((levels + weights) / 10)))
+        assert float(row["A-weighted, dB"]) == pytest.approx(total)
+        known = float(ratings[f"of octaves, {row['prediction']}"]["value, dB"])
+        assert known == pytest.approx(total)
     assert ratings["required"]["text"] == str(prediction.requirement)
 
 
@@ -121,15 +137,20 @@ def test_interval_is_that_of_the_listed_contributions(
 ) -> None:
     """No interval is stated without what it consists of."""
     rows = read_table(contents([floor], tmp_path, report=False)["contributions.csv"])
-    assert {row["contribution"] for row in rows} == floor.prediction.contributions.keys()
-    ends = [[float(row[f"{end}, dB"]) for row in rows] for end in ("lower", "upper")]
-    distances = [np.hypot.reduce(values) for values in ends]
+    for name in ("octaves", "thirds", "standardized"):
+        stated = [row for row in rows if row["rating"] == name]
+        assert {row["contribution"] for row in stated} == floor.prediction.contributions.keys()
+        ends = [[float(row[f"{end}, dB"]) for row in stated] for end in ("lower", "upper")]
+        distances = [np.hypot.reduce(values) for values in ends]
+        low, high = floor.prediction.interval_of(name)
+        rated = floor.prediction.rated_of(name)
+        assert [rated - low, high - rated] == pytest.approx(distances)
     low, high = floor.prediction.interval
-    rated = floor.prediction.rated
-    assert [rated - low, high - rated] == pytest.approx(distances)
-    sizes = np.abs(ends).max(axis=0)
+    assert f"{floor.prediction.rated:.0f} dB ({low:.0f} to {high:.0f})" == (
+        floor.prediction.rated_text
+    )
+    sizes = [max(map(abs, ends)) for ends in floor.contributions.values()]
     assert (np.diff(sizes) <= 0).all()
-    assert f"{rated:.0f} dB ({low:.0f} to {high:.0f})" == floor.prediction.rated_text
 
 
 def test_fractions_of_the_paths_are_stated(tmp_path: Path) -> None:
@@ -255,7 +276,10 @@ def test_changes_out_of_range_are_not_allowed() -> None:
     [
         (thud.Plate(screed_thickness=0.05), ["floating plate", "resilient layer", "plate"]),
         (thud.JoistFloor(), ["sheathing", "joists, 60 mm wide, 0.4 m apart"]),
-        (thud.LaminateFloor(added_mass=90.0), ["laminate"]),
+        (
+            thud.LaminateFloor(added_mass=90.0),
+            ["added mass, 90 kg/m²", *["lamella, along", "lamella, across"] * 2, "lamella, along"],
+        ),
     ],
 )
 def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: list[str]) -> None:
@@ -267,7 +291,9 @@ def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: li
     depth = 0.03 if "joists" in materials[-1] else 0.25
     assert layers[-2].thickness == pytest.approx(depth)
     if isinstance(plate, thud.LaminateFloor):
-        assert layers[0].thickness == pytest.approx(0.16)
+        assert [layer.thickness for layer in layers[:6]] == pytest.approx(
+            [0.06, 0.04, 0.02, 0.04, 0.02, 0.04]
+        )
     rows = {meaning: (value, source) for meaning, value, source in floor.assumptions}
     assert rows["mass per unit area of a suspended ceiling"] == ("9 kg/m²", "stated in the case")
     assert "width of the floor" in " ".join(rows)
@@ -323,7 +349,7 @@ def test_workbook_has_every_table(floor: PredictedFloor, tmp_path: Path) -> None
     (tmp_path / "a.xlsx").write_bytes(files["predictions.xlsx"])
     book = openpyxl.load_workbook(tmp_path / "a.xlsx")
     assert book.sheetnames == [
-        "bands", "ratings", "contributions", "paths", "assumptions", "warnings",
+        "bands", "octaves", "ratings", "contributions", "paths", "assumptions", "warnings",
     ]  # fmt: skip
     rows = list(book["bands"].iter_rows(values_only=True))
     column = rows[0].index("statistical, dB")
@@ -435,6 +461,41 @@ def test_reports_of_other_floors_are_removed(
     assert {*names_in(tmp_path / "out")} == {
         ".thud", "mine.pdf", "predictions.xlsx", *TABLES
     }  # fmt: skip
+
+
+def test_report_with_all_assumptions_has_two_pages(tmp_path: Path) -> None:
+    """Two lines of default values were on a page of their own."""
+    pytest.importorskip("weasyprint")
+    pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
+    room = thud.Room(
+        length=5, width=4, height=2.5, wall_lengths=(5, 4, 5, 4), wall_junction="t",
+        wall_thickness=(0.2, 0.1, 0.2, 0.1), wall_density=(2300, 1200, 1800, 1200),
+        wall_wave_speed=(3500, 2500, 2700, 2500), required=49,
+    )  # fmt: skip
+    built = thud.construction("joists, 3 boards, double resilient subceiling")
+    prediction = thud.predict_level(thud.solve(built.case(thud.Case(room=room))))
+    details = ("Project", "House A"), ("Client", "B"), ("Date", "2026-01-01")
+    floor = PredictedFloor(built.name, "joists", prediction, built, details)
+    page = page_contents(floor, tmp_path)["joists.pdf"]
+    assert len(pdfium.PdfDocument(page)) == 2
+
+
+def test_decimals_of_texts_in_figures_are_kept() -> None:
+    """Joists 0.625 m apart were drawn as 0.62 m apart."""
+    svg = '<svg viewBox="0 0 10.123 5"><path d="M 1.2345 2"/><text>0.625 m apart</text></svg>'
+    shown = inline_svg(svg, "a")
+    assert "0.625 m apart" in shown
+    assert "1.23 2" in shown
+
+
+def test_floor_without_a_choice_of_edges_has_no_contribution_of_them(floor: PredictedFloor) -> None:
+    """Other edges of own modes are not computed, but were stated to be less than 0.1 dB."""
+    own = replace(floor.prediction, floor=thud.ModalFloor())
+    known = replace(floor, prediction=own)
+    assert own.n_modal
+    assert "model" in known.contributions
+    assert "edges" not in known.contributions
+    assert "support of the edges" not in screen_text(known)
 
 
 def test_workbook_has_fitted_columns_assumptions_and_warnings() -> None:

@@ -20,6 +20,7 @@ from thud.base.errors import ReportWarning
 from thud.case.case import tables_case
 from thud.cli import main
 from thud.floors.prediction import _force_change
+from thud.impact.room_level import new_room_level
 from thud.level.assessment import octave_limits
 
 if TYPE_CHECKING:
@@ -583,8 +584,8 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
     found = thud.predict_level(source, floor, room)
     assert found.requirement is None
     assert list(found.ratings) == list(_schema.RATINGS)
-    mean = found.rated + found.ratings[name].a_weighted - found.rating.a_weighted
-    low, high = (math.floor(end + mean - found.rated + 0.5) for end in found.interval)
+    mean = (found.ratings[name].a_weighted + found.modal_ratings[name].a_weighted) / 2
+    low, high = (math.floor(end + 0.5) for end in found.interval_of(name))
     # The three ratings of this room differ.
     assert len({rating.rounded for rating in found.ratings.values()}) == 3
     assert high - low > 1
@@ -609,6 +610,73 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
         )
         page = thud.compare_floors({"floor": thud.predict_level(source, floor, strict)})
         assert ("required, dB", f"{limit} ({name}): {verdict}") in page.rows()
+
+
+@pytest.mark.parametrize(
+    ("name", "class_text"),
+    [
+        ("concrete 220, screed on 15 MN/m3", "class 4; interval: class 3 to no class"),
+        ("concrete 220", "no class (class 4: at most 49 dB)"),
+    ],
+)
+def test_rating_of_octaves_is_the_mean_of_both_predictions(name: str, class_text: str) -> None:
+    """It was that of one-third octaves, moved by the difference of the statistical ratings."""
+    room = thud.Room(length=5, width=4, height=2.5)
+    found = thud.predict_level(floor=thud.construction(name), room=room)
+
+    def octaves(level: np.ndarray) -> float:
+        sums = 10 * np.log10((10 ** (level.reshape(4, 3) / 10)).sum(axis=1))
+        return thud.rating(sums).a_weighted
+
+    both = octaves(found.level), octaves(found.modal_level)
+    assert found.rated_of("octaves") == pytest.approx(np.mean(both), abs=0.03)
+    assert found.class_text == class_text
+    low, high = found.interval_of("octaves")
+    assert low < min(both) < max(both) < high
+    assert found.all_contributions["octaves"]["model"][1] == pytest.approx(
+        abs(both[0] - both[1]) / 2, abs=0.03
+    )
+
+
+def test_standardized_rating_is_almost_free_of_the_reverberation_time() -> None:
+    found = thud.predict_level(floor=thud.Plate(), room=thud.Room(volume=50.0))
+    name = "reverberation_time"
+    assert found.contributions[name][1] > 0.4
+    assert max(map(abs, found.all_contributions["standardized"][name])) < 0.2
+
+
+def test_level_that_is_not_finite_gets_a_sentence() -> None:
+    """It ended with a traceback: cannot convert float NaN to integer."""
+    room, octaves = {"few_modes": 5.0}, {"level": np.zeros(4)}
+    bands = {name: np.zeros(12) for name in ("level", "modal_level", "simple_level")}
+    bands |= {"frequency": np.arange(12.0), "clamped_level": np.where(np.arange(12) < 2, np.nan, 0)}
+    with pytest.raises(thud.NumericalError, match=naming("not finite", "0, 1 Hz")):
+        new_room_level({"room": room, "room_octaves": octaves, "room_bands": bands})
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"support": "elastic"}, ("elastic", "support_stiffness", "support_rotation")),
+        ({"bridge_x": (1.0,), "bridge_y": (1.0,)}, ("bridge_x", "screed_thickness")),
+    ],
+)
+def test_keys_without_what_they_need_are_refused(
+    keys: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    """An elastic support without a spring was simple; bridges without a screed had no effect."""
+    with pytest.raises(thud.InputError, match=naming(*words)):
+        thud.predict_level(floor=thud.Plate(**keys), room=thud.Room())
+
+
+def test_floor_that_does_not_radiate_is_named_with_those_that_do() -> None:
+    with pytest.raises(thud.InputError, match=naming("'oscillator'", "'plate'", "'modal_floor'")):
+        thud.predict_level(floor=thud.Oscillator(), room=thud.Room())
+
+
+def test_soft_floor_is_named_as_the_cause_of_a_long_contact() -> None:
+    with pytest.raises(thud.ThudError, match=naming("duration", "soft", "stiffer floor")):
+        thud.predict_level(floor=thud.Plate(thickness=0.001), room=thud.Room())
 
 
 def test_paths_share_the_energy_that_enters_the_room(

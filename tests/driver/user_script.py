@@ -75,7 +75,7 @@ floors += [thud.ModalFloor(file=str(folder / "modes.csv"))]
 plates: list[thud.RectangularFloor] = [thud.LaminateFloor()]
 assert all(isinstance(plate, thud.RectangularFloor) for plate in plates)
 light: thud.Impact = thud.solve(ball, floor=floors[1])
-point: thud.MobilityFit = thud.fit_mobility(([10.0, 20.0, 40.0], [1e-5, 2e-5, 1e-5]), order=1)
+point: thud.MobilityFit = thud.fit_mobility(([20.0, 30.0, 40.0, 50.0], [1e-5] * 4), order=1)
 moved: thud.FloorImpact | None = light.on_floor
 assert moved is not None
 impedance: thud.BallImpedance = thud.ball_impedance(light, [1e4, 1e5])

@@ -57,7 +57,7 @@ def calls() -> dict[str, Call]:
         "ball_impedance": Call([[1e4, 1e5]], lambda floors: thud.ball_impedance(light, floors)),
         "mobility": Call([[25.0, 100.0]], lambda frequency: thud.mobility(PLATE, frequency)),
         "fit_mobility": Call(
-            [[10.0, 20.0, 40.0], [1e-5, 2e-5, 1e-5]],
+            [[20.0, 30.0, 40.0, 50.0], [1e-5, 2e-5, 2e-5, 1e-5]],
             lambda *table: thud.fit_mobility(table, order=1),
         ),
         "modal_room": Call(

@@ -91,7 +91,7 @@ def slow_calls(folder: Path) -> Calls:
     force = np.pad(impact.floor_force, 8000)
     force += np.random.default_rng(1).normal(scale=0.5, size=force.size)
     np.savetxt(folder / "record.csv", np.c_[np.arange(force.size) / impact.sample_rate, force])
-    table = ([10.0, 20.0, 40.0], [1e-5, 2e-5, 1e-5])
+    table = ([20.0, 30.0, 40.0, 50.0], [1e-5, 2e-5, 2e-5, 1e-5])
     set_study: Any = {"design": {"size": 8}, "parameters": MASS}
     learned = thud.surrogate({"parameters": MASS, "surrogate": {"size": 64}})
     learned.save(folder / "mass.npz")

@@ -74,11 +74,20 @@ def measured_levels(pressure: Array) -> SoundLevels:
 
 def _weighted_history(pressure: Array) -> Array:
     """Return the A-weighted squared pressure after the Fast detector, Pa2, shape (n_sample,)."""
-    # The weighting between the mid frequencies is interpolated.
-    bands = np.log(rated_bands(BANDS))
-    frequency = np.log(np.maximum(np.fft.rfftfreq(len(pressure), 1 / RATE), 1.0))
-    gain = np.exp(np.interp(frequency, bands, np.log(_weights()) / 2))
+    gain = _a_weighting(np.fft.rfftfreq(len(pressure), 1 / RATE))
     return _fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)))
+
+
+def _a_weighting(frequency: Array) -> Array:
+    """Return the factor of pressure of the A-weighting at frequencies, Hz (IEC 61672-1 annex E)."""
+
+    def response(frequency: Array) -> Array:
+        low, lower, upper, high = (
+            corner**2 + frequency**2 for corner in (20.6, 107.65, 737.86, 12194.22)
+        )
+        return np.asarray(frequency**4 / (low * np.sqrt(lower * upper) * high))
+
+    return np.asarray(response(frequency) / response(np.array(1000.0)))
 
 
 @lru_cache

@@ -210,10 +210,27 @@ class Constructions(Displayed):
         names = [_words(known) for known in self.names]
         if _words(name) not in names:
             refuse(
-                f"construction = {shown(name)} is not known{suggestion(name, self.names)}",
+                f"construction = {shown(name)} is not known{self._suggestion(name)}",
                 "names that thud-driver floor --list shows, or the path of a TOML file",
             )
         return self.entries[names.index(_words(name))]
+
+    def _suggestion(self, name: object) -> str:
+        """Return the end of a message that suggests names that differ in numbers, the nearest two.
+
+        Without such names it suggests the closest spelling.
+        """
+        words, numbers = _parted(f"{name}")
+        known = {entry: _parted(entry) for entry in self.names}
+        distance = {
+            entry: sum(abs(a - b) for a, b in zip(numbers, others, strict=True))
+            for entry, (texts, others) in known.items()
+            if texts == words and len(others) == len(numbers)
+        }
+        nearest = sorted(sorted(distance, key=lambda entry: distance[entry])[:2])
+        if not nearest:
+            return suggestion(name, self.names)
+        return f" (did you mean {' or '.join(map(repr, nearest))}?)"
 
     def __iter__(self) -> Iterator[Construction]:
         """Iterate over the constructions."""
@@ -298,6 +315,15 @@ def _searched(entry: Construction) -> str:
 def _words(text: str) -> list[str]:
     """Return the words of a text in lower case, without commas."""
     return text.lower().replace(",", " ").split()
+
+
+def _parted(text: str) -> tuple[list[str], list[int]]:
+    """Return the words of a text that are no whole numbers, and the numbers."""
+    words = _words(text)
+    return (
+        [word for word in words if not word.isdecimal()],
+        [int(word) for word in words if word.isdecimal()],
+    )
 
 
 def _sides(case: Case) -> tuple[float, float] | None:

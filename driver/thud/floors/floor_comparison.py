@@ -16,7 +16,7 @@ from thud.case.case import Case
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
-from thud.level.levels import get_bands
+from thud.level.rating import rated_bands
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,10 +51,15 @@ class FloorComparison(Displayed, Page):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, with a column for each floor."""
-        octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
+        octaves = [
+            f"{f:g} Hz octave, {prediction}, dB"
+            for prediction in ("by modes", "statistical")
+            for f in rated_bands("octave")
+        ]
         titles = (
             "", "floor", "force", "source", "L_iA,Fmax (ISO 717-2)", "by modes, dB",
-            "statistical, dB", "of octaves (KS F 2863-2)", "class (KS F 2863-2)",
+            "statistical, dB", "of octaves (KS F 2863-2)", "of octaves by modes, dB",
+            "of octaves statistical, dB", "class (KS F 2863-2)",
             "standardized (ISO 16283-2)", "required, dB", *octaves,
             "energy into the bearing floor, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
@@ -147,10 +152,13 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         str(prediction.modal_rating.rounded) if prediction.n_modal else "",
         str(prediction.rating.rounded),
         prediction.octave_text,
+        str(prediction.modal_ratings["octaves"].rounded) if prediction.n_modal else "",
+        str(prediction.octave_rating.rounded),
         # In few words, as the columns are as wide as their cells.
         "not stated" if prediction.source_note else prediction.class_text.partition(" (")[0],
         prediction.standardized_text,
         _required(prediction),
+        *(f"{level:.1f}" if prediction.n_modal else "" for level in prediction.modal_octave_level),
         *(f"{level:.1f}" for level in prediction.octave_level),
         f"{1e3 * prediction.energy.sum():.3g}",
         _tapping(prediction),

@@ -67,6 +67,8 @@ _OTHER_UNITS = {
     "khz", "mhz", "ghz", "rpm", "rad", "radian", "radians", "db", "mm", "cm", "um", "nm", "inch",
     "ft", "kn", "mn", "lbf", "lb", "g", "mg", "percent",
 }  # fmt: skip
+# Minimum number of frequencies in an octave.
+_MIN_POINTS = 2
 # Numbers of poles to try, up to the maximum of the library.
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
 # Numbers of poles without improvement after which the search ends.
@@ -135,15 +137,11 @@ class MobilityFit(Displayed):
         result = {}
         errors = self._errors()
         fitted = self.mobility(self.frequency)
-        octaves = get_bands("octave")
-        for name, low, high in zip(octaves.nominal, octaves.lower, octaves.upper, strict=True):
-            inside = (self.frequency >= low) & (self.frequency < high)
-            if self.frequency[0] > low or self.frequency[-1] < high or not inside.any():
-                continue
+        for name, inside in _covered(self.frequency).items():
             real = [np.trapezoid(y.real[inside], self.frequency[inside])
                     for y in (fitted, self.measured)]  # fmt: skip
             level = 10 * np.log10(real[0] / real[1]) if min(real) > 0 else np.nan
-            result[float(name)] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
+            result[name] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
         return result
 
     @property
@@ -204,7 +202,8 @@ class MobilityFit(Displayed):
         """Return number of poles and error."""
         pairs = sum(ratio < 1 for ratio in self.floor.damping_ratio)
         order = len(self.floor.damping_ratio) + pairs
-        return f"<MobilityFit {self.name}: {order} poles, error {100 * self.error:.2g} %>"
+        poles = f"{order} pole{'s' * (order != 1)}"
+        return f"<MobilityFit {self.name}: {poles}, error {100 * self.error:.2g} %>"
 
 
 def fit_mobility(
@@ -252,12 +251,11 @@ def fit_mobility(
     # The value at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
-    if len(frequency) <= 1:
-        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
     if not (is_valid := np.isfinite(values) & (values != 0)).all():
         first = is_valid.argmin()
         problem = "not finite" if values[first] else "0"
         refuse(f"{label}: the value at {frequency[first]:g} Hz is {problem}", "finite, not 0")
+    _require_octave(label, frequency)
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
     try:
@@ -267,6 +265,30 @@ def fit_mobility(
     except ThudError as error:
         message = "; ".join([f"{label}: {error}", *_unit_warnings(values)])
         raise type(error)(message) from error
+
+
+def _covered(frequency: Array) -> dict[float, NDArray[np.bool_]]:
+    """Return which frequencies lie in each octave that they cover, by mid frequencies, Hz."""
+    octaves = get_bands("octave")
+    result = {}
+    for name, low, high in zip(octaves.nominal, octaves.lower, octaves.upper, strict=True):
+        inside = (frequency >= low) & (frequency < high)
+        reached = frequency.min() <= low and frequency.max() >= high
+        if reached and inside.sum() >= _MIN_POINTS:
+            result[float(name)] = inside
+    return result
+
+
+def _require_octave(label: str, frequency: Array) -> None:
+    """Raise InputError if frequencies, Hz, cover no octave."""
+    if len(frequency) <= 1:
+        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
+    if not _covered(frequency):
+        refuse(
+            f"{label}: {len(frequency)} frequencies from {frequency.min():g} to "
+            f"{frequency.max():g} Hz cover no octave from 31.5 to 500 Hz",
+            f"at least one octave, with {_MIN_POINTS} frequencies or more inside",
+        )
 
 
 def _unit_warnings(values: NDArray[np.complex128]) -> list[str]:

@@ -163,30 +163,27 @@ class RoomPrediction(RoomLevel, Displayed):
 
     @property
     def octave_rating(self) -> Rating:
-        """Single-number rating of the octave levels in the room, with the Korean class."""
+        """Single-number rating of the statistical octave levels, with the Korean class."""
         return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
     def ratings(self) -> dict[RoomRequiredRating, Rating]:
-        """Ratings by name, one for each standard: octaves, thirds and standardized thirds."""
+        """Statistical ratings by name, one for each standard: octaves, thirds, standardized."""
         return {
             "octaves": self.octave_rating,
             "thirds": self.rating,
             "standardized": self.standardized_rating,
         }
 
-    def rated_of(self, name: RoomRequiredRating) -> float:
-        """Return a rating by the mean of both predictions, dB."""
-        return self.rated + self._shift(name)
-
-    def interval_of(self, name: RoomRequiredRating) -> tuple[float, float]:
-        """Return the interval of a rating, dB: that of both predictions, moved to the rating."""
-        low, high = self.interval
-        return low + self._shift(name), high + self._shift(name)
-
-    def _shift(self, name: RoomRequiredRating) -> float:
-        """Return the difference between a statistical rating and that of one-third octaves, dB."""
-        return self.ratings[name].a_weighted - self.rating.a_weighted
+    @property
+    def modal_ratings(self) -> dict[RoomRequiredRating, Rating]:
+        """Ratings by the modes of floor and room, by name."""
+        standardized = standardized_level(self.modal_level, self.reverberation_time, self.volume)
+        return {
+            "octaves": rating(self.modal_octave_level, BANDWIDTHS[0]),
+            "thirds": self.modal_rating,
+            "standardized": rating(standardized, BANDS),
+        }
 
     @property
     def requirement(self) -> Requirement | None:

@@ -5,15 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from thud.base._schema import RATINGS
 from thud.base.bridge import text
+from thud.base.errors import NumericalError
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy as np
     from numpy.typing import NDArray
 
+    from thud.base._schema import RoomRequiredRating
     from thud.base.bridge import Bundle
 
     Array = NDArray[np.float64]
@@ -54,6 +58,9 @@ class RoomLevel(Immutable):
     octave_level, octave_time : ndarray, shape (4,)
         Maximum Fast levels of the octaves 63 to 500 Hz, dB, and the times of these maxima, s. The
         level of an octave is the energy sum of its bands at an instant.
+    modal_octave_level : ndarray, shape (4,)
+        Levels of the octaves by the modes, dB: energy sums of `modal_level`, less what the sums of
+        the statistical levels exceed `octave_level`.
     history_time : ndarray, shape (n_time,)
         Instants after the impact, s.
     history : ndarray, shape (n_time, 12)
@@ -73,13 +80,14 @@ class RoomLevel(Immutable):
         Number of bands in which the sound is modal.
     size : tuple of float
         Length, width and height of the room, m.
-    rated : float
-        Mean of the A-weighted levels of the statistical and the modal prediction, dB.
-    interval : tuple of float
-        Ends of the interval of `rated`, dB: the root sum of squares of `contributions`.
-    contributions : mapping
-        Lower and upper deviation from `rated`, dB, by another conforming source, the support of the
-        edges, a reverberation time 20 % shorter or longer, the positions, and the model.
+    rated_ends : mapping
+        By the name of a rating (``"octaves"``, ``"thirds"``, ``"standardized"``): the mean of its
+        values by the statistical and the modal prediction, and the lower and upper end of its
+        interval, the root sum of squares of its contributions, dB.
+    all_contributions : mapping
+        By the name of a rating: lower and upper deviation from its mean, dB, by another conforming
+        source, the support of the edges, a reverberation time 20 % shorter or longer, the
+        positions, and the model.
     """
 
     frequency: Array
@@ -99,6 +107,7 @@ class RoomLevel(Immutable):
     path_shares: Array
     octave_level: Array
     octave_time: Array
+    modal_octave_level: Array
     history_time: Array
     history: Array
     floor_warnings: tuple[str, ...]
@@ -108,9 +117,32 @@ class RoomLevel(Immutable):
     clamped_level: Array
     n_modal: int
     size: tuple[float, float, float]
-    rated: float
-    interval: tuple[float, float]
-    contributions: Mapping[str, tuple[float, float]]
+    rated_ends: Mapping[RoomRequiredRating, tuple[float, float, float]]
+    all_contributions: Mapping[RoomRequiredRating, Mapping[str, tuple[float, float]]]
+
+    @property
+    def rated(self) -> float:
+        """Mean of the A-weighted levels of both predictions in one-third octaves, dB."""
+        return self.rated_of("thirds")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of the interval of `rated`, dB."""
+        return self.interval_of("thirds")
+
+    @property
+    def contributions(self) -> Mapping[str, tuple[float, float]]:
+        """Contributions to `interval`: lower and upper deviation from `rated`, dB."""
+        return self.all_contributions["thirds"]
+
+    def rated_of(self, name: RoomRequiredRating) -> float:
+        """Return the mean of a rating by both predictions, dB."""
+        return self.rated_ends[name][0]
+
+    def interval_of(self, name: RoomRequiredRating) -> tuple[float, float]:
+        """Return the ends of the interval of a rating, dB."""
+        _, low, high = self.rated_ends[name]
+        return low, high
 
 
 def new_room_level(answer: Bundle) -> RoomLevel | None:
@@ -118,6 +150,14 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
     if "room" not in answer:
         return None
     bands = {**answer["room_bands"]}
+    for name in ("level", "modal_level", "simple_level", "clamped_level"):
+        if not (is_known := np.isfinite(bands[name])).all():
+            frequencies = ", ".join(f"{f:g}" for f in bands["frequency"][~is_known])
+            message = (
+                f"&room: the level in the room is not finite at {frequencies} Hz: a value of the "
+                "floor or the room is too extreme to be computed"
+            )
+            raise NumericalError(message)
     return RoomLevel(
         time_of_maximum=bands.pop("time"),
         **bands,
@@ -127,22 +167,23 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         path_shares=answer["room_paths"]["share"],
         octave_level=answer["room_octaves"]["level"],
         octave_time=answer["room_octaves"]["time"],
+        modal_octave_level=answer["room_octaves"]["modal_level"],
         history_time=answer["room_history"]["time"],
         history=answer["room_history"]["level"],
         floor_warnings=tuple(map(text, answer.get("room_warnings", {}).values())),
         n_modal=int(answer["room"]["n_modal"]),
-        size=_sides(answer["room_size"]["sides"]),
-        rated=answer["room"]["rated"],
-        interval=_pair(answer["room_interval"]["ends"]),
-        contributions={name: _pair(ends) for name, ends in answer["room_contributions"].items()},
+        size=_triple(answer["room_size"]["sides"]),
+        rated_ends={name: _triple(answer["room_rated"][name]) for name in RATINGS},
+        all_contributions={
+            name: {
+                title: (float(ends[0, i]), float(ends[1, i]))
+                for title, ends in answer["room_contributions"].items()
+            }
+            for i, name in enumerate(RATINGS)
+        },
     )
 
 
-def _pair(ends: Array) -> tuple[float, float]:
-    low, high = ends.tolist()
-    return low, high
-
-
-def _sides(sides: Array) -> tuple[float, float, float]:
-    length, width, height = sides.tolist()
-    return length, width, height
+def _triple(values: Array) -> tuple[float, float, float]:
+    first, second, third = values.tolist()
+    return first, second, third

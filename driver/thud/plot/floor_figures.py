@@ -48,8 +48,9 @@ if TYPE_CHECKING:
 THIRDS = BANDWIDTHS[1]
 # Length of the drawn piece of a section and of its scale bar, m; of the piece on paper, inch.
 _PIECE, _BAR, _DRAWN = 0.8, 0.2, 1.2
-# Height of a label beside a section, inch, and the maximum number of characters in one line.
-_LINE, _LABEL = 0.23, 30
+# Height of a label beside a section, inch, of each further line of it, and the maximum number of
+# characters in one line.
+_LABEL_HEIGHT, _LINE, _LABEL = 0.23, 0.12, 30
 # Drawn time, as a multiple of the contact time.
 _SHOWN = 1.5
 # Maximum number of mode shapes, and points along a side of the plate.
@@ -74,8 +75,7 @@ def draw_section(layers: Sequence[Layer], title: str = "") -> Figure:
     scale = _DRAWN / _PIECE
     below = 0.17
     labels = [escape_label(fill(str(layer), _LABEL)) for layer in layers]
-    # A label has room for two lines, or more if it needs them.
-    sizes = np.array([_LINE * -(-(label.count("\n") + 1) // 2) for label in labels])
+    sizes = np.array([_LABEL_HEIGHT + _LINE * label.count("\n") for label in labels])
     height = max(total * scale, sizes.sum()) + below + 0.2 * bool(title)
     figure = new_figure(height)
     figure.set_layout_engine("none")

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.workbooks import workbook
-from thud.report.predicted_floor import contribution_title, deviation_text, sheets, tables
+from thud.level.rating import rated_bands
+from thud.report.predicted_floor import (
+    contribution_title,
+    deviation_text,
+    number_text,
+    sheets,
+    tables,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -22,7 +29,7 @@ if TYPE_CHECKING:
 
 WORKBOOK = "predictions.xlsx"
 # Names of the tables; the last is part of the report.
-_TABLES = ("bands", "ratings", "contributions", "paths", "changes")
+_TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "changes")
 # Maximum number of characters in a line on the screen.
 _WIDTH = 80
 
@@ -31,6 +38,7 @@ def screen_text(floor: PredictedFloor) -> str:
     """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
     prediction = floor.prediction
     required = prediction.requirement
+    octave_ends = prediction.all_contributions["octaves"]
     (_, standard, _, _), *others, (_, korean, _, octaves) = floor.ratings
     notes = [*filter(None, (standard, prediction.source_note))]
     lines = [
@@ -38,11 +46,17 @@ def screen_text(floor: PredictedFloor) -> str:
         f"  {', '.join([f'{prediction.rated_name} {prediction.rated_text}', *notes])}",
         *(f"    {text:>6}  {title}" for title, _, _, text in others),
         f"  Of octaves{korean and f', {korean}'}: {octaves}",
+        *(
+            f"    {title}: {', '.join(number_text(level, '.1f') for level in levels)} dB at "
+            f"{', '.join(f'{f:g}' for f in rated_bands('octave'))} Hz"
+            for title, (*levels, _) in floor.octaves.items()
+        ),
         *([f"  {required}"] if required else []),
         *([f"  A-weighted energy by path: {floor.path_shares}"] if len(floor.paths) > 1 else []),
-        "  Contributions to the interval, dB:",
+        "  Contributions to the intervals of one-third octaves and octaves, dB:",
         *(
-            f"    {deviation_text(ends):<13} {contribution_title(name)}"
+            f"    {deviation_text(ends):<13} {deviation_text(octave_ends[name]):<13} "
+            f"{contribution_title(name)}"
             for name, ends in floor.contributions.items()
         ),
     ]

@@ -17,6 +17,7 @@ from thud.report.predicted_floor import (
     deviation_text,
     difference_text,
     number_text,
+    octave_titles,
 )
 from thud.report.template import PAGE
 
@@ -41,7 +42,7 @@ $ratings
 <h2>Assumptions and their sources</h2>
 $assumptions
 <p class="rule">$assumed</p>
-<div class="sheet"></div>
+<div class="levels">
 <h2>Maximum Fast levels in the room below, one-third octaves</h2>
 <table class="columns"><tr>
 <td>$figure</td>
@@ -50,10 +51,13 @@ $contributions
 <p class="rule">$interval</p>
 <h2>What would change it</h2>
 $changes
-<p class="rule">Each change is predicted again, all else unchanged.</p></td>
+<p class="rule">Changes of the mean rating of one-third octaves, each predicted again, all else
+unchanged.</p></td>
 </tr></table>
 $bands
 <p class="rule">$columns</p>
+$octaves
+</div>
 <h2>How certain the computation is</h2>
 <p class="rule">$computation</p>
 <h2>How certain the model is</h2>
@@ -62,11 +66,14 @@ $warnings
 <footer>$footer</footer>
 """)
 
+# Widths of the columns of bands in print, mm: as their titles need them.
+WIDTHS = (8.5, 13.6, 17.5, 14, 10, 9, 16, 11.6, 10.6, 17, 14, 16, 21.4)
 STYLE = """
 .verdict b { text-transform: none; }
 .whole { white-space: nowrap; }
 .details { font-size: 1em; }
-.sheet { break-after: page; }
+/* With the figure, more than half a page: it begins the second one. */
+.levels { break-inside: avoid; }
 .figure { height: auto; }
 .named td:last-child, .named th:last-child { text-align: left; white-space: normal;
   padding-left: 1.2em; overflow-wrap: anywhere; }
@@ -81,10 +88,14 @@ STYLE = """
   .narrow td:last-child, .narrow th:last-child { width: 22mm; }
   .values th:first-child { width: 64mm; }
   .values th:nth-child(2) { width: 28mm; }
-  .bands th:first-child, .bands th:nth-child(6) { width: 10mm; }
-  .bands th:nth-child(5), .bands th:nth-child(8) { width: 13mm; }
-  .bands th:last-child { width: 22mm; }
-  .bands td, .bands th { padding-left: 0.5mm; }
+  .narrow td:nth-last-child(2):not(:first-child), .narrow th:nth-last-child(2):not(:first-child) {
+    width: 22mm; }
+  .octaves th:first-child { width: 64mm; }
+"""
+STYLE += "".join(
+    f"  .bands th:nth-child({i}) {{ width: {width}mm; }}\n" for i, width in enumerate(WIDTHS, 1)
+)
+STYLE += """  .bands td, .bands th { padding-left: 0.5mm; }
 }
 @media print, (min-width: 60.01em) {
   .verdict { width: 52%; }
@@ -105,8 +116,9 @@ ABOUT_COLUMNS = (
     "modes, and its rating uses the statistical levels."
 )
 ABOUT_INTERVAL = (
-    "Deviations from {rated:.1f} dB. They count as independent: the root sums of squares of both "
-    "sides give the interval, {low:.1f} to {high:.1f} dB."
+    "Deviations from {thirds[0]:.1f} dB by one-third octaves and {octaves[0]:.1f} dB by octaves. "
+    "They count as independent: the root sums of squares of both sides give the intervals, "
+    "{thirds[1]:.1f} to {thirds[2]:.1f} dB and {octaves[1]:.1f} to {octaves[2]:.1f} dB."
 )
 ABOUT_MODEL = (
     "The interval, {interval}, is an estimate of what the model leaves open: {largest} contributes "
@@ -128,7 +140,7 @@ ABOUT_ONE = (
 def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
     """Return the page as self-contained HTML, with the section and the levels as SVG."""
     prediction = floor.prediction
-    low, high = prediction.interval
+    octaves = prediction.all_contributions["octaves"]
     body = BODY.substitute(
         rating=escaped(floor.prediction.rated_text),
         box="<br>".join(map(symbols, _box(floor))),
@@ -149,15 +161,19 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         figure=_figure(figure, "l"),
         contributions=_table(
             [
-                ("Contribution", "dB"),
+                ("Contribution, dB", "1/3 octaves", "octaves"),
                 *(
-                    (contribution_title(name), deviation_text(ends))
+                    (contribution_title(name), deviation_text(ends), deviation_text(octaves[name]))
                     for name, ends in floor.contributions.items()
                 ),
             ],
             "narrow",
         ),
-        interval=escaped(ABOUT_INTERVAL.format(rated=prediction.rated, low=low, high=high)),
+        interval=escaped(
+            ABOUT_INTERVAL.format(
+                thirds=prediction.rated_ends["thirds"], octaves=prediction.rated_ends["octaves"]
+            )
+        ),
         changes=_table(
             [
                 ("Change", "dB"),
@@ -167,6 +183,16 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         ),
         bands=_table(band_rows(floor), "bands scroll"),
         columns=escaped(_about_columns(floor)),
+        octaves=_table(
+            [
+                ("Maximum Fast levels, octaves", *octave_titles()),
+                *(
+                    (title, *(number_text(level, ".1f") for level in levels))
+                    for title, levels in floor.octaves.items()
+                ),
+            ],
+            "octaves",
+        ),
         computation=escaped(_about_computation(floor)),
         model=escaped(_about_model(floor)),
         warnings=notes("Warnings", prediction.warnings or ["none"]),
@@ -191,7 +217,8 @@ def page_texts(floor: PredictedFloor) -> str:
 def _box(floor: PredictedFloor) -> list[str]:
     """Return the lines below the rating."""
     prediction = floor.prediction
-    (_, standard, _, _), *_, (_, korean, _, octaves) = floor.ratings
+    (_, standard, _, _), *_, (_, korean, _, _) = floor.ratings
+    octaves = ", ".join(filter(None, (prediction.octave_text, prediction.class_text)))
     lines = [
         f"{prediction.rated_name} in the room below, 50 to 630 Hz{standard and f' ({standard})'}",
         f"of octaves{korean and f' ({korean})'}: {octaves}",

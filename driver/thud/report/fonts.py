@@ -29,7 +29,7 @@ def missing_characters(text: str) -> str:
             missing -= _characters(path)
         except (OSError, RuntimeError):
             continue
-    return "".join(sorted(missing))
+    return "".join(c for c in dict.fromkeys(text) if c in missing)
 
 
 def _characters(path: str | Path) -> set[str]:

@@ -72,7 +72,8 @@ def inline_svg(svg: str, prefix: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", text)
     text = re.sub(r' style="([^"]*)"', _attributes, text)
-    text = re.sub(r"(\.\d\d)\d+", r"\1", text)
+    # Decimals of coordinates, not of texts.
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\.\d\d)\d+", r"\1", tag[0]), text)
     box = re.search(r'viewBox="[^"]*"', text)
     assert box  # noqa: S101 - matplotlib writes it
     head = f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax"'

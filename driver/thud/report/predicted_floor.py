@@ -27,12 +27,12 @@ from thud.floors.constructions import Layer
 from thud.floors.prediction import BANDS, predict_level
 from thud.floors.resonances import resonances
 from thud.level.levels import get_bands
-from thud.level.rating import rating
+from thud.level.rating import rated_bands, rating
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from thud.base._schema import FloorOptions
+    from thud.base._schema import FloorOptions, RoomRequiredRating
     from thud.base.key import Key
     from thud.floors.constructions import Construction
     from thud.floors.prediction import RoomPrediction
@@ -81,6 +81,10 @@ _THICKNESSES = {
 }
 # Thicknesses that a case does not state, for its drawing, m.
 _LAYER, _BOARD = 0.02, 0.0125
+# Density that gives the drawn thickness of an added mass, kg/m3: that of loose gravel.
+_GRAVEL_DENSITY = 1500.0
+# Thicknesses of the layers of a laminate by default, m.
+_LAMELLAS = (0.04, 0.02, 0.04, 0.02, 0.04)
 _ASSUMED = "(thickness assumed)"
 # Maximum number of values of a key that are listed.
 _MAX_SHOWN = 12
@@ -128,12 +132,14 @@ class PredictedFloor:
     def contributions(self) -> dict[str, tuple[float, float]]:
         """Lower and upper deviation from the rating, dB, the largest contribution first.
 
-        Without a prediction by modes those of edges and model are not known.
+        Without a prediction by modes those of edges and model are not known; that of the edges is
+        not known either if the floor is given by its own modes.
         """
         entries = [
             (name, ends)
             for name, ends in self.prediction.contributions.items()
-            if self.prediction.n_modal or name not in {"edges", "model"}
+            if (self.prediction.n_modal or name != "model")
+            and (self.prediction.has_edges or name != "edges")
         ]
         return dict(sorted(entries, key=lambda entry: -max(map(abs, entry[1]))))
 
@@ -147,7 +153,12 @@ class PredictedFloor:
         """Title, standard, value, dB, and text of each rating; no standard for the tyre."""
         prediction = self.prediction
         note = f"; {prediction.source_note}" if prediction.source_note else ""
-        known = f", {prediction.class_text}" if prediction.class_text else ""
+        octaves = ", ".join(filter(None, (prediction.octave_text, prediction.class_text)))
+        if prediction.n_modal:
+            statistical, modal = (
+                known["octaves"].rounded for known in (prediction.ratings, prediction.modal_ratings)
+            )
+            octaves += f"; statistical {statistical} dB, by modes {modal} dB"
         predictions = "mean of both predictions" if prediction.n_modal else "prediction"
         mean = f"{predictions}, with interval"
         result = [
@@ -166,14 +177,23 @@ class PredictedFloor:
                 "standardized", "ISO 16283-2", prediction.rated_of("standardized"),
                 prediction.standardized_text,
             ),
-            (
-                "of octaves", "KS F 2863-2", prediction.rated_of("octaves"),
-                f"{prediction.octave_text}{known}",
-            ),
+            ("of octaves", "KS F 2863-2", prediction.rated_of("octaves"), octaves),
         ]  # fmt: skip
         if prediction.is_ball:
             return result
         return [(title, "", value, text) for title, _, value, text in result]
+
+    @property
+    def octaves(self) -> dict[str, list[float]]:
+        """Levels of octaves and their rating, dB, by the prediction that they belong to."""
+        prediction = self.prediction
+        both = {"statistical": (prediction.octave_level, prediction.ratings)}
+        if prediction.n_modal:
+            both["by modes"] = (prediction.modal_octave_level, prediction.modal_ratings)
+        return {
+            title: [*map(float, levels), ratings["octaves"].a_weighted]
+            for title, (levels, ratings) in both.items()
+        }
 
     @property
     def paths(self) -> list[str]:
@@ -334,8 +354,9 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
     """Return every number of floors in tables by name, each with a header."""
     bands: list[Cells] = [("floor", "band, Hz", *COLUMNS, "floor modes", "room modes", "modal")]
     ratings: list[Cells] = [("floor", "rating", "standard", "value, dB", "text")]
-    head = ("floor", "contribution", "lower, dB", "upper, dB")
+    head = ("floor", "rating", "contribution", "lower, dB", "upper, dB")
     contributions: list[Cells] = [head]
+    octaves: list[Cells] = [("floor", "prediction", *octave_titles())]
     paths: list[Cells] = [("floor", "band, Hz", "path", "fraction of the energy")]
     changed: list[Cells] = [("floor", "change", "difference, dB")]
     for floor in floors:
@@ -346,20 +367,26 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
             map(float, prediction.room_modes), map(float, np.arange(count) < prediction.n_modal),
         ]  # fmt: skip
         bands += [(floor.name, *row) for row in zip(*columns, strict=True)]
+        octaves += [(floor.name, title, *values) for title, values in floor.octaves.items()]
         ratings += [(floor.name, *entry) for entry in floor.ratings]
-        for end, value in zip(("lower", "upper"), prediction.interval, strict=True):
-            standard = floor.ratings[0][1]
-            ratings.append((floor.name, f"{end} end of the interval", standard, value, ""))
+        ratings += [(floor.name, *entry) for entry in _rating_details(floor)]
         required = prediction.requirement
         if required:
             ratings.append((floor.name, "required", "", required.required, str(required)))
-        contributions += [(floor.name, name, *ends) for name, ends in floor.contributions.items()]
+        contributions += [
+            (floor.name, rated, name, *deviations[name])
+            for rated, deviations in prediction.all_contributions.items()
+            for name in floor.contributions
+        ]
         shares = [*prediction.path_shares, prediction.rated_shares]
         for band, row in zip([*prediction.frequency, "A"], shares, strict=True):
             paths += [(floor.name, band, *path) for path in zip(floor.paths, row, strict=True)]
         if changes:
             changed += [(floor.name, *change) for change in floor.changes]
-    result = {"bands": bands, "ratings": ratings, "contributions": contributions, "paths": paths}
+    result = {
+        "bands": bands, "octaves": octaves, "ratings": ratings, "contributions": contributions,
+        "paths": paths,
+    }  # fmt: skip
     return {**result, "changes": changed} if changes else result
 
 
@@ -371,6 +398,30 @@ def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
         assumptions += [(floor.name, *row) for row in floor.assumptions[1:]]
         warnings += [(floor.name, warning) for warning in floor.prediction.warnings]
     return {"assumptions": assumptions, "warnings": warnings}
+
+
+def octave_titles() -> list[str]:
+    """Return the titles of the columns of `PredictedFloor.octaves`."""
+    return [*(f"{frequency:g} Hz, dB" for frequency in rated_bands("octave")), "A-weighted, dB"]
+
+
+def _rating_details(floor: PredictedFloor) -> Iterator[tuple[str, str, float, str]]:
+    """Yield the ends of the intervals, and the ratings by both predictions of what is not rated."""
+    prediction = floor.prediction
+    names: dict[RoomRequiredRating, str] = {
+        "thirds": "", "standardized": "standardized, ", "octaves": "of octaves, ",
+    }  # fmt: skip
+    standards = {title: standard for title, standard, _, _ in floor.ratings}
+    for name, beginning in names.items():
+        standard = standards[beginning.removesuffix(", ") or "statistical prediction"]
+        both = {"statistical": prediction.ratings}
+        if prediction.n_modal:
+            both["by modes"] = prediction.modal_ratings
+        for title, known in both.items() if beginning else ():
+            value = known[name]
+            yield f"{beginning}{title}", standard, value.a_weighted, f"{value.rounded} dB"
+        for end, level in zip(("lower", "upper"), prediction.interval_of(name), strict=True):
+            yield f"{beginning}{end} end of the interval", standard, level, ""
 
 
 def _rating_entry(
@@ -466,8 +517,8 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     if isinstance(floor, Plate):
         add(f"plate, {floor.density:g} kg/m³", floor.thickness)
     elif isinstance(floor, LaminateFloor):
-        mass = prediction.mass_per_area - floor.added_mass
-        add(f"laminate, {floor.density:g} kg/m³", mass / floor.density)
+        for material, thickness in _laminate_layers(floor):
+            add(material, thickness)
     elif isinstance(floor, ModalFloor | MeasuredMobility):
         add(f"plate like the floor, {floor.density:g} kg/m³", floor.thickness)
     else:
@@ -483,3 +534,14 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     if room.ceiling_mass:
         add(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)
     return layers
+
+
+def _laminate_layers(floor: LaminateFloor) -> Iterator[tuple[str, float]]:
+    """Yield material and thickness, m, of an added mass and of the layers of a laminate."""
+    if floor.added_mass:
+        added = f"added mass, {floor.added_mass:g} kg/m² {_ASSUMED}"
+        yield added, floor.added_mass / _GRAVEL_DENSITY
+    # By default the keys are empty, and the directions alternate.
+    for i, thickness in enumerate(floor.layer_thickness or _LAMELLAS):
+        angle = floor.layer_angle[i] if floor.layer_angle else 90 * (i % 2)
+        yield f"lamella, {'across' if angle else 'along'}", thickness

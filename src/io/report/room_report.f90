@@ -7,7 +7,7 @@ module thud_room_report
    use thud_kinds, only: wp
    use thud_rating, only: class_limits, get_a_weighted_level, get_class, get_rounded, rating_names, rating_titles
    use thud_report, only: line
-   use thud_room, only: few_modes, get_rated, judge_requirement, room_level_type
+   use thud_room, only: few_modes, get_octave_levels, get_rated, get_ratings, judge_requirement, room_level_type
    use thud_room_prediction, only: contribution_names
    use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, significant, to_text
    implicit none (type, external)
@@ -18,6 +18,9 @@ module thud_room_report
    !> Files of a prediction.
    character(len=*), parameter :: room_file_names(*) = [character(len=16) :: 'room_levels.csv', 'room_octaves.csv', &
       'room_history.csv']
+
+   !> Position of the rating of one-third octaves.
+   integer, parameter :: thirds = findloc(rating_names == 'thirds', .true., dim=1)
 
    !> Width of a column of the table.
    integer, parameter :: column = 13
@@ -48,8 +51,9 @@ contains
          prediction%radiation_factor, prediction%loss_factor, prediction%reverberation_time, prediction%floor_modes, &
          prediction%room_modes, prediction%modal_level, prediction%modal_spread, prediction%edge_level, &
          prediction%path_share], [size(prediction%level), 14 + size(prediction%path_share, 2)]))
-      files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
-         prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]))
+      files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,modal_level_dB', &
+         reshape([prediction%octaves%nominal, prediction%octave_level, prediction%octave_time, &
+         get_octave_levels(prediction, prediction%modal_level)], [size(prediction%octave_level), 4]))
       header = 'time_s'
       do i = 1, size(prediction%bands)
          header = header//',level_'//trim(get_band_name(prediction%bands(i)))//'_Hz_dB'
@@ -93,10 +97,9 @@ contains
          end if
          text = text//fixed(prediction%spread(i), 1)//' dB'//newline
       end do
-      text = text//newline//'  Octaves:'
-      do i = 1, size(prediction%octaves)
-         text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(prediction%octave_level(i), 1)//' dB'
-      end do
+      text = text//newline//get_octave_line('Octaves, statistical:', prediction, prediction%octave_level)
+      if (prediction%n_modal > 0) text = text//get_octave_line('Octaves, modal:', prediction, &
+         get_octave_levels(prediction, prediction%modal_level))
       call add_ratings(case, prediction, coupled, text)
       resistance = 1/maxval(prediction%conductance)
       text = text//'  Room of '//fixed(prediction%volume, 1)//' m3, reverberation time ' &
@@ -111,6 +114,24 @@ contains
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 
+   !> Levels of octaves as a line.
+   function get_octave_line(title, prediction, level) result(text)
+      character(len=*), intent(in) :: title
+      type(room_level_type), intent(in) :: prediction
+      !> The levels, dB: [n_octave].
+      real(wp), intent(in) :: level(:)
+      character(len=:), allocatable :: text
+      character(len=21) :: cell
+      integer :: i
+
+      cell = title
+      text = '  '//cell
+      do i = 1, size(level)
+         text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(level(i), 1)//' dB'
+      end do
+      text = text//newline
+   end function get_octave_line
+
    !> Adds the ratings, and whether they meet a requirement.
    subroutine add_ratings(case, prediction, coupled, text)
       type(case_type), intent(in) :: case
@@ -122,7 +143,7 @@ contains
       character(len=1) :: separator
       integer :: i
 
-      text = text//newline//'  Means of both predictions, with their intervals:'//newline
+      text = text//'  Means of both predictions, with their intervals:'//newline
       do i = 1, size(rating_names)
          associate (rated => get_rated(prediction, rating_names(i)))
             text = text//'  '//rating_titles(i)//to_text(get_rounded(rated(1)))//' dB (' &
@@ -138,14 +159,14 @@ contains
       else
          text = text//'no modal prediction: the interval contains neither edges nor model'//newline
       end if
-      text = text//'  Contributions:'
+      text = text//'  Contributions, one-third octaves:'
       separator = ' '
       do i = 1, size(contribution_names)
          if (prediction%n_modal == 0 .and. any(contribution_names(i) == ['edges', 'model'])) cycle
          ! As far as the decimals show it.
-         if (all(abs(prediction%contribution(:, i)) < 0.05_wp)) cycle
+         if (all(abs(prediction%contribution(:, i, thirds)) < 0.05_wp)) cycle
          text = text//trim(separator)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
-            //fixed(prediction%contribution(1, i), 1)//' to '//fixed(prediction%contribution(2, i), 1)
+            //fixed(prediction%contribution(1, i, thirds), 1)//' to '//fixed(prediction%contribution(2, i, thirds), 1)
          separator = ','
       end do
       text = text//' dB'//newline
@@ -214,12 +235,14 @@ contains
       rated = get_rated(prediction, rating_names(1))
       if (has_class(case, prediction)) text = text &
          //line('class', to_text(get_class(rated(1))), 'of octaves, KS F 2863-2; 0: none')
-      text = text//line('rated', to_text(prediction%rated), 'dB, mean of both predictions, ISO 717-2') &
-         //line('interval', join(prediction%interval), 'dB')
-      if (prediction%n_modal > 0) text = text//line('modal', &
-         to_text(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level)), 'dB, by the modes, ISO 717-2')
+      text = text//line('rated', join(prediction%rated), 'dB, means of both predictions') &
+         //line('rated_lower', join(prediction%interval(1, :)), 'dB') &
+         //line('rated_upper', join(prediction%interval(2, :)), 'dB')
+      if (prediction%n_modal > 0) text = text//line('modal', join(get_ratings(prediction, prediction%modal_level)), &
+         'dB, by the modes')
       text = text//line('contribution', join_quoted(contribution_names), '') &
-         //line('lower', join(prediction%contribution(1, :)), 'dB')//line('upper', join(prediction%contribution(2, :)), 'dB')
+         //line('lower', join(prediction%contribution(1, :, thirds)), 'dB, of one-third octaves') &
+         //line('upper', join(prediction%contribution(2, :, thirds)), 'dB, of one-third octaves')
       rated = get_rated(prediction, case%room%required_rating)
       if (case%room%required > 0.0_wp) text = text//line('required', to_text(case%room%required), 'dB') &
          //line('required_rating', quoted(case%room%required_rating), '') &

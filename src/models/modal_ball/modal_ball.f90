@@ -406,13 +406,17 @@ contains
       type(ball_motion_type), intent(in) :: state
       !> Set if the ball touches the floor or may touch it again.
       type(error_type), allocatable, intent(out) :: error
-      character(len=64) :: allowed
+      character(len=:), allocatable :: cause, allowed
 
       if (.not. has_separated) then
+         cause = ''
          allowed = 'longer than that'
-         if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
+         if (state%floor_moves) then
+            cause = ', probably because the floor is so soft that the ball sinks into it instead of rebounding'
+            allowed = 'a stiffer floor, covering or floating plate, or a longer duration'
+         end if
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact; allowed: '//trim(allowed))
+            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact'//cause//'; allowed: '//allowed)
       else if (state%floor_moves) then
          if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_dof)), state%velocity)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &
