@@ -74,7 +74,7 @@ def measured_levels(pressure: Array) -> SoundLevels:
 
 def _weighted_history(pressure: Array) -> Array:
     """Return the A-weighted squared pressure after the Fast detector, Pa2, shape (n_sample,)."""
-    gain = _a_weighting(np.fft.rfftfreq(len(pressure), 1 / RATE))
+    gain = _a_weighting(np.asarray(np.fft.rfftfreq(len(pressure), 1 / RATE), float))
     return _fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)))
 
 

@@ -87,7 +87,7 @@ contains
       integer, allocatable :: kept(:)
       real(wp) :: highest
       logical :: couples_all
-      integer :: i, k
+      integer :: i
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
       allocate (radiation%radiated(size(bands)), radiation%energy_beyond(size(bands)))
