@@ -552,6 +552,10 @@ def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: Tes
     (asked,) = answer["asks"]
     assert asked["values"] == {"plate_f0": "1100", "plate_Q": "24"}
     assert any("“First resonance of the force plate, Hz” = 1100" in w for w in answer["warnings"])
+    # The share of the resonance is asked for next, as half of it would conform.
+    answer = measured(client, content, **fields, **asked["values"])["answer"]
+    assert answer["headline"]["result"] == "undecided"
+    assert [ask["values"] for ask in answer["asks"]] == [{"plate_share": ""}]
     stated = asked["values"] | {"plate_share": 1}
     answer = measured(client, content, **fields, **stated)["answer"]
     octave = answer["criteria"][4]

@@ -89,24 +89,23 @@ def recording_headline(verdict: Verdict, excluded: str, *, is_stated: bool) -> d
     is a sentence on what the uncertainty lacks, and `is_stated` whether the source is stated.
     """
     result = RESULTS[verdict.result]
-    parts = [_largest_contribution(verdict) if result == "undecided" else "", excluded]
-    parts.append(_standard(verdict))
+    parts = [excluded, _standard(verdict)]
+    largest = largest_contribution(verdict)
+    if result == "undecided" and largest:
+        parts.insert(0, "Largest contribution to the uncertainty of {}: {}.".format(*largest))
     if not is_stated:
         parts.append("The source is not stated: these limits are assumed.")
     detail = " ".join(filter(None, parts))
     return _headline(verdict, result, WORDS[result], detail)
 
 
-def _largest_contribution(verdict: Verdict) -> str:
-    """Return the largest contribution to the first undecided level, as a sentence, or nothing."""
-    undecided = [entry for entry in verdict.criteria if entry.result == VERDICTS[2]]
-    for entry in undecided:
+def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
+    """Return the title of the first undecided level and its largest contribution, if any."""
+    for entry in verdict.criteria:
         parts = [part for part in entry.estimate.contributions if part.counted]
-        if entry.unit == "dB" and parts:
-            largest = max(parts, key=lambda part: part.uncertainty)
-            title = entry.quantity.title
-            return f"Largest contribution to the uncertainty of {title}: {largest.name}."
-    return ""
+        if entry.result == VERDICTS[2] and entry.unit == "dB" and parts:
+            return entry.quantity.title, max(parts, key=lambda part: part.uncertainty).name
+    return None
 
 
 def model_headline(

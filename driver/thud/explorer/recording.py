@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
-from thud.explorer.criteria import recording_headline
+from thud.explorer.criteria import largest_contribution, recording_headline
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import TABLES, name_fields
 from thud.plot.impact_figures import contact_force
+from thud.recordings.assumptions import ASSUMED_SHARE
 from thud.recordings.config import config_from, read_table
 from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
@@ -26,6 +27,7 @@ from thud.report.write import figures, json_bytes
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
+    from thud.level.assessment import Verdict
     from thud.recordings.config import Config
     from thud.recordings.signal import Signal
 
@@ -55,7 +57,7 @@ def answer_recording(
     excluded = excluded_text(rows).replace(f"{INCOMPLETE} U", f"{INCOMPLETE} The uncertainty")
     answer["headline"] = recording_headline(verdict, excluded, is_stated="source" in table)
     answer["drops"] = len(recording.drops)
-    answer["asks"] = _asks(recording)
+    answer["asks"] = _asks(recording, verdict)
     # The page shows the name of a single file next to its warnings.
     signals = [name for name in names if not _is_laboratory(name)]
     prefix = f"{signals[0]}: " if len(signals) == 1 else ""
@@ -148,7 +150,7 @@ def _renamed(signal: Signal, copy: str, title: str) -> Signal:
     )
 
 
-def _asks(recording: Recording) -> list[dict[str, Any]]:
+def _asks(recording: Recording, verdict: Verdict) -> list[dict[str, Any]]:
     """Return the fields that change the verdict and are not stated, with estimates and reasons."""
     config = recording.config
     ringing = next((drop.ringing for drop in recording.drops if drop.ringing), None)
@@ -160,6 +162,14 @@ def _asks(recording: Recording) -> list[dict[str, Any]]:
         )
         values = {"plate_f0": f"{ringing.frequency:.0f}", "plate_Q": f"{ringing.quality:.2g}"}
         result.append({"reason": reason, "values": values})
+    title, contribution = largest_contribution(verdict) or ("", "")
+    if contribution == ASSUMED_SHARE:
+        reason = (
+            f"{title} depends on the share of the resonance in the static response of the plate: "
+            "1 if no other mode is as stiff, else less. Taps with hammers of different hardness "
+            "show it."
+        )
+        result.append({"reason": reason, "values": {"plate_share": ""}})
     missing = [name for name in ("height", "mass") if getattr(config, name) is None]
     if missing:
         reason = (
