@@ -367,7 +367,7 @@ contains
          real(wp), intent(in) :: matrix(:, :)
          real(wp), allocatable :: product(:, :)
 
-         product = get_transposed_product(matrix, reshape(part, [n, size(part)/max(n, 1)]))
+         product = get_transposed_product(matrix, reshape(part, [n, size(part(1, :, :, :))]))
       end function get_product_of
    end function get_flow
 

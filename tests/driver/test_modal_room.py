@@ -197,3 +197,17 @@ def test_improvement_by_a_covering_is_in_neither_level() -> None:
     found = thud.modal_room(thud.solve(floor=covered, room=room))
     assert found.mean == pytest.approx(bare.mean)
     assert found.statistical == pytest.approx(bare.statistical)
+
+
+def test_one_mode_of_a_floor_drives_the_room() -> None:
+    # Only (1, 1) takes part, which is coupled with the even half waves of a room of the same sides,
+    # and with all of a room that ends 5 mm before the edge.
+    floor = thud.Plate(length=1.5, width=1.5, thickness=0.15, support="simple")
+    source = thud.solve()
+    levels = []
+    for side in (1.5, 1.495):
+        room = thud.Room(length=side, width=side, height=8.0, reverberation_time=0.05)
+        prediction = thud.predict_level(source, floor, room)
+        levels.append(prediction.modal_level[: prediction.n_modal])
+    assert len(levels[0]) > 0
+    np.testing.assert_allclose(*levels, atol=0.2)
