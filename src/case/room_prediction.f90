@@ -258,9 +258,9 @@ contains
       type(room_level_type), intent(inout) :: prediction
       type(source_limits_type) :: limits
       type(error_type), allocatable :: error
-      type(room_level_type) :: changed
+      type(room_level_type) :: changed(2)
       type(room_type) :: room
-      real(wp), dimension(size(rating_names)) :: modal, simple, clamped
+      real(wp) :: modal(size(rating_names))
       real(wp) :: source_level(size(level))
       integer :: i, octave
 
@@ -275,33 +275,36 @@ contains
             octave = min(2 + (i - 1)/3, octave_count)
             source_level(i) = prediction%level(i) + (limits%upper_level(octave) - limits%lower_level(octave))/2
          end do
-         source = get_ends(get_ratings(prediction, source_level) - statistical)
-         simple = get_ratings(prediction, prediction%edge_level(:, 1)) - modal
-         clamped = get_ratings(prediction, prediction%edge_level(:, 2)) - modal
-         edges(1, :) = min(simple, clamped, 0.0_wp)
-         edges(2, :) = max(simple, clamped, 0.0_wp)
+         source = get_ends(statistical - get_ratings(prediction, source_level))
+         edges = get_ends(get_ratings(prediction, prediction%edge_level(:, 1)) - modal, &
+            get_ratings(prediction, prediction%edge_level(:, 2)) - modal)
          do i = 1, 2
             room = case%room
             room%reverberation_time%values = room%reverberation_time%values*time_ratio**(2*i - 3)
-            call get_room_level(plate, radiation, room, prediction%bands, level, changed)
-            time(i, :) = changed%rating - statistical
+            call get_room_level(plate, radiation, room, prediction%bands, level, changed(i))
          end do
+         time = get_ends(changed(1)%rating - statistical, changed(2)%rating - statistical)
          positions = get_ends(coverage*get_rated_spread(prediction))
-         model = get_ends(abs(modal - statistical)/2)
+         model = get_ends((modal - statistical)/2)
          prediction%rated = (modal + statistical)/2
       end associate
       ! The contributions are independent of each other.
-      prediction%interval = spread(prediction%rated, 1, 2) + get_ends([(1.0_wp, i=1, size(rating_names))]) &
-         *norm2(prediction%contribution, dim=2)
+      prediction%interval(1, :) = prediction%rated - norm2(prediction%contribution(1, :, :), dim=1)
+      prediction%interval(2, :) = prediction%rated + norm2(prediction%contribution(2, :, :), dim=1)
    end subroutine add_contributions
 
-   !> Lower and upper ends of symmetric deviations, dB: [2, n].
-   pure function get_ends(deviation) result(ends)
+   !> Lower and upper ends of deviations, at most and at least 0, dB: [2, n].
+   pure function get_ends(deviation, other) result(ends)
       real(wp), intent(in) :: deviation(:)
+      !> Deviation the other way (default: as large, with the opposite sign).
+      real(wp), intent(in), optional :: other(:)
       real(wp) :: ends(2, size(deviation))
+      real(wp) :: opposite(size(deviation))
 
-      ends(1, :) = -deviation
-      ends(2, :) = deviation
+      opposite = -deviation
+      if (present(other)) opposite = other
+      ends(1, :) = min(deviation, opposite, 0.0_wp)
+      ends(2, :) = max(deviation, opposite, 0.0_wp)
    end function get_ends
 
    !> Standard deviations of the ratings of the mean levels: that of the bands, weighted by their energies, as if their
