@@ -189,6 +189,9 @@ contains
          .and. options%support_rotation%count == 0) then
          error = input_error('&'//trim(base%group)//': support = elastic without support_stiffness and support_rotation; ' &
             //'allowed: at least one of them')
+      else if (options%support /= 'elastic' .and. options%support_stiffness%count + options%support_rotation%count > 0) then
+         error = input_error('&'//trim(base%group)//': support_stiffness and support_rotation with support = ' &
+            //trim(options%support)//'; allowed: with support = elastic')
       else if (is_loose() .and. options%line_x%count + options%line_y%count == 0) then
          error = input_error('&'//trim(base%group)//': support = '//trim(options%support) &
             //' without any stiffness needs supports at line_x or line_y; allowed: at least one')

@@ -658,13 +658,15 @@ def test_level_that_is_not_finite_gets_a_sentence() -> None:
     ("keys", "words"),
     [
         ({"support": "elastic"}, ("elastic", "support_stiffness", "support_rotation")),
+        ({"support_stiffness": (1e8,)}, ("support_stiffness", "simple", "elastic")),
+        ({"support": "clamped", "support_rotation": (1e8,)}, ("support_rotation", "clamped")),
         ({"bridge_x": (1.0,), "bridge_y": (1.0,)}, ("bridge_x", "screed_thickness")),
     ],
 )
 def test_keys_without_what_they_need_are_refused(
     keys: dict[str, Any], words: tuple[str, ...]
 ) -> None:
-    """An elastic support without a spring was simple; bridges without a screed had no effect."""
+    """An elastic support without a spring was simple; springs and bridges had no effect."""
     with pytest.raises(thud.InputError, match=naming(*words)):
         thud.predict_level(floor=thud.Plate(**keys), room=thud.Room())
 
