@@ -362,12 +362,14 @@ def test_few_modes_of_floor_or_room_raise_a_warning(shell: thud.Impact) -> None:
     enough = replace(found, floor_modes=many, room_modes=many)
     assert not enough.has_few_modes.any()
     assert enough.warnings == ()
-    # The force that is used is the right one, or the change is no greater than 0.1 dB.
-    for force, change, count in (
-        ("blocked", -0.1, 0), ("blocked", -0.11, 1), ("blocked", 0.11, 1), ("contact", -3.0, 0)
+    # The force that is used is the right one, or its change is stated.
+    for force, change, words in (
+        ("blocked", -0.1, ["at most 0.1 dB"]), ("blocked", -0.11, ["by about -0.1 dB"]),
+        ("blocked", 0.11, ["by about 0.1 dB"]), ("contact", -3.0, []),
     ):  # fmt: skip
         one = replace(enough, force=force, force_change=change)  # type: ignore[arg-type]
-        assert len(one.warnings) == count
+        assert len(one.warnings) == len(words)
+        assert all(word in text for word, text in zip(words, one.warnings, strict=True))
     assert replace(enough, floor_warnings=("a", "b")).warnings == ("a", "b")
 
 

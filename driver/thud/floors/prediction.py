@@ -251,9 +251,8 @@ class RoomPrediction(RoomLevel, Displayed):
             )
         elif self.force == "blocked" and (model := self.source.case.model) is not None:
             result.append(
-                f"the model {model.name} has no force on a mobile floor: that on a "
-                "rigid floor is used, whose peak the floor would change by less than "
-                f"{MAX_CHANGE:g} dB"
+                f"the model {model.name} has no force on a mobile floor: that on a rigid floor is "
+                f"used, whose peak the floor would change by at most {MAX_CHANGE:g} dB"
             )
         return (*result, *self.source_warnings)
 
