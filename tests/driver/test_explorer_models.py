@@ -26,6 +26,7 @@ from thud.explorer.models import (
 )
 from thud.explorer.presets import presets
 from thud.impact.compute import compute
+from thud.report.predicted_floor import octave_texts
 
 FIELDS = {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
 # Values of keys that all models have, other than the defaults and allowed for all of them.
@@ -193,6 +194,7 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
     prediction = thud.predict_level(floor=thud.construction("concrete 180").floor, room=thud.Room())
     room = answer["room"]
     assert answer["headline"]["text"] == room["interval"] == prediction.rated_text
+    assert all(text in room["ratings"] for text in octave_texts(prediction))
     assert room["rated"] == pytest.approx(
         {"value": prediction.rated, "low": prediction.interval[0], "high": prediction.interval[1]}
     )
@@ -219,7 +221,7 @@ def test_other_sources_in_the_range_are_named_as_such() -> None:
         }.items()
     }  # fmt: skip
     assert "another source that conforms" in titles["conforms"]
-    assert "spread of sources that conform, unlike this one" in titles["shell"]
+    assert "sources that conform, unlike this one" in titles["shell"]
 
 
 def test_choices_of_a_rating_name_their_standards() -> None:

@@ -427,6 +427,9 @@ def test_source_that_does_not_conform_is_beside_the_rating(tmp_path: Path) -> No
     headline = screen_text(floor).splitlines()[1]
     assert headline == f"  L_iA,Fmax {floor.prediction.rated_text}, ISO 717-2, {note}"
     page = floor_page(floor, "", "")
+    for text in (screen_text(floor), page):
+        assert "sources that conform, unlike this one" in text
+        assert "another source" not in text
     box = page.partition('class="verdict">')[2].partition("</div>")[0]
     assert note.capitalize() in box
     assert f"class not stated: {note}" in box

@@ -25,7 +25,7 @@ from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
-from thud.report.predicted_floor import contribution_title
+from thud.report.predicted_floor import contribution_title, octave_texts
 from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
@@ -222,7 +222,7 @@ def _room(prediction: RoomPrediction) -> Answer:
         "rated": {"value": prediction.rated, "low": low, "high": high},
         "interval": prediction.rated_text,
         "contributions": [
-            [_contribution(name, prediction), *ends]
+            [contribution_title(name, prediction), *ends]
             for name, ends in prediction.contributions.items()
         ],
         "source_warnings": list(prediction.source_warnings),
@@ -230,15 +230,8 @@ def _room(prediction: RoomPrediction) -> Answer:
     }
 
 
-def _contribution(name: str, prediction: RoomPrediction) -> str:
-    """Return the title of a contribution; that of other sources, if this one does not conform."""
-    if name == "source" and prediction.source_note:
-        return "spread of sources that conform, unlike this one"
-    return contribution_title(name)
-
-
 def _ratings_text(prediction: RoomPrediction) -> str:
-    """Return the ratings, the class and the verdict on a requirement."""
+    """Return the ratings, the class, the levels of octaves and the verdict on a requirement."""
     both = f"statistical {prediction.rating.rounded} dB"
     if prediction.n_modal:
         both += f", by modes {prediction.modal_rating.rounded} dB"
@@ -248,6 +241,7 @@ def _ratings_text(prediction: RoomPrediction) -> str:
         f"{prediction.rated_name} {prediction.rated_text}{iso_717}, {both}",
         f"octaves {prediction.octave_text}{korean}{known}",
         f"standardized {prediction.standardized_text}{iso_16283}",
+        f"levels of octaves, {', '.join(octave_texts(prediction))}",
     ]
     required = prediction.requirement
     return "; ".join([*words, *([str(required)] if required else [])])

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.workbooks import workbook
-from thud.level.rating import rated_bands
 from thud.report.predicted_floor import (
     contribution_title,
     deviation_text,
-    number_text,
+    octave_texts,
     sheets,
     tables,
 )
@@ -46,17 +45,13 @@ def screen_text(floor: PredictedFloor) -> str:
         f"  {', '.join([f'{prediction.rated_name} {prediction.rated_text}', *notes])}",
         *(f"    {text:>6}  {title}" for title, _, _, text in others),
         f"  Of octaves{korean and f', {korean}'}: {octaves}",
-        *(
-            f"    {title}: {', '.join(number_text(level, '.1f') for level in levels)} dB at "
-            f"{', '.join(f'{f:g}' for f in rated_bands('octave'))} Hz"
-            for title, (*levels, _) in floor.octaves.items()
-        ),
+        *(f"    {text}" for text in octave_texts(prediction)),
         *([f"  {required}"] if required else []),
         *([f"  A-weighted energy by path: {floor.path_shares}"] if len(floor.paths) > 1 else []),
         "  Contributions to the intervals of one-third octaves and octaves, dB:",
         *(
             f"    {deviation_text(ends):<13} {deviation_text(octave_ends[name]):<13} "
-            f"{contribution_title(name)}"
+            f"{contribution_title(name, prediction)}"
             for name, ends in floor.contributions.items()
         ),
     ]

@@ -17,6 +17,7 @@ from thud.report.predicted_floor import (
     deviation_text,
     difference_text,
     number_text,
+    octave_levels,
     octave_titles,
 )
 from thud.report.template import PAGE
@@ -121,10 +122,10 @@ ABOUT_INTERVAL = (
     "{thirds[1]:.1f} to {thirds[2]:.1f} dB and {octaves[1]:.1f} to {octaves[2]:.1f} dB."
 )
 ABOUT_MODEL = (
-    "The interval, {interval}, is an estimate of what the model leaves open: {largest} contributes "
-    "most. {predictions} The interval has no stated probability: no measured floor has been "
-    "compared with these predictions. It excludes mistakes in the assumed values above, "
-    "workmanship, paths that are not described, and furniture."
+    "The interval, {interval}, is an estimate of what the model leaves open. The largest "
+    "contribution: {largest}. {predictions} The interval has no stated probability: no measured "
+    "floor has been compared with these predictions. It excludes mistakes in the assumed values "
+    "above, workmanship, paths that are not described, and furniture."
 )
 ABOUT_BOTH = (
     "The statistical prediction is a mean over many floors and rooms of this kind, that by modes "
@@ -163,7 +164,11 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
             [
                 ("Contribution, dB", "1/3 octaves", "octaves"),
                 *(
-                    (contribution_title(name), deviation_text(ends), deviation_text(octaves[name]))
+                    (
+                        contribution_title(name, prediction),
+                        deviation_text(ends),
+                        deviation_text(octaves[name]),
+                    )
                     for name, ends in floor.contributions.items()
                 ),
             ],
@@ -188,7 +193,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
                 ("Maximum Fast levels, octaves", *octave_titles()),
                 *(
                     (title, *(number_text(level, ".1f") for level in levels))
-                    for title, levels in floor.octaves.items()
+                    for title, levels in octave_levels(prediction).items()
                 ),
             ],
             "octaves",

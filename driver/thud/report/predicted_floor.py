@@ -146,7 +146,7 @@ class PredictedFloor:
     @property
     def largest(self) -> str:
         """Name of the largest contribution, in words."""
-        return contribution_title(next(iter(self.contributions)))
+        return contribution_title(next(iter(self.contributions)), self.prediction)
 
     @property
     def ratings(self) -> list[tuple[str, str, float, str]]:
@@ -182,18 +182,6 @@ class PredictedFloor:
         if prediction.is_ball:
             return result
         return [(title, "", value, text) for title, _, value, text in result]
-
-    @property
-    def octaves(self) -> dict[str, list[float]]:
-        """Levels of octaves and their rating, dB, by the prediction that they belong to."""
-        prediction = self.prediction
-        both = {"statistical": (prediction.octave_level, prediction.ratings)}
-        if prediction.n_modal:
-            both["by modes"] = (prediction.modal_octave_level, prediction.modal_ratings)
-        return {
-            title: [*map(float, levels), ratings["octaves"].a_weighted]
-            for title, (levels, ratings) in both.items()
-        }
 
     @property
     def paths(self) -> list[str]:
@@ -294,8 +282,10 @@ _MODAL = {
 }  # fmt: skip
 
 
-def contribution_title(name: str) -> str:
-    """Return a contribution in words."""
+def contribution_title(name: str, prediction: RoomPrediction) -> str:
+    """Return a contribution in words; that of other sources, if this one does not conform."""
+    if name == "source" and prediction.source_note:
+        return "sources that conform, unlike this one"
     return CONTRIBUTIONS.get(name, name.replace("_", " "))
 
 
@@ -367,7 +357,9 @@ def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list
             map(float, prediction.room_modes), map(float, np.arange(count) < prediction.n_modal),
         ]  # fmt: skip
         bands += [(floor.name, *row) for row in zip(*columns, strict=True)]
-        octaves += [(floor.name, title, *values) for title, values in floor.octaves.items()]
+        octaves += [
+            (floor.name, title, *values) for title, values in octave_levels(prediction).items()
+        ]
         ratings += [(floor.name, *entry) for entry in floor.ratings]
         ratings += [(floor.name, *entry) for entry in _rating_details(floor)]
         required = prediction.requirement
@@ -400,8 +392,28 @@ def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
     return {"assumptions": assumptions, "warnings": warnings}
 
 
+def octave_levels(prediction: RoomPrediction) -> dict[str, list[float]]:
+    """Return levels of octaves and their rating, dB, by the prediction that they belong to."""
+    both = {"statistical": (prediction.octave_level, prediction.ratings)}
+    if prediction.n_modal:
+        both["by modes"] = (prediction.modal_octave_level, prediction.modal_ratings)
+    return {
+        title: [*map(float, levels), ratings["octaves"].a_weighted]
+        for title, (levels, ratings) in both.items()
+    }
+
+
+def octave_texts(prediction: RoomPrediction) -> list[str]:
+    """Return the levels of octaves, in a text for each prediction."""
+    octaves = ", ".join(f"{frequency:g}" for frequency in rated_bands("octave"))
+    return [
+        f"{title}: {', '.join(number_text(level, '.1f') for level in levels)} dB at {octaves} Hz"
+        for title, (*levels, _) in octave_levels(prediction).items()
+    ]
+
+
 def octave_titles() -> list[str]:
-    """Return the titles of the columns of `PredictedFloor.octaves`."""
+    """Return the titles of the columns of `octave_levels`."""
     return [*(f"{frequency:g} Hz, dB" for frequency in rated_bands("octave")), "A-weighted, dB"]
 
 
