@@ -143,7 +143,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
     prediction = floor.prediction
     octaves = prediction.all_contributions["octaves"]
     body = BODY.substitute(
-        rating=escaped(floor.prediction.rated_text),
+        rating=escaped(prediction.rated_text),
         box="<br>".join(map(symbols, _box(floor))),
         name=escaped(floor.name),
         details="<br>".join(escaped(f"{name}: {text}") for name, text in floor.details),
@@ -320,7 +320,7 @@ def _about_model(floor: PredictedFloor) -> str:
         statistical=prediction.rating.rounded, modal=prediction.modal_rating.rounded
     )
     return ABOUT_MODEL.format(
-        interval=floor.prediction.rated_text,
+        interval=prediction.rated_text,
         largest=floor.largest,
         predictions=both if prediction.n_modal else ABOUT_ONE,
     )

@@ -426,12 +426,12 @@ def _rating_details(floor: PredictedFloor) -> Iterator[tuple[str, str, float, st
     standards = {title: standard for title, standard, _, _ in floor.ratings}
     for name, beginning in names.items():
         standard = standards[beginning.removesuffix(", ") or "statistical prediction"]
-        both = {"statistical": prediction.ratings}
-        if prediction.n_modal:
-            both["by modes"] = prediction.modal_ratings
-        for title, known in both.items() if beginning else ():
-            value = known[name]
-            yield f"{beginning}{title}", standard, value.a_weighted, f"{value.rounded} dB"
+        if beginning:
+            value = prediction.ratings[name]
+            yield f"{beginning}statistical", standard, value.a_weighted, f"{value.rounded} dB"
+        if beginning and prediction.n_modal:
+            value = prediction.modal_ratings[name]
+            yield f"{beginning}by modes", standard, value.a_weighted, f"{value.rounded} dB"
         for end, level in zip(("lower", "upper"), prediction.interval_of(name), strict=True):
             yield f"{beginning}{end} end of the interval", standard, level, ""
 
