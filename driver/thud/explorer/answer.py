@@ -59,6 +59,7 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     Raise InputError if a value is not allowed, or TypeError or ValueError if its type is wrong.
     """
     case = tables_case(values)
+    refuse_unused(values, case)
     _require_density(case)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:
