@@ -1256,7 +1256,7 @@ def test_case_with_an_error_is_not_downloaded(browser: Browser, server: Served) 
     fill(page, "drop.height", "")
     message = page.locator("#message")
     sync_api.expect(message).to_contain_text("enter a number")
-    for entry in ("[data-file='case.nml']", "[data-copy='case.py']", "#link"):
+    for entry in ("[data-file='case.nml']", "[data-copy='case.py']", "#link", "#save_page"):
         share(page, entry)
         sync_api.expect(field(page, "drop.height")).to_be_focused()
         sync_api.expect(message).to_contain_text("enter a number")

@@ -59,7 +59,10 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     Raise InputError if a value is not allowed, or TypeError or ValueError if its type is wrong.
     """
     case = tables_case(values)
-    refuse_unused(values, case)
+    used = case.to_namelist()
+    for group in values:
+        if group not in used:
+            refuse(f"&{group} does nothing with this model and floor", ", ".join(used))
     _require_density(case)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:

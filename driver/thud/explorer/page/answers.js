@@ -1,7 +1,7 @@
 // Requests and answers of the doors: which answers are current, messages, and the tasks of the server.
 import { byId, button, element } from "./page.js";
 import { ConnectionError, ServerError, ask, follow, units } from "./request.js";
-import { about, caseValues, isTyping, markField, state } from "./form.js";
+import { about, caseValues, invalidField, isTyping, markField, state } from "./form.js";
 import { isLaboratory, recording, recordingBody, recordingRequest, statedRows } from "./recording.js";
 
 // Pause before a slow case is requested, and before outdated results are dimmed, ms.
@@ -59,7 +59,9 @@ export function showStatus(delay = 0) {
   byId("panel").setAttribute("aria-busy", String(Boolean(job || timer)));
   const show = () => {
     document.body.classList.toggle("outdated", isOutdated);
-    for (const target of [byId("report"), byId("save_page"), ...document.querySelectorAll(".figure .menu button")]) if (target) target.disabled = isOutdated;
+    // Like a download, saving the page names an invalid field.
+    byId("save_page").disabled = isOutdated && !invalidField();
+    for (const target of [byId("report"), ...document.querySelectorAll(".figure .menu button")]) if (target) target.disabled = isOutdated;
   };
   if (isOutdated && delay) dimTimer = setTimeout(show, delay);
   else show();

@@ -4,7 +4,7 @@ import { ConnectionError, ask, firstAbout, fragment, requestAbout, setFragment, 
 import { hideTip } from "./results.js";
 import { firstVariant } from "./first.js";
 import { listenToBall } from "./ball.js";
-import { about, caseValues, isCase, state, takeValues } from "./form.js";
+import { about, caseValues, invalidField, isCase, state, takeValues } from "./form.js";
 import { addFiles, recording } from "./recording.js";
 import { freeStyle } from "./variants.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
@@ -111,7 +111,7 @@ function begin(start) {
 
 /** Move to the field with an error, of which the message is shown; return whether there is one. */
 function hasInvalidField() {
-  const input = document.querySelector("#inputs [aria-invalid]");
+  const input = invalidField();
   input?.focus();
   return Boolean(input);
 }

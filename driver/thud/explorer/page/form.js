@@ -479,6 +479,9 @@ function sliderInput(field, value, step, onMove) {
   return slider;
 }
 
+/** Return the first field with an error, or null. */
+export const invalidField = () => document.querySelector("#inputs [aria-invalid]");
+
 /** Mark only one field as invalid, with a sentence below it; none without a name. */
 export function markField(name, message = "") {
   for (const input of document.querySelectorAll("#panel [aria-invalid]")) input.removeAttribute("aria-invalid");
