@@ -925,7 +925,6 @@ def test_smallest_change_that_conforms_is_found(client: TestClient) -> None:
     answer = last_report(client, "/improve", json=values)["answer"]
     (change,) = (entry for entry in answer["changes"] if entry["key"] == "modal_ball.loss_factor")
     assert change["text"].startswith("Loss factor ")
-    assert change["to"] == change["value"]
 
     def margin(loss: float) -> float:
         options = {"damping_law": "rising", "loss_factor": loss}

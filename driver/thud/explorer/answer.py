@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -97,7 +96,6 @@ def answer_quickly(case: Case) -> Answer | None:
 
 def answer_case(case: Case) -> Answer:
     """Return force, levels, verdict and warnings, and motion, floor and room if they exist."""
-    start = time.perf_counter()
     if isinstance(case.model, FiniteElement):
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
@@ -129,7 +127,6 @@ def answer_case(case: Case) -> Answer:
         known = answer["warnings"]
         answer["warnings"] += [text for text in prediction.warnings if text not in known]
     answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
-    answer["seconds"] = time.perf_counter() - start
     return answer
 
 
@@ -229,7 +226,6 @@ def _room(prediction: RoomPrediction) -> Answer:
             [_contribution(name, prediction), *ends]
             for name, ends in prediction.contributions.items()
         ],
-        "source_warnings": list(prediction.source_warnings),
         "ratings": _ratings_text(prediction),
     }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,7 +44,6 @@ def answer_recording(
     `paths` are copies of the files, `names` the names of the original files, and `table` is a table
     of the configuration. Its values replace those of a file of the laboratory among the files.
     """
-    start = time.perf_counter()
     recording, in_words = read_copies(paths, names, table)
     verdict = recording.assess()
     answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
@@ -66,7 +64,6 @@ def answer_recording(
     if "calibration" in recording.not_stated:
         open_warnings += filter(None, [calibration_warning(verdict.criteria)])
     answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
-    answer["seconds"] = time.perf_counter() - start
     return answer
 
 

@@ -1,7 +1,7 @@
 // The three doors: what each shows, its variants, and the actions on its answer.
 import { byId, button, element, saveFile } from "./page.js";
 import { setFragment } from "./request.js";
-import { hideTip, showCriteria, showFloors, showForces, showHeadline, showRooms, showWarnings } from "./results.js";
+import { hideTip, showAnswer, showFloors, showWarnings } from "./results.js";
 import { showBall } from "./ball.js";
 import { closePress } from "./press.js";
 import { caseValues, isTyping, state, takeValues } from "./form.js";
@@ -68,28 +68,15 @@ function showAnswers() {
   }
   shown = variants;
   nameVariants(variants);
-  showHeadline(own);
+  showAnswer(variants, view);
   showWarnings(own);
-  const hasRoom = Boolean(own.answer.room);
-  byId("levels_figure").hidden = hasRoom;
-  byId("force_figure").hidden = hasRoom;
-  byId("force_figure").classList.toggle("second", !hasRoom);
-  byId("criteria_section").hidden = door === "floor";
-  showPlots(variants, view);
   showFloors(variants);
-  if (door !== "floor") showCriteria(variants);
   showBall(door === "recording" ? null : own.answer.motion);
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
-  showSounds(hasRoom ? variants : [], showError);
+  showSounds(own.answer.room ? variants : [], showError);
   if (door === "recording") byId("next").append(button("Calibration report", saveReport, { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
   if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor", { focus: true })));
-}
-
-/** Show the plots of room or force. */
-export function showPlots(variants, options) {
-  showRooms(variants, options);
-  if (!variants[0].answer.room) showForces(variants, options);
 }
 
 /** Show the result of the last fit, and its details folded; at first in sight. */

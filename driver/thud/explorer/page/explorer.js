@@ -1,7 +1,7 @@
 // Start of the page: its menu, links, keys and files, and the case with which it begins.
 import { byId, button, element, saveFile } from "./page.js";
 import { ConnectionError, ask, firstAbout, fragment, requestAbout, setFragment, takeFragment, units } from "./request.js";
-import { hideTip } from "./results.js";
+import { hideTip, showPlots } from "./results.js";
 import { firstVariant } from "./first.js";
 import { listenToBall } from "./ball.js";
 import { about, caseValues, invalidField, isCase, state, takeValues } from "./form.js";
@@ -10,7 +10,7 @@ import { freeStyle } from "./variants.js";
 import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
 import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, once, reconnect, runTask, showError, showMessage } from "./answers.js";
 import { commit, restoreStored } from "./steps.js";
-import { DOORS, formHandlers, keep, move, openDoor, showAll, showPlots, variantsOfDoor } from "./doors.js";
+import { DOORS, formHandlers, keep, move, openDoor, showAll, variantsOfDoor } from "./doors.js";
 
 async function copyLink() {
   if (hasInvalidField()) return;
