@@ -170,7 +170,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     """Return a criterion for the page; times are in ms."""
     scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
     name, band = criterion.name.rpartition("octave_")[1:]
-    expanded = scale * criterion.estimate.expanded
+    expanded = round(scale * criterion.estimate.expanded, 6)
     # Numerical errors are often too small to be shown.
     is_computed = criterion.uncertainty_name == NUMERICAL_ERROR
     smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
