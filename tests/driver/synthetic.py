@@ -162,6 +162,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         bounces=(),
         steps=(),
         warnings=(),
+        level_effects={},
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force,
             (np.zeros(1), np.zeros(1)), gate, offset, (before, after),

@@ -7,6 +7,7 @@ import base64
 import hashlib
 import io
 import json
+import math
 import re
 import signal
 import socket
@@ -620,22 +621,16 @@ def test_headline_names_everything_that_is_not_known(client: TestClient) -> None
 
 
 @pytest.mark.parametrize(
-    ("warning", "is_open"),
-    [
-        ("without a filter before sampling, the octave of 500 Hz may be off by 0.6 dB", True),
-        ("without a filter before sampling, the octave of 500 Hz may be off by 0.4 dB", False),
-        ("without a filter before sampling, the octave of 31.5 Hz may be off by 0.6 dB", False),
-        ("drop 1: the force is flat within 1 % for 2 ms: it may be clipped", True),
-        ("the plate is not stated: its estimated effect, 2 dB, is in the uncertainty", False),
-        ("the restitution is known of 1 of 2 drops only", False),
-    ],
+    ("effect", "is_open"), [(0.6, True), (0.4, False), (math.inf, True), (0.0, False)]
 )
-def test_warnings_without_effect_on_the_verdict_stay_folded(warning: str, *, is_open: bool) -> None:
+def test_warnings_without_effect_on_the_verdict_stay_folded(
+    effect: float, *, is_open: bool
+) -> None:
     criteria = [
         Criterion(name, Estimate(value, 0.0, "dB"), 10.0, 14.0)
         for name, value in {"octave_500": 10.5, "octave_31_5": 12.0}.items()
     ]
-    assert decisive_warnings([warning], criteria) == [warning] * is_open
+    assert decisive_warnings({"warning": effect}, criteria) == ["warning"] * is_open
 
 
 def test_several_files_are_the_drops_of_one_measurement(client: TestClient) -> None:
@@ -930,7 +925,6 @@ def test_smallest_change_that_conforms_is_found(client: TestClient) -> None:
     answer = last_report(client, "/improve", json=values)["answer"]
     (change,) = (entry for entry in answer["changes"] if entry["key"] == "modal_ball.loss_factor")
     assert change["text"].startswith("Loss factor ")
-    assert change["to"] == change["value"]
 
     def margin(loss: float) -> float:
         options = {"damping_law": "rising", "loss_factor": loss}

@@ -239,7 +239,7 @@ def test_share_that_is_not_stated_is_assumed_and_named() -> None:
     known = measured(felt(half), plate=PlateConfig(**stated, share=0.5))
     error = abs(float((assumed.levels() - known.levels())[-1]))
     (text,) = [warning for warning in assumed.warnings if "share" in warning]
-    named = re.search(r"half of it ([\d.]+) dB", text)
+    named = re.search(r"share; up to ([\d.]+) dB", text)
     assert named
     assert float(named[1]) == pytest.approx(error, rel=0.1)
     assert not any("share" in warning for warning in known.warnings)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -59,6 +58,10 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     Raise InputError if a value is not allowed, or TypeError or ValueError if its type is wrong.
     """
     case = tables_case(values)
+    used = case.to_namelist()
+    for group in values:
+        if group not in used:
+            refuse(f"&{group} does nothing with this model and floor", ", ".join(used))
     _require_density(case)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:
@@ -93,7 +96,6 @@ def answer_quickly(case: Case) -> Answer | None:
 
 def answer_case(case: Case) -> Answer:
     """Return force, levels, verdict and warnings, and motion, floor and room if they exist."""
-    start = time.perf_counter()
     if isinstance(case.model, FiniteElement):
         case = replace(case, model=replace(case.model, snapshot_interval=SNAPSHOT_INTERVAL))
     impact = compute(case)
@@ -125,7 +127,6 @@ def answer_case(case: Case) -> Answer:
         known = answer["warnings"]
         answer["warnings"] += [text for text in prediction.warnings if text not in known]
     answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
-    answer["seconds"] = time.perf_counter() - start
     return answer
 
 
@@ -169,7 +170,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     """Return a criterion for the page; times are in ms."""
     scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
     name, band = criterion.name.rpartition("octave_")[1:]
-    expanded = scale * criterion.estimate.expanded
+    expanded = round(scale * criterion.estimate.expanded, 6)
     # Numerical errors are often too small to be shown.
     is_computed = criterion.uncertainty_name == NUMERICAL_ERROR
     smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
@@ -225,7 +226,6 @@ def _room(prediction: RoomPrediction) -> Answer:
             [contribution_title(name, prediction), *ends]
             for name, ends in prediction.contributions.items()
         ],
-        "source_warnings": list(prediction.source_warnings),
         "ratings": _ratings_text(prediction),
     }
 

@@ -2,67 +2,46 @@
 
 from __future__ import annotations
 
-import re
+import math
 from typing import TYPE_CHECKING
 
 from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Mapping, Sequence
 
     from thud.level.assessment import Criterion
 
 # Errors of a calibration up to this fraction are common.
 CALIBRATION_ERROR = 0.05
-# Effects on a level that no uncertainty includes: dB and Hz, or Hz and dB.
-_SIZED = re.compile(
-    r"its correction, (?P<size>[\d.]+) dB at (?P<band>[\d.]+) Hz"
-    r"|octave of (?P<other_band>[\d.]+) Hz may be off by (?P<other_size>[\d.]+) dB"
-)
-_NOT_STATED = "uncertainty not stated, and not included: "
-# Warnings on other criteria, and on effects that are included or asked for.
-_OTHER = re.compile(
-    r"not stated, and assumed|restitution|number of peaks|mass is not stated|no bounce|uncertainty"
-    r"|keeps ringing"
-)
 
 
-def decisive_warnings(warnings: Iterable[str], criteria: Sequence[Criterion]) -> list[str]:
+def decisive_warnings(effects: Mapping[str, float], criteria: Sequence[Criterion]) -> list[str]:
     """Return the warnings that can change the verdict on a level.
 
-    These are warnings on an effect that is at least as large as the distance of the level to
-    another verdict, and warnings on the force that state no size.
+    `effects` are those of `thud.recordings.recording.Recording.level_effects`: a warning is
+    returned if its effect is unknown, or at least the distance of the level to another verdict.
     """
-    distances = {entry.name: _distance(entry) for entry in criteria if entry.unit == "dB"}
-    return [text for warning in warnings for text in _decisive(warning, distances)]
+    octave = next(entry for entry in criteria if entry.name == "octave_500")
+    distance = _distance(octave)
+    return [text for text, size in effects.items() if 0 < size >= distance]
+
+
+def calibration_warning(criteria: Sequence[Criterion]) -> str:
+    """Return a warning if a common error of a calibration changes the verdict on a level."""
+    levels = [entry for entry in criteria if entry.unit == "dB"]
+    closest = min(levels, key=_distance)
+    error = 10 ** (_distance(closest) / 20) - 1
+    if error >= CALIBRATION_ERROR:
+        return ""
+    return (
+        f"The uncertainty of the calibration is not stated: an error of {100 * error:.2g} % "
+        f"changes the verdict on {closest.quantity.title}."
+    )
 
 
 def _distance(criterion: Criterion) -> float:
     """Return the change of a level, dB, that changes its verdict; infinite if it is undecided."""
     if criterion.result == VERDICTS[2]:
-        return float("inf")
+        return math.inf
     return abs(criterion.margin) - criterion.estimate.expanded
-
-
-def _decisive(warning: str, distances: dict[str, float]) -> Iterator[str]:
-    """Yield a warning, or its part, that can change a verdict."""
-    if warning.startswith(_NOT_STATED):
-        name = min(distances, key=lambda band: distances[band])
-        error = 10 ** (distances[name] / 20) - 1
-        if "calibration" in warning and error < CALIBRATION_ERROR:
-            yield (
-                f"The uncertainty of the calibration is not stated: an error of {100 * error:.2g} "
-                f"% changes the verdict on {_band(name)} Hz."
-            )
-        return
-    effect = _SIZED.search(warning)
-    if effect:
-        band, size = effect["band"] or effect["other_band"], effect["size"] or effect["other_size"]
-        if float(size) >= distances[f"octave_{band.replace('.', '_')}"]:
-            yield warning
-    elif not _OTHER.search(warning):
-        yield warning
-
-
-def _band(name: str) -> str:
-    return name.removeprefix("octave_").replace("_", ".")

@@ -119,7 +119,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "label": label,
         "kind": key.kind,
         "help": meaning,
-        "choices": {choice: _choice_text(key, choice) for choice in key.choices},
+        "choices": {choice: humanize(choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
         "unit": _typeset(key.unit),
         "si_unit": key.unit,
@@ -128,6 +128,10 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "advanced": is_folded(key),
         "condition": condition_of(key),
     }
+    if key.name == "required_rating":
+        # The bands stand in the help: the column has no room for both.
+        standards = {name: text.partition("(")[2].rstrip(")") for name, text in RATINGS.items()}
+        field |= {"choices": standards, "help": "; ".join(RATINGS.values())}
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
         unit = _unit(key, default)
         power = power_of(unit or "1", key.unit, key.name)
@@ -146,14 +150,6 @@ def _field(key: Key, default: object) -> dict[str, Any]:
             "slider": _slider(value or 0.0, *ends, whole=is_whole),
         }
     return field
-
-
-def _choice_text(key: Key, choice: str) -> str:
-    """Return the text of a choice; that of a rating names its standard."""
-    if key.name == "required_rating":
-        standardized = "standardized " if choice == "standardized" else ""
-        return f"{standardized}{RATINGS[choice].partition(' of ')[2]}"  # type: ignore[index]
-    return humanize(choice)
 
 
 def _title(name: str) -> str:

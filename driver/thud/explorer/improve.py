@@ -354,10 +354,6 @@ def _change(case: Case, name: str, start: float, value: float) -> dict[str, Any]
     unit = f" {field['unit']}" if field["unit"] else ""
     return {
         "key": f"{field['group']}.{field['name']}",
-        "label": field["label"],
-        "unit": field["unit"],
-        "from": before,
-        "to": after,
         "value": value,
         "factor": value / start,
         "text": f"{field['label']} {after:g}{unit} instead of {before:g}{unit} ({percent} %)",

@@ -20,10 +20,11 @@ FOLDER = resources.files("thud.explorer") / "page"
 _STYLE = re.compile(r'<link rel="stylesheet" href="page/([\w.]+)">')
 _SCRIPT = re.compile(r'<script type="module" src="page/([\w.]+)"></script>')
 _FIRST = '<script type="application/json" id="first_answer">'
-# Comments of whole lines, indents, and imports of other modules: a script shares the names of those
-# before.
+# Comments of whole lines, indents and empty lines, blanks of a style, and imports of other modules:
+# a script shares the names of those before.
 _COMMENT = re.compile(r"^[ \t]*(?://[^\n]*|/\*.*?\*/)\n", re.MULTILINE | re.DOTALL)
-_INDENT = re.compile(r"^ +", re.MULTILINE)
+_INDENT = re.compile(r"^[ \n]+", re.MULTILINE)
+_BLANK = re.compile(r"(?<=[{};,:]) | (?=[{}])")
 _IMPORT = re.compile(r'^import .*"\./[\w.]+";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 # The page loads nothing, but plays and shows what it has made or downloaded with its token.
@@ -66,6 +67,6 @@ def new_page(values: Mapping[str, Any] | None) -> Page:
 
 
 def _text(file: Traversable, *, is_script: bool) -> str:
-    """Return a style, or a module as a script, without comments and indents."""
+    """Return a style, or a module as a script, without comments and needless blanks."""
     text = _INDENT.sub("", _COMMENT.sub("", file.read_text(encoding="utf-8")))
-    return _EXPORT.sub("", _IMPORT.sub("", text)) if is_script else text
+    return _EXPORT.sub("", _IMPORT.sub("", text)) if is_script else _BLANK.sub("", text)

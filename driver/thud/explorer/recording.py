@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import largest_contribution, recording_headline
-from thud.explorer.decisive import decisive_warnings
+from thud.explorer.decisive import calibration_warning, decisive_warnings
 from thud.explorer.recording_fields import TABLES, name_fields
 from thud.plot.impact_figures import contact_force
 from thud.recordings.assumptions import ASSUMED_SHARE
@@ -45,7 +44,6 @@ def answer_recording(
     `paths` are copies of the files, `names` the names of the original files, and `table` is a table
     of the configuration. Its values replace those of a file of the laboratory among the files.
     """
-    start = time.perf_counter()
     recording, in_words = read_copies(paths, names, table)
     verdict = recording.assess()
     answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
@@ -62,9 +60,10 @@ def answer_recording(
     signals = [name for name in names if not _is_laboratory(name)]
     prefix = f"{signals[0]}: " if len(signals) == 1 else ""
     answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
-    open_warnings = decisive_warnings(recording.warnings, verdict.criteria)
+    open_warnings = decisive_warnings(recording.level_effects, verdict.criteria)
+    if "calibration" in recording.not_stated:
+        open_warnings += filter(None, [calibration_warning(verdict.criteria)])
     answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
-    answer["seconds"] = time.perf_counter() - start
     return answer
 
 

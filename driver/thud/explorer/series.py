@@ -15,14 +15,16 @@ if TYPE_CHECKING:
 MAX_POINTS = 400
 # Length of the displayed time range divided by the contact time.
 TIME_RANGE = 1.05
-# Significant digits of curves.
+# Significant digits of numbers, and of curves.
 DIGITS = 6
+CURVE_DIGITS = 5
 
 
 def curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> dict[str, Any]:
     """Return a curve of at most `MAX_POINTS` points."""
     chosen = thin_out(np.arange(len(times)), MAX_POINTS)
-    return {"time": to_json(times[chosen]), "value": to_json(values[chosen])}
+    series = {"time": times, "value": values}
+    return {name: to_json(row[chosen], CURVE_DIGITS) for name, row in series.items()}
 
 
 def thin_out(indices: NDArray[np.intp], count: int) -> NDArray[np.intp]:

@@ -73,9 +73,12 @@ def assumed_contributions(
     return {name: values for name, values in contributions.items() if values.any()}
 
 
-def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...]:
-    """Return a warning for each assumption on the instruments that matters."""
-    result = []
+def assumption_warnings(drops: Sequence[Drop], config: Config) -> dict[str, float]:
+    """Return a warning for each assumption on the instruments that matters.
+
+    Its value is its effect on the octave of 500 Hz that the uncertainty does not include, dB.
+    """
+    result = {}
     contributions = assumed_contributions(drops, config)
 
     def size(name: str) -> str:
@@ -104,41 +107,37 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> tuple[str, ...
             f"([filter]; {size(ASSUMED_FILTER)})"
         )
     if assumed:
-        result.append(f"not stated, and assumed for levels and peak: {'; '.join(assumed)}")
+        result[f"not stated, and assumed for levels and peak: {'; '.join(assumed)}"] = 0.0
     limit = _flat_limit(config)
     if limit is not None and limit < ASSUMED_FLAT:
-        result.append(
-            f"force plate: it is flat up to {limit:g} Hz; the standard asks for {ASSUMED_FLAT:g} Hz"
-        )
+        flat = f"force plate: it is flat up to {limit:g} Hz; the standard asks for "
+        result[f"{flat}{ASSUMED_FLAT:g} Hz"] = math.inf
     if plate is None and rings:
-        result.append(
-            "the resonance of the force plate is not stated: its estimated effect, "
-            f"{size(ASSUMED_PLATE)}, is in the uncertainty"
-        )
+        estimated = "the resonance of the force plate is not stated: its estimated effect, "
+        result[f"{estimated}{size(ASSUMED_PLATE)}, is in the uncertainty"] = 0.0
     if plate is not None:
-        result += _plate_warnings(drops, plate, size(ASSUMED_PLATE))
-    return tuple(result)
+        result |= _plate_warnings(drops, plate, size(ASSUMED_PLATE))
+    return result
 
 
-def _plate_warnings(drops: Sequence[Drop], plate: Plate, effect: str) -> list[str]:
+def _plate_warnings(drops: Sequence[Drop], plate: Plate, effect: str) -> dict[str, float]:
     """Return a warning if a stated resonance is not, or not clearly, in the record."""
     seen = [drop.plate_recorded for drop in drops]
     if True in seen:
-        return []
+        return {}
     if False in seen:
         absent = (
             f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
             f"correction, {effect}, is in the uncertainty; check [plate]"
         )
-        return [absent]
-    change = np.nanmax(
-        np.abs(PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f))))
-    )
+        return {absent: 0.0}
+    changes = PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f)))
+    change = float(np.nanmax(np.abs(changes)))
     unclear = (
         f"the record neither shows nor excludes the stated resonance of {plate.frequency:.4g} Hz: "
         f"its correction, {change:.2f} dB at 500 Hz, depends on [plate] alone"
     )
-    return [unclear] if change > MIN_WARNED else []
+    return {unclear: change} if change > MIN_WARNED else {}
 
 
 def with_assumptions(drop: Drop, config: Config) -> Drop:

@@ -221,14 +221,14 @@ def measure_window(window: Window, config: Config) -> Drop:
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
     ringing = find_ringing(contact, chain)
+    rings = {str(ringing): 0.0} if ringing else {}
     drop = replace(
         drop,
         contact=contact,
         steps=(*steps, *drop.steps),
         # A flat top stays flat without tones.
-        warnings=tuple(
-            dict.fromkeys((*warnings, *drop.warnings, *([str(ringing)] if ringing else [])))
-        ),
+        warnings=tuple(dict.fromkeys((*warnings, *drop.warnings, *rings))),
+        level_effects=drop.level_effects | rings,
         ringing=ringing,
         plate_recorded=None if plate is None else is_in_record(recorded, contact, plate),
     )

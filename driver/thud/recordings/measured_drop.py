@@ -98,6 +98,9 @@ class Drop(Immutable):
         Processing of the signal, and possible faults, a sentence each.
     contact : Contact
         Times, background and gate of the contact.
+    level_effects : dict of str to float
+        Effects of those warnings of which it is known, on the octave of 500 Hz, dB: what its
+        uncertainty does not include; zero if there is none.
     offset_step : float
         Change of the offset during the contact, N; zero if there is none.
     ringing : Ringing or None
@@ -126,6 +129,7 @@ class Drop(Immutable):
     steps: tuple[str, ...]
     warnings: tuple[str, ...]
     contact: Contact
+    level_effects: dict[str, float]
     offset_step: float = 0.0
     ringing: Ringing | None = None
     plate_recorded: bool | None = None
@@ -171,6 +175,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             f"{1e3 * contact_time.uncertainty:.2g} ms",
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
+    level_effects: dict[str, float] = {}
     offset_step = find_offset_step(contact)
     if offset_step:
         changed = (
@@ -178,6 +183,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             "uncertainty"
         )
         warnings += (changed,)
+        level_effects[changed] = 0.0
     impulse, peak_force = _impulse(contact), _peak(contact)
     if offset_step:
         errors = step_errors(offset_step, len(contact.gated))
@@ -197,10 +203,12 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
                 f"it is no bounce after a drop from {conditions.height:g} m"
             )
             warnings += (no_bounce,)
+            level_effects[no_bounce] = 0.0
     ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     duration = _between(contact.touch, contact.release)
     methods, unknown = conditions.restitutions(impulse, duration, flights)
+    aliasing = _check_aliasing(contact, window.chain)
     restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
     rate, first = window.sample_rate, contact.span[0]
     return Drop(
@@ -225,11 +233,12 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         warnings=(
             *window.warnings,
             *warnings,
-            *_check_aliasing(contact, window.chain),
+            *aliasing,
             *_check_step(window, contact),
             *unknown,
         ),
         contact=contact,
+        level_effects=level_effects | aliasing | dict.fromkeys(unknown, 0.0),
     )
 
 
@@ -346,11 +355,11 @@ def _check_step(window: Window, contact: Contact) -> tuple[str, ...]:
     return (warning,)
 
 
-def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[str, ...]:
-    """Return a warning if content above half the rate may alias into the octave of 500 Hz.
+def _check_aliasing(contact: Contact, chain: Chain | None) -> dict[str, float]:
+    """Return a warning and its size, dB, if content may alias into the octave of 500 Hz.
 
-    The amplitude of a pulse with kinks is assumed to fall as 1/f**2 above half the rate; stated
-    instruments reduce it further.
+    This is content above half the rate. The amplitude of a pulse with kinks is assumed to fall as
+    1/f**2 there; stated instruments reduce it further.
     """
     rate = contact.sample_rate
     lower, upper = OCTAVE_500
@@ -366,9 +375,9 @@ def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[str, ...]:
         folded *= abs(chain.response(np.array([rate - upper]))[0]) ** 2
     error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
     if error < MAX_ALIASING_ERROR:
-        return ()
+        return {}
     warning = (
         f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
         f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
     )
-    return (warning,)
+    return {warning: error}

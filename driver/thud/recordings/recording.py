@@ -233,27 +233,46 @@ class Recording(Displayed):
         result += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
         return tuple(dict.fromkeys(result))
 
-    @cached_property
+    @property
     def own_warnings(self) -> tuple[str, ...]:
         """Possible faults of the recording as a whole, a sentence each."""
-        config, warnings = self.config, list[str]()
+        return tuple(self._own_effects)
+
+    @property
+    def level_effects(self) -> dict[str, float]:
+        """Effects of warnings on the octave of 500 Hz, dB: what its uncertainty does not include.
+
+        Zero without an effect, infinite if unknown.
+        """
+        of_drops = {
+            f"{drop.name}: {text}": effect
+            for drop in self.drops
+            for text, effect in drop.level_effects.items()
+        }
+        return dict.fromkeys(self.warnings, math.inf) | self._own_effects | of_drops
+
+    @cached_property
+    def _own_effects(self) -> dict[str, float]:
+        """Warnings on the recording as a whole, with their effects as in `level_effects`."""
+        config, others, on_force = self.config, list[str](), list[str]()
         if math.isnan(self.estimates["peaks"].value):
-            warnings.append("the number of peaks is unknown: some may be noise or the plate")
+            others.append("the number of peaks is unknown: some may be noise or the plate")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
-            warnings.append(f"the restitution is known of {known} of {len(self.drops)} drops only")
-        warnings += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
+            others.append(f"the restitution is known of {known} of {len(self.drops)} drops only")
+        others += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            warnings.append("the mass is not stated: the effective mass is assessed")
-        warnings += [
+            others.append("the mass is not stated: the effective mass is assessed")
+        on_force += [
             f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
         ]
-        warnings += config.check_dates(origin.date for origin in self.origins)
-        warnings += assumption_warnings(self.drops, config)
+        on_force += config.check_dates(origin.date for origin in self.origins)
+        effects = dict.fromkeys(others, 0.0) | dict.fromkeys(on_force, math.inf)
+        effects |= assumption_warnings(self.drops, config)
         if self.not_stated:
             names = ", ".join(self.not_stated)
-            warnings.append(f"uncertainty not stated, and not included: {names}")
-        return tuple(warnings)
+            effects[f"uncertainty not stated, and not included: {names}"] = 0.0
+        return effects
 
     @property
     def not_stated(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 // First picture: the answer that the page itself contains or has stored, until the rest has arrived.
 import { byId } from "./page.js";
 import { fragment } from "./request.js";
-import { showCriteria, showForces, showHeadline, showRooms } from "./results.js";
+import { showAnswer } from "./results.js";
 import { stored, storedCase } from "./storage.js";
 
 /** Variant with which the page begins, of which the motion is not known; null if it has to be computed. */
@@ -18,13 +18,6 @@ function findFirst() {
 }
 
 if (firstVariant) {
-  const hasRoom = Boolean(firstVariant.answer.room);
   document.body.dataset.door = firstVariant.door;
-  showHeadline(firstVariant);
-  byId("levels_figure").hidden = hasRoom;
-  byId("force_figure").hidden = hasRoom;
-  byId("criteria_section").hidden = firstVariant.door === "floor";
-  showRooms([firstVariant], {});
-  if (!hasRoom) showForces([firstVariant], {});
-  showCriteria([firstVariant]);
+  showAnswer([firstVariant], {});
 }

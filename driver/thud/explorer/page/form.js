@@ -139,7 +139,7 @@ function findConstruction() {
 }
 
 /** Fill the fields of floor and ceiling with the values of a construction; a ceiling needs the room below. */
-export function fillConstruction(name) {
+function fillConstruction(name) {
   const construction = about.constructions.find((entry) => entry.name === name);
   if (!construction) return;
   Object.assign(state, { chosen: name, floor: construction.floor, room: state.room || Object.keys(construction.room).length > 0 });
@@ -254,7 +254,7 @@ function floorInputs(handlers) {
 }
 
 /** Return values in the order of their names, without empty groups, for comparisons. */
-export function sorted(values) {
+function sorted(values) {
   const order = (entries) => Object.fromEntries(Object.entries(entries).sort(([one], [other]) => (one < other ? -1 : 1)));
   return order(Object.fromEntries(Object.entries(values).filter(([name, group]) => name === "room" || Object.keys(group).length).map(([name, group]) => [name, order(group)])));
 }
@@ -478,6 +478,9 @@ function sliderInput(field, value, step, onMove) {
   });
   return slider;
 }
+
+/** Return the first field with an error, or null. */
+export const invalidField = () => document.querySelector("#inputs [aria-invalid]");
 
 /** Mark only one field as invalid, with a sentence below it; none without a name. */
 export function markField(name, message = "") {

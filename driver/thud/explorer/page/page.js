@@ -85,3 +85,14 @@ export function saveFile(name, content, type = "text/plain") {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
+
+/** Return a zone with a title, a button to choose files, and a help; `onFiles` is called with those that were chosen. */
+export function fileZone({ id, input: inputId, title, label, multiple, accept }, help, onFiles) {
+  const input = element("input", { type: "file", id: inputId, class: "file", multiple, accept });
+  input.addEventListener("change", () => {
+    if (input.files.length) onFiles([...input.files]);
+    // Otherwise choosing the same file again would raise no event.
+    input.value = "";
+  });
+  return element("div", { id, class: "drop_zone" }, element("b", {}, title), input, element("label", { for: inputId }, label), help);
+}

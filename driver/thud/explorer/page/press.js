@@ -1,5 +1,5 @@
 // The curve of a press, from which the modulus of the ball is fitted.
-import { button, byId, element } from "./page.js";
+import { button, byId, element, fileZone } from "./page.js";
 
 /** The file that was chosen last, and units of columns whose titles state none. */
 const press = { isOpen: false, file: null, units: {} };
@@ -18,14 +18,8 @@ export function pressInputs(declared, onPress) {
     onPress(body, press.file.name);
   };
   const take = (file) => { press.file = file; byId("press_name").textContent = file.name; send(); };
-  const input = element("input", { type: "file", id: "press_file", class: "file", accept: ".csv,.txt,.tsv,.dat,.xlsx" });
-  input.addEventListener("change", () => {
-    if (input.files.length) take(input.files[0]);
-    // Otherwise choosing the same file again would raise no event.
-    input.value = "";
-  });
-  const zone = element("div", { id: "press_zone", class: "drop_zone" }, element("b", {}, "Drop the curve of a press here"), input, element("label", { for: "press_file" }, "Choose file"),
-    element("p", { class: "help", id: "press_name" }, press.file?.name ?? "CSV: deflection, mm, and force, N, on the loading branch"));
+  const zone = fileZone({ id: "press_zone", input: "press_file", title: "Drop the curve of a press here", label: "Choose file", accept: ".csv,.txt,.tsv,.dat,.xlsx" },
+    element("p", { class: "help", id: "press_name" }, press.file?.name ?? "CSV: deflection, mm, and force, N, on the loading branch"), ([file]) => take(file));
   zone.addEventListener("drop", (event) => {
     event.preventDefault();
     event.stopPropagation();

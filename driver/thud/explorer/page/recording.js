@@ -1,5 +1,5 @@
 // The door of a recording: its files, what they do not say, and what its answer asks for.
-import { button, byId, element, numberOf, numberProblem } from "./page.js";
+import { button, byId, element, fileZone, numberOf, numberProblem } from "./page.js";
 import { about, buildInputs, listenToTyping, state } from "./form.js";
 import { ServerError } from "./request.js";
 
@@ -38,12 +38,12 @@ export function keepStated() {
 }
 
 /** Build the form of the recording; `onChange` is called when it has to be assessed again, `onTyping` while a field is typed. */
-export function buildRecording(handlers) {
+function buildRecording(handlers) {
   const { onChange } = handlers;
   const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, handlers));
   byId("inputs").replaceChildren(
-    element("div", { id: "drop_zone", class: "drop_zone" }, element("b", {}, "Drop the files of a force plate here"), fileInput(onChange), element("label", { for: "file" }, "Choose files"),
-      element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS; with it the laboratory’s TOML file")),
+    fileZone({ id: "drop_zone", input: "file", title: "Drop the files of a force plate here", label: "Choose files", multiple: true },
+      element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS; with it the laboratory’s TOML file"), (files) => addFiles(files, onChange)),
     element("ul", { id: "files", "aria-label": "Files" }), asked,
     element("fieldset", {}, element("legend", {}, "What the file does not say"), element("p", { id: "earlier", class: "help" }), ...fields(false)),
     element("details", { class: "folded" }, element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
@@ -65,16 +65,6 @@ function showEarlier(handlers) {
   const labels = about.recording.filter(({ name }) => state.earlier.includes(name)).map(({ label, name }) => `${label}: ${state.recording[name]}`);
   byId("earlier").hidden = !labels.length;
   byId("earlier").replaceChildren(`Kept from the last recording: ${labels.join("; ")}. `, button("Clear", clearEarlier, { id: "clear_earlier" }));
-}
-
-function fileInput(onChange) {
-  const input = element("input", { type: "file", id: "file", class: "file", multiple: true });
-  input.addEventListener("change", () => {
-    addFiles([...input.files], onChange);
-    // Otherwise choosing the same file again would raise no event.
-    input.value = "";
-  });
-  return input;
 }
 
 export function addFiles(files, onChange) {

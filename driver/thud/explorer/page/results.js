@@ -4,7 +4,8 @@ import { interpolate, plot, swatch } from "./plot.js";
 
 const RESULTS = { conforms: "conforms", undecided: "undecided" };
 const UNCERTAINTIES = { "numerical error": "numerical error of the computation", "uncertainty (95 %)": "measurement uncertainty (95 %)" };
-// Verdicts on the required level of a room.
+// Verdicts on a source, and on the required level of a room, by the result of a headline.
+export const SOURCE_VERDICTS = { conforms: "conforms", fails: "does not conform", undecided: "undecided" };
 const ROOM_VERDICTS = { conforms: "met", fails: "not met", undecided: "undecided" };
 const SIGNS = { conforms: "✓", fails: "✕", undecided: "?", level: "" };
 // Uncertainties that are smaller are not drawn, dB.
@@ -21,7 +22,7 @@ const valueTextOf = (criterion) => criterion.value_text ?? rounded(criterion.val
 const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${text ?? Number(uncertainty.toPrecision(2))}${mark ? ` ${mark}` : ""}`;
 
 /** Show the answer to the question; `variant` has a label and an answer. */
-export function showHeadline({ label, answer }) {
+function showHeadline({ label, answer }) {
   const { result, detail } = answer.headline;
   const [, first, rest] = headlineText(answer).match(answer.room ? /^([^(]+)(.*)$/s : /^([^:(]+)(.*)$/s);
   byId("verdict").className = result;
@@ -61,7 +62,7 @@ function resultOf(criterion) {
 }
 
 /** Show force and levels of variants; options: third octaves, and differences to the first variant. */
-export function showForces(variants, { thirds, differences }) {
+function showForces(variants, { thirds, differences }) {
   const isDifference = differences && variants.length > 1;
   const [first] = variants;
   const shown = isDifference ? variants.slice(1) : variants;
@@ -102,7 +103,7 @@ export function showForces(variants, { thirds, differences }) {
 const minusLevel = (level, reference) => (level === null || reference === null ? null : level - reference);
 
 /** Show the levels in the room below, what makes their range, and the ratings. */
-export function showRooms(variants, { differences }) {
+function showRooms(variants, { differences }) {
   const rooms = variants.filter((variant) => variant.answer.room);
   const hasRoom = Boolean(variants[0].answer.room);
   for (const name of ["room_figure", "contributions_figure", "ratings_section"]) byId(name).hidden = !hasRoom;
@@ -148,7 +149,7 @@ function missedSide(criterion) {
 }
 
 /** Show the criteria of the standards; their names explain themselves. */
-export function showCriteria(variants) {
+function showCriteria(variants) {
   const cell = (criterion) => {
     const value = element("td", { class: `value ${resultOf(criterion)}` }, valueTextOf(criterion));
     if (criterion.uncertainty && !criterion.range) value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertaintyText(criterion)}`));
@@ -232,4 +233,21 @@ export function showFloors(variants) {
   byId("floor_table").replaceChildren(
     element("thead", {}, element("tr", {}, ...header.map((title) => element("th", { scope: "col" }, capitalize(title))))),
     element("tbody", {}, ...rows.map(([first, ...cells]) => element("tr", {}, element("th", { scope: "row" }, first), ...cells.map((text) => element("td", {}, minus(text)))))));
+}
+
+/** Show the plots of room or force. */
+export function showPlots(variants, options) {
+  showRooms(variants, options);
+  if (!variants[0].answer.room) showForces(variants, options);
+}
+
+/** Show headline, plots and criteria of variants, of which the first is the answer of its door. */
+export function showAnswer(variants, options) {
+  const [{ door, answer: { room } }] = variants;
+  showHeadline(variants[0]);
+  for (const name of ["levels_figure", "force_figure"]) byId(name).hidden = Boolean(room);
+  byId("force_figure").classList.toggle("second", !room);
+  byId("criteria_section").hidden = door === "floor";
+  showPlots(variants, options);
+  if (door !== "floor") showCriteria(variants);
 }

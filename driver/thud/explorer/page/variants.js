@@ -1,15 +1,13 @@
 // Variants: what they are called, by what differs, and their table.
 import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
 import { STYLES, swatch } from "./plot.js";
-import { headlineText } from "./results.js";
+import { SOURCE_VERDICTS, headlineText } from "./results.js";
 import { about, factsOf, findField } from "./form.js";
 
 // Words of keys in names, if shorter than their labels.
 const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
 // Number of differences in a name.
 const MAX_DIFFERENCES = 3;
-// Verdicts on a source, by the result of its headline.
-const SOURCE_VERDICTS = { conforms: "conforms", fails: "does not conform", undecided: "undecided" };
 const SOURCE_GROUPS = ["sampling", "levels", "limits", "drop", "ball"];
 
 /** Return a free style for a further variant. */

@@ -1,0 +1,239 @@
+// The three doors: what each shows, its variants, and the actions on its answer.
+import { byId, button, element, saveFile } from "./page.js";
+import { setFragment } from "./request.js";
+import { hideTip, showAnswer, showFloors, showWarnings } from "./results.js";
+import { showBall } from "./ball.js";
+import { closePress } from "./press.js";
+import { caseValues, isTyping, state, takeValues } from "./form.js";
+import { buildDoor, keepStated, recording, recordingBody, showAsks } from "./recording.js";
+import { freeStyle, nameVariants, showVariants } from "./variants.js";
+import { showSounds } from "./listen.js";
+import { PAUSE, cancel, computeSoon, current, hideMessage, isCurrent, kept, listenToAnswers, onInvalid, onTyping, once, requestOf, runTask, runningJob, showError, showMessage, showStatus, solve, subjectOf, titleOfDoor } from "./answers.js";
+import { commit, commitSoon, takeStep } from "./steps.js";
+
+const RECORDING_TEXT = "Choose the record of one drop or more. The answer is the verdict with its uncertainty, the levels within the limits of the standards, and a calibration report to save. Missing values can be stated afterwards: the page asks for those that matter.";
+export const DOORS = ["recording", "ball", "floor"];
+// Text on the last fit, and the values that it belongs to.
+let fitted = { text: "", details: "", values: "" };
+// The variants on the page.
+let shown = [];
+
+// ---- Answers.
+
+/** Change the page; a focus on what has gone moves to what replaces it, or to the headline. */
+function changePage(change) {
+  const old = document.activeElement;
+  change();
+  const now = document.activeElement;
+  if (old === document.body || (old.isConnected && now === old) || (now && now !== document.body)) return;
+  const next = byId(old.id);
+  (next && !next.disabled ? next : byId("verdict")).focus({ preventScroll: true });
+}
+
+/** Return the variants of the current door, its own first. */
+export function variantsOfDoor() {
+  const { door } = state;
+  const own = current[door];
+  if (own) own.title = titleOfDoor(door);
+  if (door === "floor") return [own, ...kept.list.filter((variant) => variant.door === "floor")].filter(Boolean);
+  const others = kept.list.filter((variant) => variant.door !== "floor");
+  if (door === "ball" && current.recording && isCurrent("recording")) others.unshift({ ...current.recording, title: titleOfDoor("recording"), style: freeStyle(others) });
+  return [own, ...others].filter(Boolean);
+}
+
+/** Show the answers of the current door. */
+export function showAll() {
+  changePage(showAnswers);
+  showStatus(PAUSE);
+}
+
+function showAnswers() {
+  const { door, view } = state;
+  const variants = variantsOfDoor();
+  const own = current[door];
+  const isEmpty = !own;
+  document.body.dataset.door = door;
+  document.body.classList.toggle("measured", Boolean(current.recording));
+  for (const name of Object.keys(view)) byId(name).checked = view[name];
+  hideTip();
+  byId("variants_section").hidden = variants.length < 2;
+  byId("keep").hidden = isEmpty;
+  byId("next").replaceChildren();
+  byId("result").replaceChildren();
+  byId("improvement").replaceChildren(...improveButton(own));
+  showAsks(own && door === "recording" ? own.answer.asks : [], formHandlers);
+  if (isEmpty) {
+    showNothing(door);
+    return;
+  }
+  shown = variants;
+  nameVariants(variants);
+  showAnswer(variants, view);
+  showWarnings(own);
+  showFloors(variants);
+  showBall(door === "recording" ? null : own.answer.motion);
+  showVariants(variants, { remove: removeVariant, rename: renameVariant });
+  showSounds(own.answer.room ? variants : [], showError);
+  if (door === "recording") byId("next").append(button("Calibration report", saveReport, { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
+  if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
+  if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor", { focus: true })));
+}
+
+/** Show the result of the last fit, and its details folded; at first in sight. */
+function showFitTexts() {
+  const { text, details, isNew } = fitted;
+  byId("result").append(element("p", {}, text), ...(details ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, details))] : []));
+  if (isNew) byId("result").scrollIntoView({ block: "nearest" });
+  fitted.isNew = false;
+}
+
+/** Show the door without an answer. */
+function showNothing(door) {
+  byId("verdict").className = "";
+  byId("verdict").replaceChildren(element("b", {}, door === "recording" ? "Does my source conform?" : "Computing …"));
+  byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
+  delete byId("detail").dataset.subject;
+  byId("open_warnings").replaceChildren();
+  for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
+  for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
+}
+
+// ---- Variants.
+
+/** Keep the variant that the form describes; while a slow case is computed, the one that is shown. */
+export async function keep() {
+  const job = runningJob();
+  if (job && !job.slow) await job.end;
+  const own = current[state.door];
+  if (!own) return;
+  kept.list = [...kept.list, { ...own, style: freeStyle(variantsOfDoor()) }];
+  showAll();
+  commit();
+}
+
+/** Remove a kept variant, or the recording with its files. */
+function removeVariant(variant) {
+  if (kept.list.includes(variant)) kept.list = kept.list.filter((other) => other !== variant);
+  else {
+    recording.files = [];
+    current.recording = null;
+    keepStated();
+  }
+  showAll();
+  byId("keep").focus();
+  commit();
+}
+
+/** Give a variant a name of the user; an empty one takes it back, and null changes nothing. The focus returns to the name unless it has left. */
+function renameVariant(variant, text, isLeft) {
+  const at = shown.indexOf(variant);
+  const title = text || undefined;
+  if (text !== null && text !== variant.label) {
+    if (kept.list.includes(variant)) kept.list = kept.list.map((other) => (other === variant ? { ...variant, title } : other));
+    else state.titles = { ...state.titles, [variant.door]: { text: title, subject: subjectOf(variant.door) } };
+  }
+  showAll();
+  if (!isLeft) document.querySelectorAll("#variants .name")[at]?.focus();
+  commit();
+}
+
+// ---- Doors.
+
+/** Open a door, and compute its case if that is not known. */
+export function openDoor(door, { focus = false } = {}) {
+  cancel();
+  state.door = door;
+  for (const name of DOORS) {
+    const tab = byId(`door_${name}`);
+    tab.setAttribute("aria-selected", String(name === door));
+    tab.tabIndex = name === door ? 0 : -1;
+    if (name === door && focus) tab.focus();
+  }
+  byId("panel").setAttribute("aria-labelledby", `door_${door}`);
+  setFragment(door);
+  document.body.dataset.door = door;
+  changePage(() => buildDoor(formHandlers));
+  hideMessage();
+  showAll();
+  solve();
+  commitSoon();
+}
+
+/** Go to another step; a text that is no value is taken back first. */
+export function move(count) {
+  if (isTyping() || takeStep(count)) openDoor(state.door);
+}
+
+/** Compute the case after a change of the form, and remember the change. */
+function onChange() {
+  commitSoon();
+  computeSoon();
+}
+
+export const formHandlers = { onChange, onTyping, onInvalid, onPress };
+listenToAnswers({
+  onAnswer: () => { showAll(); commitSoon(); },
+  onMissing: (name) => showAsks([{ reason: "", values: { [name]: "" } }], formHandlers),
+});
+
+// ---- Actions.
+
+/** Save the calibration report of the recording. */
+const saveReport = once(async () => {
+  saveFile("calibration.html", await runTask("Calibration report", "report", recordingBody(), new AbortController(), { showNow: true }), "text/html");
+});
+
+const fit = () => fitTo("Fitting a ball to the recording", "fit", () => recordingBody(caseValues("ball")));
+
+/** Fit the ball to the curve of a press. */
+function onPress(body, name) {
+  hideMessage();
+  body.set("case", JSON.stringify(caseValues("ball")));
+  fitTo(`Fitting the ball to ${name}`, "press", () => body);
+}
+
+/** Fit the ball, and take over its values unless others were entered in the meantime. */
+const fitTo = once(async (title, path, newBody) => {
+  const requests = () => JSON.stringify([requestOf("ball"), requestOf("recording"), isTyping()]);
+  const before = requests();
+  const answer = await runTask(title, path, newBody(), new AbortController(), { showNow: true });
+  if (requests() !== before) {
+    showMessage("The fit was not taken over: values have changed since it began");
+    return;
+  }
+  closePress();
+  showFit(answer);
+});
+
+/** Take over the values of a fit, and show its result beside them. */
+function showFit({ values, text, details, name }) {
+  takeValues(values);
+  if (name) state.titles = { ...state.titles, ball: { text: name, subject: subjectOf("ball") } };
+  fitted = { text, details, isNew: true, values: JSON.stringify(caseValues("ball")) };
+  openDoor("ball");
+}
+
+/** Return the button that looks for a change with which a source conforms or a required level is met, if there is a need. */
+function improveButton(own) {
+  if (!own?.values || ["conforms", "level"].includes(own.answer.headline.result)) return [];
+  const title = own.answer.room ? `Change that meets ${own.values.room.required} dB` : "Smallest change that conforms";
+  return [button(title, () => improve(title), { id: "improve" })];
+}
+
+const improve = once(async (title) => {
+  const { door } = state;
+  const request = requestOf(door);
+  const { changes, none, note } = await runTask(title, "improve", JSON.stringify(caseValues(door)), new AbortController(), { showNow: true });
+  await runningJob()?.end;
+  if (state.door !== door || requestOf(door) !== request) return;
+  const apply = ({ key, value }) => {
+    const [group, name] = key.split(".");
+    const values = caseValues(door);
+    (values[group] ??= {})[name] = value;
+    takeValues(values);
+    openDoor(door);
+  };
+  const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
+  byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
+  byId("result").scrollIntoView({ block: "nearest" });
+});

@@ -1,0 +1,81 @@
+// Steps of undo, and what the browser stores.
+import { byId } from "./page.js";
+import { storeCase, storedCase } from "./storage.js";
+import { about, state } from "./form.js";
+import { keepStated, recording } from "./recording.js";
+import { current, isCurrent, kept } from "./answers.js";
+
+// Pause after a change before it can be undone, ms.
+const COMMIT_PAUSE = 400;
+
+const steps = { list: [], at: -1, timer: 0 };
+const snapshot = () => ({ state: JSON.stringify(state), kept: kept.list, recorded: current.recording, files: recording.files });
+
+export function commitSoon() {
+  clearTimeout(steps.timer);
+  steps.timer = setTimeout(commit, COMMIT_PAUSE);
+}
+
+/** Remember the case and its variants, so that a change can be undone. */
+export function commit() {
+  clearTimeout(steps.timer);
+  const [last, next] = [steps.list[steps.at], snapshot()];
+  const isEqual = last && last.kept === next.kept && last.files === next.files && sameCase(last.state, next.state);
+  store();
+  if (isEqual) { last.recorded = current.recording; return; }
+  steps.list.splice(steps.at + 1, Infinity, next);
+  steps.at = steps.list.length - 1;
+  showSteps();
+}
+
+function sameCase(one, other) {
+  const text = (entry) => JSON.stringify({ ...JSON.parse(entry), moved: null, door: null, earlier: null, view: null });
+  return text(one) === text(other);
+}
+
+function showSteps() {
+  const isFocused = [byId("undo"), byId("redo")].includes(document.activeElement);
+  byId("undo").disabled = steps.at <= 0;
+  byId("redo").disabled = steps.at >= steps.list.length - 1;
+  // A button that is disabled loses the focus.
+  if (isFocused) [document.activeElement, byId("undo"), byId("redo")].find((target) => target?.matches("button:enabled"))?.focus();
+}
+
+/** Take over the values of another step; return whether there is one. */
+export function takeStep(count) {
+  commit();
+  const step = steps.list[steps.at + count];
+  if (!step) return false;
+  steps.at += count;
+  restore({ ...JSON.parse(step.state), view: state.view });
+  kept.list = step.kept;
+  current.recording = step.recorded;
+  recording.files = step.files;
+  showSteps();
+  store();
+  return true;
+}
+
+function restore(values) {
+  for (const name of Object.keys(state)) state[name] = values[name] ?? state[name];
+}
+
+const withoutMotion = (variant) => ({ ...variant, answer: { ...variant.answer, motion: null } });
+
+/** Store case and variants in this browser; without room for the answers, only the case. */
+function store() {
+  const own = current[state.door];
+  const entry = { start: JSON.stringify(about.start), state, shown: own?.values && isCurrent(state.door) ? withoutMotion(own) : null, kept: kept.list.map(withoutMotion) };
+  storeCase(entry, { ...entry, shown: null, kept: [] });
+}
+
+/** Restore what this browser has stored for the same start of the page; return whether there was something. */
+export function restoreStored() {
+  const entry = storedCase();
+  if (entry?.start !== JSON.stringify(about.start) || !about.models.some(({ name }) => name === entry.state?.model)) return false;
+  restore(entry.state);
+  kept.list = entry.kept;
+  // The files are not stored.
+  keepStated();
+  return true;
+}
