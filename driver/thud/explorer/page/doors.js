@@ -74,9 +74,15 @@ function showAnswers() {
   showBall(door === "recording" ? null : own.answer.motion);
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(own.answer.room ? variants : [], showError);
-  if (door === "recording") byId("next").append(button("Calibration report", saveReport, { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
+  if (door === "recording") byId("next").append(...toAsks(own.answer.asks), button("Calibration report", saveReport, { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
   if (door === "ball" && JSON.stringify(own.values) === fitted.values) showFitTexts();
   if (door === "ball") byId("next").append(button("Drop it on a floor", () => openDoor("floor", { focus: true })));
+}
+
+/** Return a button to what the answer asks for, which is further down on narrow screens. */
+function toAsks(asks) {
+  if (!asks.length) return [];
+  return [button("State what is missing", () => byId("asks").querySelector("input").focus(), { class: "narrow strong" })];
 }
 
 /** Show the result of the last fit, and its details folded; at first in sight. */

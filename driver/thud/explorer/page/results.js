@@ -25,11 +25,13 @@ const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${te
 function showHeadline({ label, answer }) {
   const { result, detail } = answer.headline;
   const [, first, rest] = headlineText(answer).match(answer.room ? /^([^(]+)(.*)$/s : /^([^:(]+)(.*)$/s);
+  // Narrow screens leave further criteria to the table.
+  const [, why, also] = rest.replace(/^\(/, " (").match(/^(.*?)((?:; also .*)?)$/s);
   byId("verdict").className = result;
   byId("verdict").replaceChildren(
     ...(SIGNS[result] ? [element("span", { class: "sign", "aria-hidden": "true" }, SIGNS[result])] : []),
     element("span", { class: "subject" }, `${label} `),
-    element("b", {}, capitalize(first.trim())), element("span", { class: "why" }, rest.replace(/^\(/, " (")));
+    element("b", {}, capitalize(first.trim())), element("span", { class: "why" }, why, element("span", { class: "wide" }, also)));
   byId("detail").replaceChildren(...withSymbols(detail ?? ""));
   // Narrow screens name the case here.
   if (SIGNS[result]) byId("detail").dataset.subject = label;
