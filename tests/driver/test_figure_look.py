@@ -295,7 +295,10 @@ STEPS = [str(REPOSITORY / "inputs/comparison" / f"{name}.nml") for name in ("1_s
 FLOORS = [str(REPOSITORY / "inputs/floors" / name) for name in ("joists.nml", "concrete_140.nml")]
 SWEEP = '[parameters]\nheight = {values = [0.5, 1.0], unit = "m"}\n'
 FIT = "[target]\nlevels = [39, 31, 23, 17, 12]\n[parameters]\nyoungs_modulus = {}\n"
-RESPONSE = "frequency,real,imaginary\n10,1e-5,1e-5\n20,2e-5,0\n40,1e-5,-1e-5\n80,5e-6,-5e-6\n"
+RESPONSE = (
+    "frequency,real,imaginary\n10,1e-5,1e-5\n20,2e-5,0\n30,1.5e-5,-5e-6\n40,1e-5,-1e-5\n"
+    "80,5e-6,-5e-6\n"
+)
 
 
 @pytest.mark.parametrize(
