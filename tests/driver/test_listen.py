@@ -248,7 +248,7 @@ def test_stated_level_is_that_of_its_own_file(oracle: Callable[..., None]) -> No
     weight = np.sqrt(a_weighting(np.fft.rfftfreq(2 * len(samples), 1 / rate)))
     fast = fast_history(np.fft.irfft(spectrum * weight)[: len(samples)])
     oracle(
-        "stated L_AFmax of a sound with modes below 50 Hz",
+        "stated A-weighted level of a sound with modes below 50 Hz",
         "closed form",
         level(fast) - sound.sounds[0].level.a_weighted,
         0.02,

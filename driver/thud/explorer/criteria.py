@@ -149,7 +149,10 @@ def _standard(verdict: Verdict) -> str:
 
 def _without_ranges(case: Case) -> str:
     """Return why the verdict on a case has no range, as a sentence."""
-    text = "Values of the model only: what is not known of the source is not counted"
+    text = (
+        "Values of this model only, from which others may differ; what is not known of the source "
+        "is not counted"
+    )
     if case.unknowns:
         return f"{text}; thud-driver assess counts the stated unknowns."
     outside = re.fullmatch(
@@ -220,7 +223,7 @@ def _closest(verdict: Verdict) -> str:
     """Return the octave level that is closest to a limit, as a sentence."""
     octaves = [entry for entry in verdict.criteria if entry.unit == "dB"]
     closest = min(octaves, key=lambda entry: entry.margin)
-    return f"Closest to a limit: {closest.quantity.title}, {closest.margin:.1f} dB."
+    return f"Closest to a limit: {closest.quantity.title}, {closest.margin:.2f} dB."
 
 
 def _cause(criterion: Criterion) -> str:

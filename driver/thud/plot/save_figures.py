@@ -6,6 +6,8 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from thud.base.checks import require_choice, shown
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError
@@ -53,8 +55,22 @@ def _content(figure: Figure, name: str, kind: str) -> bytes:
     # Without a date, the same figure gives the same bytes.
     date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
     title = name.replace("_", " ").capitalize()
+    engine = figure.get_layout_engine()
+    _fix_layout(figure)
     figure.savefig(content, format=kind, metadata={"Title": title, **date})
+    figure.set_layout_engine(engine)
     return content.getvalue()
+
+
+def _fix_layout(figure: Figure) -> None:
+    """Round the positions of axes, whose last digits the solver of the layout leaves to chance."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        if axes.get_axes_locator() is None:
+            x, y, width, height = np.round(axes.get_position().bounds, 6)
+            axes.set_position((x, y, width, height))
+            axes.set_in_layout(True)
 
 
 def figure_files(figures: Mapping[str, Figure], kind: str = FORMATS[0]) -> dict[str, bytes]:

@@ -195,6 +195,10 @@ function awaitToken() {
 }
 
 async function main() {
+  // Doors may be chosen before the rest has arrived.
+  let chosen = null;
+  const choose = ({ target }) => { chosen = target.closest("[role=tab]")?.id.replace("door_", "") ?? chosen; };
+  byId("doors").addEventListener("click", choose);
   try {
     Object.assign(about, await firstAbout);
   } catch (error) {
@@ -220,6 +224,8 @@ async function main() {
   addEventListener("hashchange", onAddress);
   if (link !== null) await takeLink(link);
   else if (door && !isRestored) openDoor(door);
+  byId("doors").removeEventListener("click", choose);
+  if (chosen) openDoor(chosen);
   commit();
 }
 

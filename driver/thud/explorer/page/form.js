@@ -199,19 +199,17 @@ function ballInputs(handlers) {
 // Range of the slider of aging, %.
 const AGING = { ends: [0, 100], log: false };
 
-/** Return the modulus of the first preset of which the case is an aged ball, in its own unit; null if there is none. */
+/** Return the modulus of the new ball, that of the first preset of the same model, in its own unit; null if there is none. */
 function newModulus() {
-  const without = ({ ball, ...rest }) => sorted({ ...rest, ball: { ...ball, youngs_modulus: 0 } });
   const field = findField("ball", "youngs_modulus");
-  const current = caseValues("ball");
-  const preset = isUsed(field) && about.presets.find(({ door, values }) => door === "ball" && isSame(without(values), without(current)));
+  const preset = isUsed(field) && about.presets.find(({ door, values }) => door === "ball" && values.model.name === state.model);
   return preset ? preset.values.ball?.youngs_modulus ?? field.default : null;
 }
 
 /** Return the percentage by which aging has raised the modulus. */
 const agingOf = (modulus) => Number((100 * (valueOf(findField("ball", "youngs_modulus")) / modulus - 1)).toFixed(1));
 
-/** Return the field of the percentage by which aging has raised the modulus of a named ball; nothing for others. */
+/** Return the field of the percentage by which aging has raised the modulus; nothing for models without a named ball. */
 function agingElement(handlers) {
   const modulus = newModulus();
   if (modulus === null) return "";
