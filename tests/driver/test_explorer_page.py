@@ -463,6 +463,13 @@ def test_help_on_a_phone_hides_no_row_beside_its_owner(browser: Browser, server:
     settle(page)
     sync_api.expect(page.locator("#ask_height")).to_have_count(0)
     sync_api.expect(page.locator("#ask_plate_share")).to_be_focused()
+    # The last one leads back to the answer.
+    page.locator("#ask_plate_share").fill("1")
+    page.locator("#ask_mass").fill("2.5")
+    page.locator("#ask_mass").press("Enter")
+    settle(page)
+    sync_api.expect(page.locator("#asks")).to_be_hidden()
+    assert page.evaluate("scrollY") == 0
 
 
 def test_changed_construction_is_named_as_changed(browser: Browser, server: Served) -> None:

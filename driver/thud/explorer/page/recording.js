@@ -123,6 +123,8 @@ export function recordingBody(values) {
 /** Ask for what the answer lacks, with the values that it found or that were typed since; one button sends all. */
 export function showAsks(asks, { onChange, onTyping }) {
   const focus = asked.contains(document.activeElement) ? document.activeElement.id : "";
+  // The last answer stands above on narrow screens.
+  if (!asked.hidden && !asks.length && matchMedia("(max-width: 759px)").matches) scrollTo(0, 0);
   asked.hidden = !asks.length;
   const cards = asks.map(({ reason, values }) => {
     const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
