@@ -169,7 +169,7 @@ contains
          end if
          pole = get_poles(modes, kept)
          omega = sqrt(max(pole%re, tiny(1.0_wp)))
-         decay = pole%im/omega
+         decay = get_decay(pole)
          slowest = max(minval(decay), 1.0_wp)
          ! Modes far below the bands ring longest, but the filters of the bands remove them.
          if (.not. with_pressure) slowest = max(minval(decay, omega > pi*box%bands(1)%lower), slowest)
@@ -316,7 +316,7 @@ contains
       real(wp), dimension(size(pole)) :: decay, difference, loss
       integer :: i
 
-      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
+      decay = get_decay(pole)
       do i = 1, size(frequency)
          associate (w => 2*pi*frequency(i))
             ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes
@@ -327,6 +327,15 @@ contains
          end associate
       end do
    end function get_responses
+
+   !> Decay of the energy of a mode with a dashpot, 1/s: angular frequency times loss factor.
+   elemental function get_decay(pole) result(decay)
+      !> Squared angular frequency with its losses, rad2/s2.
+      complex(wp), intent(in) :: pole
+      real(wp) :: decay
+
+      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
+   end function get_decay
 
    !> Volume flow into the pairs of half waves of a group, m3/s per Hz, for each frequency real parts, then imaginary parts,
    !> for each ball: [n_pair, 2*n_ball*n_line].
@@ -389,9 +398,8 @@ contains
 
       room%floor_input = room%floor_input + 2*step*real(matmul(matmul(response, conjg(force)), gain**2), wp)
       if (is_identity(mixing)) then
-         associate (decay => pole%im/sqrt(max(pole%re, tiny(1.0_wp))))
-            room%floor_loss = room%floor_loss + 2*step*matmul(decay*sum(response%re**2 + response%im**2, dim=2), gain%re**2)
-         end associate
+         room%floor_loss = room%floor_loss &
+            + 2*step*matmul(get_decay(pole)*sum(response%re**2 + response%im**2, dim=2), gain%re**2)
          return
       end if
       ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.

@@ -214,7 +214,7 @@ def radiated_by_elements(
     system: System, sides: tuple[float, float], size: float, strike: tuple[float, float],
     bands: Array,
 ) -> Array:  # fmt: skip
-    """Return the power per mean-square force that plate 1 radiates in thirds, m/(N s)."""
+    """Return the power per mean-square force that plate 1 radiates in each band, m/(N s)."""
     x, y = grid_centers(*sides, size)
     points = (grid.ravel() for grid in np.meshgrid(x, y, indexing="ij"))
     output, load = system.get_row(*points, 1), system.get_row(*strike).T
@@ -233,7 +233,7 @@ def radiated_by_elements(
 def radiated_by_thud(
     floor: thud.Plate | thud.JoistFloor, sides: tuple[float, float], strike: tuple[float, float]
 ) -> Array:
-    """Return the power per mean-square force that a floor radiates in thirds, m/(N s)."""
+    """Return the power per mean-square force that a floor radiates in each band, m/(N s)."""
     case = case_text(thud.Case(floor=floor, room=thud.Room(sound_speed=343.0)))
     x, y = (np.array([point / side]) for point, side in zip(strike, sides, strict=True))
     return np.asarray(ask("radiation", case=case, x=x, y=y)["radiated"])

@@ -168,7 +168,7 @@ class RoomPrediction(RoomLevel, Displayed):
 
     @property
     def ratings(self) -> dict[RoomRequiredRating, Rating]:
-        """Statistical ratings by name, one for each standard: octaves, thirds, standardized."""
+        """Statistical ratings by name, one for each standard."""
         return {
             "octaves": self.octave_rating,
             "thirds": self.rating,
