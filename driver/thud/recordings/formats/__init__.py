@@ -7,30 +7,23 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, guarded, shown_path
-from thud.recordings.probe import probe_in_subprocess
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-# Number of bytes from which the format is identified, and of channels that the probe reads.
+# Number of bytes from which the format is identified.
 HEAD = 4096
-MAX_PROBED = 8
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class Format(NamedTuple):
-    """A format: name, module that reads it, suffixes, and whether the first bytes match it.
-
-    With `is_probed` a subprocess reads the file first, because its library may hang, crash or fill
-    memory if the file is damaged.
-    """
+    """A format: name, module that reads it, suffixes, and whether the first bytes match it."""
 
     name: str
     module: str
     suffixes: tuple[str, ...]
     matches: Callable[[bytes], bool]
-    is_probed: bool = False
 
 
 def _is_uff(head: bytes) -> bool:
@@ -48,12 +41,11 @@ FORMATS = (
     Format("WAV", "audio", (".wav", ".rf64", ".bwf"),
            lambda head: head[:4] in {b"RIFF", b"RF64", b"BW64"} and head[8:12] == b"WAVE"),
     Format("FLAC", "audio", (".flac",), lambda head: head[:4] == b"fLaC"),
-    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm", is_probed=True),
+    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
-           lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
-           is_probed=True),
+           lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))),
     Format("MATLAB", "matlab", (".mat",),
-           lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}, is_probed=True),
+           lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}),
     Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
 )  # fmt: skip
@@ -86,14 +78,6 @@ def read_channels(path: Path) -> list[Channel]:
         reason = f"is no {expected.name} file" if expected else "is of no known format"
         refuse(f"{name}: {reason} according to its first bytes", f"{kinds} files")
     module = importlib.import_module(f"{__name__}.{actual.module}")
-    if actual.is_probed:
-        probe_in_subprocess(lambda file: _read_ends(module.read_channels(file)), path, actual.name)
     with guarded(path, actual.name):
         channels: list[Channel] = module.read_channels(path)
         return channels
-
-
-def _read_ends(channels: list[Channel]) -> None:
-    for channel in channels[:MAX_PROBED]:
-        channel.samples(0, 1)
-        channel.samples(channel.n_sample - 1, channel.n_sample)
