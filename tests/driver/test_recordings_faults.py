@@ -19,6 +19,7 @@ from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, injecting

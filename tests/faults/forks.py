@@ -34,7 +34,7 @@ PR_SET_CHILD_SUBREAPER = 36
 # Modules that thud imports when it needs them.
 FURTHER = ("thud_driver", "distributed", "h5netcdf", "zarr", "matplotlib.backends.backend_agg",
            "matplotlib.backends.backend_svg", "xarray.backends.zarr")  # fmt: skip
-# What is written where a study keeps a block, or a measurement a drop; see `_log_work`.
+# What is written where a study keeps a block; see `_log_work`.
 WORK = "work.log"
 
 
@@ -210,14 +210,12 @@ def _be_humble() -> None:
 
 
 def _log_work() -> None:
-    """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
+    """Make blocks small, wait shortly, freeze the date, write down what is kept."""
     from thud.impact import datasets
-    from thud.recordings import checkpoint
     from thud.studies import backends, blocks, samples
 
     samples._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
     backends.WORKER_TIMEOUT, backends.CHECK_INTERVAL = 4.0, 0.5
-    checkpoint.INTERVAL = 0.0
 
     class Frozen(datasets.datetime):  # type: ignore[name-defined, misc]
         @classmethod
@@ -241,7 +239,6 @@ def _log_work() -> None:
         setattr(kind, name, log)
 
     logged(blocks.Blocks, "keep")
-    logged(checkpoint.Checkpoint, "add")
 
 
 def _serve() -> None:

@@ -92,7 +92,7 @@ def _check(name: str, chance: random.Random, place: Path) -> Finding:
 
 
 def _work(place: Path) -> set[str]:
-    """Return the blocks or drops that were written."""
+    """Return the blocks that were written."""
     path = place / WORK
     return set(path.read_text().split()) if path.exists() else set()
 

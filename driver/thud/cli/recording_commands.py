@@ -35,7 +35,6 @@ MAX_PRINTED = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.read_recording import read_recording
     from thud.report import recording_files
 
@@ -45,34 +44,31 @@ def measure(options: argparse.Namespace) -> int:
     )
     files.require(recording_files.file_names(figures=figures))
     folder = files.folder
-    # Measured drops are kept until the results are written.
-    with Checkpoint(folder) as checkpoint:
-        recording = read_recording(
-            options.recordings,
-            height=options.height,
-            mass=options.mass,
-            height_uncertainty=options.height_uncertainty,
-            mass_uncertainty=options.mass_uncertainty,
-            source=options.source,
-            channel=channel_of(options.channel),
-            channels=options.channels,
-            unit=options.unit,
-            calibration=_single(options.calibration),
-            calibration_uncertainty=options.calibration_uncertainty,
-            polarity=options.polarity,
-            sample_rate=options.sample_rate,
-            drops=options.drops,
-            leave_out=_left_out(options) or None,
-            begin=options.begin,
-            end=options.end,
-            low_pass=options.low_pass or None,
-            config=options.config,
-            progress=shows_progress(quiet=options.quiet),
-            workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
-            checkpoint=checkpoint,
-        )
-        verdict = recording.assess()
-        recording_files.save(recording, files, figures=figures)
+    recording = read_recording(
+        options.recordings,
+        height=options.height,
+        mass=options.mass,
+        height_uncertainty=options.height_uncertainty,
+        mass_uncertainty=options.mass_uncertainty,
+        source=options.source,
+        channel=channel_of(options.channel),
+        channels=options.channels,
+        unit=options.unit,
+        calibration=_single(options.calibration),
+        calibration_uncertainty=options.calibration_uncertainty,
+        polarity=options.polarity,
+        sample_rate=options.sample_rate,
+        drops=options.drops,
+        leave_out=_left_out(options) or None,
+        begin=options.begin,
+        end=options.end,
+        low_pass=options.low_pass or None,
+        config=options.config,
+        progress=shows_progress(quiet=options.quiet),
+        workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
+    )
+    verdict = recording.assess()
+    recording_files.save(recording, files, figures=figures)
     if not options.quiet:
         rows = recording_files.drop_table(recording)
         print_results(format_rows(rows[: MAX_PRINTED + 1]))

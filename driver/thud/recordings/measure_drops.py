@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from concurrent.futures import BrokenExecutor
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -17,7 +17,6 @@ from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.assumptions import with_assumptions
-from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.choice import choose, require_chosen
 from thud.recordings.drops import search_drops
 from thud.recordings.load_cells import repair_cells
@@ -34,7 +33,6 @@ from thud.recordings.same_drops import (
 from thud.recordings.tones import remove_tones
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable, Iterable, Iterator, Sequence
     from concurrent.futures import ProcessPoolExecutor
 
@@ -84,7 +82,6 @@ def measure_signals(
     *,
     progress: bool = False,
     workers: int = 1,
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
@@ -98,11 +95,7 @@ def measure_signals(
     uncertainties: list[float | None] = []
     count = 0
     # BLAS threads slow down the many small matrix products.
-    if isinstance(checkpoint, Checkpoint):
-        opened: AbstractContextManager[Checkpoint] = nullcontext(checkpoint)
-    else:
-        opened = Checkpoint(checkpoint)
-    with threadpool_limits(1, "blas"), opened as stored, _Processes(workers) as processes:
+    with threadpool_limits(1, "blas"), _Processes(workers) as processes:
         for signal in signals:
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
@@ -117,7 +110,7 @@ def measure_signals(
             count += len(search.windows)
             refuse_simultaneous_channels(search.windows, searched)
             searched.append((signal.path, search.windows))
-            measured = _measure(windows, config, stored, processes, progress=progress)
+            measured = _measure(windows, config, processes, progress=progress)
             notes = (*_section(config), *search.ignored, *left_out)
             records.append(Record(signal.name, signal.path, signal.checksum, tuple(measured)))
             uncertainties.append(signal.calibration_uncertainty)
@@ -135,31 +128,25 @@ def measure_signals(
 def _measure(
     windows: Sequence[Window],
     config: Config,
-    checkpoint: Checkpoint,
     processes: _Processes,
     *,
     progress: bool,
 ) -> list[Drop]:
-    """Return the drops in the windows of one signal, including those of the checkpoint."""
+    """Return the drops in the windows of one signal."""
     if not windows:
         return []
     signal = windows[0].signal
-    measured = checkpoint.open(signal, config)
-    remaining = [window for window in windows if window.start not in measured]
     # A signal in memory would be copied to the processes with each window.
-    if signal.path and len(remaining) >= MIN_FOR_POOL:
+    if signal.path and len(windows) >= MIN_FOR_POOL:
         processes.start()
     call = partial(measure_window, config=config)
-    results = processes.map(call, remaining) if signal.path else map(call, remaining)
-    with tqdm(
-        total=len(windows), initial=len(windows) - len(remaining), unit="drop", desc=signal.name,
-        disable=not progress, leave=False,
-    ) as bar:  # fmt: skip
-        for window, drop in zip(remaining, results, strict=True):
-            checkpoint.add(window.start, drop)
-            measured[window.start] = drop
-            bar.update()
-    return [measured[window.start] for window in windows]
+    results = processes.map(call, windows) if signal.path else map(call, windows)
+    return list(
+        tqdm(
+            results, total=len(windows), unit="drop", desc=signal.name, disable=not progress,
+            leave=False,
+        )
+    )  # fmt: skip
 
 
 def _limit_threads() -> None:

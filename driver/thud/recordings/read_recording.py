@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from thud.base._schema import LimitsSource
-    from thud.recordings.checkpoint import Checkpoint
 
 
 def read_recording(  # noqa: PLR0913 - the keys of the configuration
@@ -42,7 +41,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
     workers: int = 1,
-    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> Recording:
     """Measure recorded drops of one source, from files with one or more drops each.
 
@@ -77,10 +75,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     workers
         Number of processes that measure drops. Scripts with more than one need
         ``if __name__ == "__main__":``.
-    checkpoint
-        Directory, or `Checkpoint`, that stores measured drops while others are measured. After an
-        interrupt the same call measures the remaining drops only, if neither files nor
-        configuration have changed. The end, or that of the `Checkpoint`, removes them.
 
     Returns
     -------
@@ -122,6 +116,4 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
             sample_rate=settings.sample_rate,
         )
     )
-    return Recording.from_signals(
-        signals, settings, progress=progress, workers=workers, checkpoint=checkpoint
-    )
+    return Recording.from_signals(signals, settings, progress=progress, workers=workers)
