@@ -34,7 +34,13 @@ def write_table(path: Path, titles: str, *columns: np.ndarray) -> Path:
     return path
 
 
-def write_universal(path: Path, response: int, values: np.ndarray, **words: int) -> Path:
+def write_universal(
+    path: Path,
+    response: int,
+    values: np.ndarray,
+    system: dict[str, Any] | None = None,
+    **words: object,
+) -> Path:
     pyuff = pytest.importorskip("pyuff")
     one: dict[str, Any] = {
         "type": 58, "binary": 0, **{f"id{i}": "NONE" for i in range(1, 6)}, "func_type": 4,
@@ -43,7 +49,7 @@ def write_universal(path: Path, response: int, values: np.ndarray, **words: int)
         "ordinate_spec_data_type": response, "orddenom_spec_data_type": 13,
         "z_axis_spec_data_type": 0, "x": FREQUENCY, "data": values, **words,
     }  # fmt: skip
-    pyuff.UFF(str(path)).write_sets([one], "overwrite")
+    pyuff.UFF(str(path)).write_sets([system, one] if system else [one], "overwrite")
     return path
 
 
@@ -125,6 +131,55 @@ def test_universal_files_say_what_they_hold(tmp_path: Path, response: int, power
         thud.fit_mobility(path, quantity=other)
 
 
+# Units per m or per N of data sets 164, and labels with their size in SI units; None is refused.
+SYSTEMS = {None: (1.0, 1.0), 1: (1.0, 1.0), 7: (39.37007874, 0.224808943)}
+INCH, POUND = 0.0254, 4.4482216
+FORCES = {"NONE": 0.0, "N": 1.0, "kN": 1e3, "lbf": POUND, "V": None}
+RESPONSES: dict[int, dict[str, float | None]] = {
+    8: {"NONE": 0.0, "m": 1.0, "mm": 1e-3, "in": INCH, "m/s": None, "mil": None},
+    11: {"NONE": 0.0, "m/s": 1.0, "mm/s": 1e-3, "(in/s)": INCH, "m": None, "m/s^2": None},
+    12: {"NONE": 0.0, "m/s^2": 1.0, "mm/s**2": 1e-3, "m/s/s": 1.0, "g": 9.80665,
+         "in/s2": INCH, "m/s": None, "V": None, "dB": None},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize(
+    ("response", "above"), [(kind, label) for kind, labels in RESPONSES.items() for label in labels]
+)
+def test_units_of_universal_files_are_applied_or_refused(
+    response: int, above: str, system: int | None, tmp_path: Path
+) -> None:
+    per_metre, per_newton = SYSTEMS[system]
+    units = {
+        "type": 164, "units_code": system, "length": per_metre, "force": per_newton, "temp": 1.0,
+        "temp_offset": 0.0,
+    }  # fmt: skip
+    power = {8: -1, 11: 0, 12: 1}[response]
+    for below, force in FORCES.items():
+        length = RESPONSES[response][above]
+        labels = {"ordinate_axis_units_lab": above, "orddenom_axis_units_lab": below}
+        # Without a label the unit is that of the system.
+        scale = (length or 1 / per_metre) / (force or 1 / per_newton)
+        agree = system is None or (
+            (above in {"NONE", "g"} or (length or 0) * per_metre == pytest.approx(1, rel=1e-3))
+            and (below == "NONE" or (force or 0) * per_newton == pytest.approx(1, rel=1e-3))
+        )
+        path = write_universal(
+            tmp_path / "point.uff",
+            response,
+            MOBILITY * S**power / scale,
+            system and units,
+            **labels,
+        )
+        if length is None or force is None or not agree:
+            with pytest.raises(thud.InputError, match=r"point\.uff: .*unit"):
+                thud.fit_mobility(path, order=8)
+        else:
+            found = thud.fit_mobility(path, order=8)
+            np.testing.assert_allclose(found.measured, MOBILITY, rtol=1e-4)
+
+
 @pytest.mark.parametrize(
     ("sign", "header"),
     [
@@ -147,10 +202,11 @@ def test_sign_follows_from_directions_and_kind_of_force(
     [
         ({"func_type": 1}, naming("point.uff", 0)),
         ({"orddenom_spec_data_type": 12}, naming("point.uff", "type 11", "type 12")),
+        ({"abscissa_axis_units_lab": "rad/s"}, naming("point.uff", "frequencies", "rad/s")),
     ],
 )
 def test_other_universal_files_are_refused(
-    tmp_path: Path, header: dict[str, int], words: str
+    tmp_path: Path, header: dict[str, Any], words: str
 ) -> None:
     path = write_universal(tmp_path / "point.uff", 11, MOBILITY, **header)
     with pytest.raises(thud.InputError, match=words):

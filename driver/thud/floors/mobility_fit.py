@@ -30,7 +30,9 @@ from thud.base.extras import data_frame
 from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
-from thud.recordings.channel import guarded, library, require_small
+from thud.recordings.channel import guarded
+from thud.recordings.force_units import UNITS, find_unit
+from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,9 +46,13 @@ Quantity = Literal["mobility", "accelerance", "receptance"]
 _POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
 # Quantity by the data type of a response in universal files: displacement, velocity, acceleration.
 _RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
-_EXCITATION_FORCE = 13
-_REACTION_FORCE = 9
 _FREQUENCY_RESPONSE = 4
+# Unit of a response in a universal file, also per force; g is the standard acceleration of gravity.
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "g": 9.80665}
+_RESPONSE_UNIT = re.compile(
+    rf"(?P<length>{'|'.join(_LENGTHS)})(?P<time>/s2|/s/s|/s)?(?:/(?P<force>[A-Za-z]+))?"
+)
+_RESPONSE_UNITS = {0: "m, mm, in", 1: "m/s, mm/s, in/s", 2: "m/s2, mm/s2, in/s2, g"}
 _ALLOWED = (
     "a table with the columns frequency, Hz, real and imaginary, or magnitude and phase, degrees; "
     "or a universal file with one frequency response, data set 58"
@@ -398,28 +404,55 @@ def _words(title: str) -> list[str]:
 
 
 def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
-    """Return the frequency response of a universal file."""
+    """Return the frequency response of a universal file, in SI units."""
     with guarded(path, "universal"):
-        require_small(path, "a universal file")
-        file = library("pyuff", "universal").UFF(str(path))
-        kinds = [int(kind) for kind in file.get_set_types()]
-        sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]  # noqa: PLR2004
-    responses = [record for record in sets if record.get("func_type") == _FREQUENCY_RESPONSE]
+        responses = read_data_sets(path, _FREQUENCY_RESPONSE)
     if len(responses) != 1:
         refuse(f"{path}: holds {len(responses)} frequency responses", "one")
-    (record,) = responses
+    (data_set,) = responses
+    record = data_set.record
     response = record["ordinate_spec_data_type"]
     force = record["orddenom_spec_data_type"]
-    if response not in _RESPONSES or force not in {_EXCITATION_FORCE, _REACTION_FORCE}:
+    if response not in _RESPONSES or force not in FORCES:
         refuse(
             f"{path}: a response of data type {response} to an excitation of type {force}",
             "displacement, velocity or acceleration (8, 11, 12) in response to a force (13)",
         )
+    if data_set.label("abscissa_axis_units_lab").casefold() not in {"", "hz"}:
+        unit = data_set.label("abscissa_axis_units_lab")
+        refuse(f"{path}: the unit of the frequencies is {shown(unit)}", "Hz")
     # Opposite directions of response and excitation change the sign.
     sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
     quantity: Quantity = _RESPONSES[response]  # type: ignore[assignment]
-    return (
-        np.asarray(record["x"], dtype=float),
-        sign * np.asarray(record["data"], dtype=complex),
-        quantity,
-    )
+    values = np.asarray(record["data"], dtype=complex)
+    values *= sign * _si_units(data_set, 1 - _POWERS[quantity], path)
+    return np.asarray(record["x"], dtype=float), values, quantity
+
+
+def _si_units(data_set: DataSet, seconds: int, path: Path) -> float:
+    """Return the unit of a response per force in SI units, m s^-n/N, n = `seconds`.
+
+    The labels state it, or data set 164. Raise InputError if they do not agree, or a label is no
+    such unit.
+    """
+    above, below = (data_set.label(f"{field}_axis_units_lab") for field in ("ordinate", "orddenom"))
+    plain = re.sub(r"[\s^*().]", "", unicodedata.normalize("NFKC", above))
+    match = _RESPONSE_UNIT.fullmatch(plain)
+    power = {None: 2 if plain.startswith("g") else 0, "/s": 1, "/s2": 2, "/s/s": 2}
+    if above and (not match or power[match["time"]] != seconds):
+        refuse(f"{path}: the response has the unit {shown(above)}", _RESPONSE_UNITS[seconds])
+    length = _LENGTHS[match["length"]] if match else None
+    ratio = match["force"] if match else None
+    forces = {UNITS.get(find_unit(text), ("", 1.0)) for text in (below, ratio) if text}
+    if len(forces) > 1 or any(base != "N" for base, _ in forces):
+        refuse(f"{path}: the force has the unit {shown(below or ratio)}", "N, kN, lbf")
+    force = next((size for _, size in forces), None)
+    pairs = ((length if power[None] == 0 else None, data_set.length), (force, data_set.force))
+    for stated, system in pairs:
+        if stated and system and abs(stated / system - 1) > SAME_UNIT:
+            refuse(
+                f"{path}: a unit is {stated:.5g} in SI units by its label, {system:.5g} by data "
+                "set 164",
+                "one unit: remove the label, or data set 164",
+            )
+    return (length or data_set.length or 1.0) / (force or data_set.force or 1.0)

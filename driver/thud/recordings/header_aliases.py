@@ -6,6 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
+from thud.base.checks import refuse
 from thud.base.columns import GROUPING, MARKS, to_number
 from thud.recordings.force_units import UNITS, find_unit
 
@@ -48,7 +49,7 @@ RATE_UNITS = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "1/s": 1.0
 TIME_UNITS = {
     "": 1.0, "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "sekunden": 1.0, "ms": 1e-3,
     "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "microseconds": 1e-6,
-    "ns": 1e-9,
+    "ns": 1e-9, "nanoseconds": 1e-9,
 }  # fmt: skip
 # "Force [kN]", "Force (kN)", "Force / kN", "Force in kN", "Force_kN", "Force, kN".
 TITLE = (
@@ -111,6 +112,14 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
         return None
     value = values[decimal or "."] if len(known) > 1 else known.pop()
     return (value, match["unit"].strip(" []()")) if value is not None else None
+
+
+def time_scale(unit: str, name: str) -> float:
+    """Return a unit of time in s; raise InputError if it is none."""
+    if unit.casefold() not in TIME_UNITS:
+        allowed = ", ".join(filter(None, TIME_UNITS))
+        refuse(f"{name}: the unit of the times is {unit!r}", allowed)
+    return TIME_UNITS[unit.casefold()]
 
 
 def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, library, require_small, shown_path
-from thud.recordings.header_aliases import TIME_UNITS
+from thud.recordings.force_units import UNITS, find_unit
+from thud.recordings.header_aliases import time_scale
 from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
 
@@ -20,57 +22,113 @@ if TYPE_CHECKING:
 # Maximum size, bytes: the library keeps the text and a list of its numbers in memory.
 MAX_SIZE = 2**25
 MAX_SETS = 1024
+FUNCTION, UNIT_SYSTEM = 58, 164
 TIME_RESPONSE = 1
-FORCES = (9, 13)
 REAL = (2, 4)
-NONE = {"", "NONE"}
+# Specific data types: unknown or general, forces (reaction, excitation), and SI units of others.
+UNKNOWN = (0, 1)
+FORCES = (9, 13)
+SYMBOLS = {8: "m", 11: "m/s", 12: "m/s2"}
+# Relative difference between two statements of the same unit.
+SAME_UNIT = 1e-3
 
 
-def read_channels(path: Path) -> list[Channel]:
-    """Return the time histories of a universal file."""
+class DataSet(NamedTuple):
+    """A data set 58, and the units of the data set 164 above it, m and N; None if there is none."""
+
+    record: dict[str, Any]
+    length: float | None
+    force: float | None
+
+    def label(self, field: str) -> str:
+        """Return the text of a field, empty if it is not used."""
+        text: str = self.record[field].strip()
+        return "" if text.upper() == "NONE" else text
+
+
+def read_data_sets(path: Path, function_type: int) -> list[DataSet]:
+    """Return the data sets 58 of a function type, such as 1 for time histories."""
     require_small(path, "a universal file", MAX_SIZE)
     file = library("pyuff", "universal").UFF(os.fsencode(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     if len(kinds) > MAX_SETS:
         refuse(f"{shown_path(path)}: {len(kinds)} data sets", f"up to {MAX_SETS}")
-    sets = [file.read_sets(number) for number, kind in enumerate(kinds) if kind == 58]  # noqa: PLR2004
-    histories = [data_set for data_set in sets if _is_history(data_set)]
+    length: float | None = None
+    force: float | None = None
+    found = []
+    for number, kind in enumerate(kinds):
+        if kind not in {FUNCTION, UNIT_SYSTEM}:
+            continue
+        record = file.read_sets(number)
+        if kind == FUNCTION:
+            if record.get("func_type") == function_type:
+                found.append(DataSet(record, length, force))
+            continue
+        if not all(0 < record[name] < math.inf for name in ("length", "force")):
+            refuse(
+                f"{shown_path(path)}: data set 164 has units of length {record['length']:g} and "
+                f"force {record['force']:g}",
+                "positive numbers per m and per N",
+            )
+        length, force = 1 / record["length"], 1 / record["force"]
+    return found
+
+
+def read_channels(path: Path) -> list[Channel]:
+    """Return the time histories of a universal file."""
+    histories = [
+        data_set
+        for data_set in read_data_sets(path, TIME_RESPONSE)
+        if data_set.record.get("ord_data_type") in REAL
+    ]
     if not histories:
         refuse(f"{shown_path(path)}: has no time history", "data sets 58 of function type 1, real")
     return [_channel(path, number, data_set) for number, data_set in enumerate(histories, start=1)]
 
 
-def _is_history(data_set: dict[str, Any]) -> bool:
-    return data_set.get("func_type") == TIME_RESPONSE and data_set.get("ord_data_type") in REAL
-
-
-def _channel(path: Path, number: int, data_set: dict[str, Any]) -> Channel:
-    name = f"{shown_path(path)}: data set {number}"
-    data = np.asarray(data_set["data"], dtype=np.float64)
-    expected = int(data_set["num_pts"])
+def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
+    name, record = f"{shown_path(path)}: data set {number}", data_set.record
+    data = np.asarray(record["data"], dtype=np.float64)
+    expected = int(record["num_pts"])
     # A final line feed may add a value to binary data sets.
     if data.size < expected or expected < 1:
         refuse(f"{name}: {data.size} samples, {expected} expected", "a complete file")
-    scale = TIME_UNITS.get(data_set["abscissa_axis_units_lab"].casefold(), 1.0)
+    scale = time_scale(data_set.label("abscissa_axis_units_lab"), name)
     steps: tuple[str, ...] = ()
-    if data_set["abscissa_spacing"] == 1:
-        step = data_set["abscissa_inc"] * scale
+    if record["abscissa_spacing"] == 1:
+        step = record["abscissa_inc"] * scale
     else:
-        _, step, steps = uniform_grid(
-            np.asarray(data_set["x"], dtype=np.float64)[:expected] * scale, name
-        )
-    unit = data_set["ordinate_axis_units_lab"].strip()
-    if unit.upper() in NONE and data_set["ordinate_spec_data_type"] in FORCES:
-        unit = "N"
-        steps += ("The data set states no unit; its quantity is a force, read in N.",)
-    label = data_set["ordinate_axis_lab"].strip()
+        times = np.asarray(record["x"], dtype=np.float64)[:expected] * scale
+        _, step, steps = uniform_grid(times, name)
+    unit, newtons, note = _ordinate(data_set)
     return Channel(
-        name=data_set["id1"].strip() if label.upper() in NONE else label,
+        name=data_set.label("ordinate_axis_lab") or record["id1"].strip(),
         number=number,
         n_sample=expected,
-        samples=partial(read_array, data[:expected]),
-        unit="" if unit.upper() in NONE else unit,
+        samples=partial(read_array, data[:expected] * newtons),
+        unit=unit,
         sample_rate=1 / step if step > 0 else None,
-        date=data_set["id3"].strip() if data_set["id3"].strip().upper() not in NONE else "",
-        steps=steps,
+        date=data_set.label("id3"),
+        steps=steps + note,
     )
+
+
+def _ordinate(data_set: DataSet) -> tuple[str, float, tuple[str, ...]]:
+    """Return the unit of the samples, a factor that converts them to it, and notes.
+
+    The unit is that of the label; without a label, that of the data type in data set 164. If both
+    are stated and differ, the unit is a text that is none, so that the user must state it.
+    """
+    label, force = data_set.label("ordinate_axis_units_lab"), data_set.force
+    kind = data_set.record["ordinate_spec_data_type"]
+    if label:
+        base, size = UNITS.get(find_unit(label), ("", 1.0))
+        if base == "N" and force and kind in FORCES and abs(force / size - 1) > SAME_UNIT:
+            return f"{label} by the label, {force:.5g} N by data set 164", 1.0, ()
+        return label, 1.0, ()
+    if kind in FORCES:
+        system = f"in units of {force:.6g} N" if force else "read in N"
+        return "N", force or 1.0, (f"The data set has no label of a unit; it is a force {system}.",)
+    if kind in UNKNOWN and force in {None, 1.0}:
+        return "", 1.0, ()
+    return SYMBOLS.get(kind, "units of data set 164"), 1.0, ()
