@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import logging
 import re
 import sys
 from typing import TYPE_CHECKING
@@ -15,7 +14,6 @@ from recording_files import WRITERS, half_sine
 
 import thud
 from thud.base.errors import InputError
-from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,15 +31,6 @@ def test_recording_is_read_where_the_file_system_has_no_locks(tmp_path: Path) ->
     faults = injecting(calls="flock", action=errno.ENOLCK, at=1, **{"from": 1})
     done = python("-c", read, cwd=tmp_path, env=faults)
     assert (done.stderr, done.stdout) == ("", "1\n")
-
-
-def test_library_of_tdms_writes_no_warnings(tmp_path: Path) -> None:
-    path = tmp_path / "p.tdms"
-    WRITERS["plate.tdms"](path, half_sine(8000.0, 0.02, 0.02), 8000.0, "N")
-    open_signals(path)
-    loggers = [name for name in logging.root.manager.loggerDict if name.startswith("nptdms.")]
-    assert loggers
-    assert not any(logging.getLogger(name).isEnabledFor(logging.WARNING) for name in loggers)
 
 
 def drop_force(  # noqa: PLR0913 - each is one property of the force

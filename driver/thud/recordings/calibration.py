@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_number
-from thud.recordings.channel import shown_path
+from thud.recordings.channel import shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
     Calibration,
@@ -104,7 +104,8 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
-    name, symbol, samples, count, sample_rate, full_scale = open_source(record, channel, unit)
+    source = open_source(record, channel, unit)
+    name, symbol, samples, count, sample_rate, full_scale, unapplied = source
     if not symbol:
         refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
     level = _means(samples, count)
@@ -124,6 +125,11 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg (g = {local:g} m/s2)"
     number = len(steps.sizes)
     warnings = _step_warnings(steps, stated, interval, load)
+    if unapplied:
+        warnings.append(
+            f"the file states {unapplied}, which is not applied: the calibration is that of stored "
+            "values, for files with the same value"
+        )
     spread = 0.0
     if mass is not None and gravity is None:
         # The standard deviation of a rectangular distribution.
@@ -217,6 +223,7 @@ class Source(NamedTuple):
     n_sample: int
     sample_rate: float | None
     full_scale: float | None
+    unapplied: str = ""
 
 
 def open_source(
@@ -241,7 +248,13 @@ def open_source(
     # Integers are read as fractions of full scale.
     full_scale = 1.0 if selected.counts else None
     return Source(
-        name, symbol, selected.samples, selected.n_sample, selected.sample_rate, full_scale
+        name,
+        symbol,
+        selected.samples,
+        selected.n_sample,
+        selected.sample_rate,
+        full_scale,
+        shown_text(selected.unapplied),
     )
 
 

@@ -55,6 +55,9 @@ class Channel:
         Processing when the file was read, a sentence each.
     may_be_fractions : bool
         Whether values without a unit may be fractions of full scale, as those of float audio.
+    unapplied : str
+        Factor or offset in the file, such as ``"gain = 10"``, of which it is not known whether the
+        values were multiplied by it; empty if there is none.
     """
 
     name: str
@@ -67,6 +70,7 @@ class Channel:
     date: str = ""
     steps: tuple[str, ...] = ()
     may_be_fractions: bool = False
+    unapplied: str = ""
 
 
 def shown_text(text: object) -> str:

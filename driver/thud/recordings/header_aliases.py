@@ -60,6 +60,14 @@ NUMBER = re.compile(
     rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
     re.IGNORECASE,
 )
+# Names of factors and offsets; of factors that convert to a unit, which apply if no unit is stated.
+_FACTOR = re.compile(
+    r"(amp|amplifier|channel|data|force|raw|sensor|signal|unit|y)?"
+    r"((gain|scale|scaling|conversion|calibration|multiplication)(factor|coefficient|db)?"
+    r"|factor|multiplier|slope)s?"
+)
+_OFFSET = frozenset({"addoffset", "offset", "intercept"})
+_SENSITIVITY = _words("sensitivity calibration")
 # Full-width brackets of Japanese and Korean titles, and those of ASCII.
 _BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d", "()[]")
 # Maximum length of a title or value.
@@ -140,6 +148,29 @@ def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float |
             rate = 1 / (number[0] * TIME_UNITS[own_unit])
             return rate if math.isfinite(rate) else None
     return None
+
+
+def neutral_value(name: str, unit: str = "") -> float | None:
+    """Return the value of a factor or an offset that changes nothing; None of any other name.
+
+    >>> neutral_value("scale_factor"), neutral_value("add_offset"), neutral_value("date")
+    (1.0, 0.0, None)
+    """
+    alias = plain(split_title(name)[0])
+    if alias in _OFFSET:
+        return 0.0
+    if alias in _SENSITIVITY:
+        return None if unit else 1.0
+    return 1.0 if _FACTOR.fullmatch(alias) else None
+
+
+def find_unapplied(items: Iterable[tuple[str, object]], unit: str) -> str:
+    """Return the first factor or offset in a header that changes values; `unit` is theirs."""
+    for title, value in items:
+        neutral = neutral_value(title, unit)
+        if neutral is not None and (read_number(value) or (None, ""))[0] != neutral:
+            return f"{title[:MAX_LENGTH]} = {str(value)[:MAX_LENGTH]}"
+    return ""
 
 
 def find_word(items: Iterable[tuple[str, object]], words: frozenset[str]) -> str:

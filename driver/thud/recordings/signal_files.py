@@ -393,6 +393,15 @@ def _scaled(
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     rate, steps = _rate(channel, stated, name)
     unit, replaced = _unit(channel, stated, name)
+    if channel.unapplied:
+        unapplied = shown_text(channel.unapplied)
+        if stated.calibration is None:
+            refuse(
+                f"{name}: the file states {unapplied}, but not whether its values were multiplied "
+                "by it",
+                "calibration = N per stored value, such as 1 if the values are in N",
+            )
+        replaced += (f"{unapplied} of the file was not applied; the calibration replaces it.",)
     factor, description, uncertainty = newtons_per_unit(
         unit, stated.calibration, channel.counts, name
     )

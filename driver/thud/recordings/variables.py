@@ -1,92 +1,146 @@
-"""Channels from named arrays in memory."""
+"""Channels from named arrays, as in HDF5 and MATLAB files."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from functools import partial
 from itertools import takewhile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MIN_SAMPLES, Channel
+from thud.recordings.channel import MAX_IN_MEMORY, MIN_SAMPLES, Channel
+from thud.recordings.force_units import find_unit
 from thud.recordings.header_aliases import (
     DATE,
     TIME,
-    TIME_UNITS,
     UNIT,
     find_rate,
+    find_unapplied,
     find_word,
     is_time,
+    neutral_value,
+    plain,
+    read_number,
     split_title,
     text_of,
+    time_scale,
 )
-from thud.recordings.signal import read_array
 from thud.recordings.uniform_grid import uniform_grid
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
 # Maximum number of columns of a matrix of channels.
 MAX_COLUMNS = 256
+# Maximum number of times, and number of rows that show whether a column may hold times.
+MAX_TIMES = MAX_IN_MEMORY // 8
+SHOWN_TIMES = 4096
+# Attributes of an array by which CF (NetCDF) and NWB scale its values: factor and offset.
+CONVENTIONS = (("scalefactor", "addoffset"), ("conversion", "offset"))
+
+Header = list[tuple[str, str]]
 
 
-def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> list[Channel]:
+@dataclass(frozen=True)
+class Variable:
+    """An array of numbers of one or two dimensions: its name with its groups, shape and reader.
+
+    `read` returns the values of a column from start to before stop.
+    """
+
+    key: str
+    shape: tuple[int, ...]
+    read: Callable[[int, int, int], NDArray[np.float64]]
+
+    @property
+    def n_sample(self) -> int:
+        """Number of samples: the larger side of a matrix."""
+        return max(self.shape)
+
+    @property
+    def n_column(self) -> int:
+        """Number of columns of samples."""
+        return math.prod(self.shape) // self.n_sample
+
+    @property
+    def group(self) -> str:
+        """Its group, with a slash at the end; empty for the whole file."""
+        return self.key[: self.key.rfind("/") + 1]
+
+    @property
+    def title(self) -> str:
+        """Its name in the group."""
+        return self.key.rpartition("/")[2]
+
+
+def may_hold_channels(kind: str, shape: tuple[int, ...]) -> bool:
+    """Whether an array is a vector, or a slender matrix, of enough real numbers."""
+    return (
+        kind in "iuf"
+        and len(shape) in {1, 2}
+        and max(shape) >= MIN_SAMPLES
+        and math.prod(shape) <= MAX_COLUMNS * max(shape)
+    )
+
+
+def read_column(array: Any, column: int, start: int, stop: int) -> NDArray[np.float64]:  # noqa: ANN401
+    """Return a section of a column of an array of NumPy or of a file."""
+    if array.ndim == 1:
+        piece = array[start:stop]
+    elif array.shape[1] > array.shape[0]:
+        piece = array[column, start:stop]
+    else:
+        piece = array[start:stop, column]
+    return np.array(piece, dtype=np.float64)
+
+
+def header_entry(key: str, value: object) -> tuple[str, str]:
+    """Return a name and its value as text; of several values those of units and of factors only."""
+    title = key.rpartition("/")[2]
+    many = np.size(value) != 1 if isinstance(value, np.ndarray | list) else False
+    if many and (plain(title) in UNIT or neutral_value(title) is not None):
+        return key, ", ".join(map(str, np.ravel(np.asarray(value))[:MIN_SAMPLES])) or "nothing"
+    return key, "" if many else text_of(value)
+
+
+def channels_of_variables(variables: list[Variable], header: Header, name: str) -> list[Channel]:
     """Return the channels among variables: vectors, and the columns of slender matrices.
 
-    Scalars and texts are the header; a vector of times gives the rate of vectors of its length. A
-    group is the name up to the last slash. A header applies to its group and the groups within it,
-    times to their group.
+    The header holds scalars, texts and attributes by their names. An entry applies to its owner,
+    which is a group or an array, and to what is within it. A vector of times gives the rate of
+    vectors of its length in its group and within it.
     """
-    columns = [
-        (key, f"[{i + 1}]" * (matrix.shape[1] > 1), matrix[:, i].astype(np.float64))
-        for key, value in values.items()
-        if (matrix := _as_columns(value)) is not None
-        for i in range(matrix.shape[1])
-    ]
-    times = {key: column for key, _, column in columns if is_time(_split(key)[1])}
-    times |= {
-        key: column
-        for key, index, column in columns
-        if _split(key)[1].rpartition("_")[2].casefold() in TIME and not index and _rises(column)
-    }
-    # The first column of a matrix may hold the times of the others.
-    own_times = {key: column for key, index, column in columns if index == "[1]" and _rises(column)}
+    columns = [(variable, i) for variable in variables for i in range(variable.n_column)]
+    times = [variable for variable in variables if _holds_times(variable)]
+    own_times = [v for v in variables if v.n_column > 1 and _rises(v)]
     channels = []
-    for number, (key, index, column) in enumerate(columns, start=1):
-        if (key in times and len(columns) > 1) or (key in own_times and index == "[1]"):
+    for number, (variable, i) in enumerate(columns, start=1):
+        if (variable in times and len(columns) > 1) or (variable in own_times and i == 0):
             continue
-        group, title = _split(key)
-        header = [
-            (_split(other)[1], text_of(value))
-            for other, value in sorted(values.items(), key=lambda item: -item[0].count("/"))
-            if np.size(value) == 1 and _applies(_split(other)[0], group)
-        ]
-        named = [t for t in times if len(times[t]) == len(column) and _split(t)[0] == group]
-        # Of several times, those with the longest common begin of the name.
-        time = max(named, key=partial(_common_length, key), default=None)
-        siblings = [(_split(k)[1], text_of(v)) for k, v in values.items() if _split(k)[0] == group]
+        own, near, entries = _header_of(variable, header)
+        rate, since, steps = find_rate(near), "", tuple[str, ...]()
+        time = variable if variable in own_times else _times_of(variable, times)
         # Times override a rate in the header of an outer group.
-        rate, steps = find_rate(header if time is None else siblings), tuple[str, ...]()
-        if key in own_times:
-            _, step, steps = uniform_grid(own_times[key], f"{name}: {key}")
-            rate = 1 / step
-        elif rate is None and time is not None:
-            scale = TIME_UNITS.get(split_title(_split(time)[1])[1].casefold(), 1.0)
-            _, step, steps = uniform_grid(times[time] * scale, f"{name}: {time}")
-            rate = 1 / step
+        if time is not None and (rate is None or time is variable):
+            rate, since, steps = _rate(time, header, name)
+        unit = _unit(variable, own, entries)
+        factor, offset, applied = _scaling(own)
         channels.append(
             Channel(
-                name=key + index,
+                name=variable.key + f"[{i + 1}]" * (variable.n_column > 1),
                 number=number,
-                n_sample=len(column),
-                samples=partial(read_array, column),
-                unit=split_title(title)[1]
-                or find_word(header, UNIT)
-                or text_of(values.get(f"{group}quantity/label", np.array(""))),
-                sample_rate=rate,
-                date=find_word(header, DATE),
+                n_sample=variable.n_sample,
+                samples=partial(_read_scaled, variable.read, i, factor, offset),
+                unit=unit,
+                sample_rate=rate or find_rate(entries),
+                date=find_word(entries, DATE) or since,
                 steps=steps,
+                unapplied=find_unapplied((e for e in entries if e not in applied), unit),
             )
         )
     if not channels:
@@ -94,39 +148,112 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
     return channels
 
 
-def _applies(owner: str, group: str) -> bool:
-    """Whether the header of a group applies to another one.
+def _header_of(variable: Variable, header: Header) -> tuple[Header, Header, Header]:
+    """Return the attributes of an array, the entries of array and group, and all that apply.
 
     Siemens Testlab exports have the step in ``x_values`` and the samples in ``y_values``.
     """
-    siblings = {group, group.removesuffix("y_values/") + "x_values/"}
-    return group.startswith(owner) or (group.endswith("y_values/") and owner in siblings)
-
-
-def _common_length(name: str, other: str) -> int:
-    """Return the length of the common begin of two names."""
-    return sum(
-        1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(name, other, strict=False))
+    own_key, group = f"{variable.key}/", variable.group
+    sibling = group.removesuffix("y_values/") + "x_values/" if group.endswith("y_values/") else None
+    entries: list[tuple[int, tuple[str, str], bool, bool]] = []
+    for key, text in header:
+        owner, title = key[: key.rfind("/") + 1], key.rpartition("/")[2]
+        if own_key.startswith(owner) or owner == sibling:
+            item = (title, text)
+            entries.append((len(owner), item, owner == own_key, owner in {own_key, group}))
+        elif key == f"{group}quantity/label":
+            entries.append((len(group), ("unit", text), False, False))
+    entries.sort(key=lambda entry: -entry[0])
+    return (
+        [item for _, item, is_own, _ in entries if is_own],
+        [item for _, item, _, is_near in entries if is_near],
+        [item for _, item, _, _ in entries],
     )
 
 
-def _rises(column: NDArray[np.float64]) -> bool:
-    """Whether a column rises uniformly enough to be times."""
-    rise = np.diff(column)
-    return bool((rise > 0).all() and rise.max() < 2 * rise.min())
+def _unit(variable: Variable, own: Header, entries: Header) -> str:
+    """Return the unit of an array by its attribute, its title, or the header of its groups."""
+    stated, titled = find_word(own, UNIT), split_title(variable.title)[1]
+    if find_unit(stated) and find_unit(titled) and find_unit(stated) != find_unit(titled):
+        return f"{stated} by the attribute, {titled} by the name"
+    return stated or titled or find_word(entries, UNIT)
 
 
-def _split(key: str) -> tuple[str, str]:
-    """Return the group of a variable, with its slash, and its name in the group."""
-    group, slash, name = key.rpartition("/")
-    return group + slash, name
+def _scaling(own: Header) -> tuple[float, float, Header]:
+    """Return factor and offset by the attributes of an array, and these attributes.
+
+    Numbers that are not finite, and a factor of zero, are not applied.
+    """
+    known = {}
+    for title, text in own:
+        number, unit = read_number(text) or (math.nan, "")
+        neutral = neutral_value(title)
+        if neutral is not None and math.isfinite(number) and not unit and (number or not neutral):
+            known[plain(title)] = number, (title, text)
+    for names in CONVENTIONS:
+        # The offset of CF may stand alone.
+        if names[0] in known or (names[1] == "addoffset" and names[1] in known):
+            factor, offset = (
+                known.get(n, (d, None))[0] for n, d in zip(names, (1.0, 0.0), strict=True)
+            )
+            return factor, offset, [known[n][1] for n in names if n in known]
+    return 1.0, 0.0, []
 
 
-def _as_columns(value: NDArray[np.generic]) -> NDArray[np.generic] | None:
-    """Return the columns of a vector or a slender matrix; None for anything else."""
-    if value.dtype.kind not in "iuf" or value.ndim not in {1, 2} or value.size < MIN_SAMPLES:
-        return None
-    matrix = value.reshape(len(value), -1)
-    if matrix.shape[1] > matrix.shape[0]:
-        matrix = matrix.T
-    return matrix if matrix.shape[0] >= MIN_SAMPLES and matrix.shape[1] <= MAX_COLUMNS else None
+def _read_scaled(  # noqa: PLR0913, PLR0917 - a section of a column and its scale
+    read: Callable[[int, int, int], NDArray[np.float64]],
+    column: int,
+    factor: float,
+    offset: float,
+    start: int,
+    stop: int,
+) -> NDArray[np.float64]:
+    return read(column, start, stop) * factor + offset
+
+
+def _holds_times(variable: Variable) -> bool:
+    """Whether a vector holds times by its name, or by the end of its name and its values."""
+    if variable.n_column > 1:
+        return False
+    end = variable.title.rpartition("_")[2].casefold()
+    return is_time(variable.title) or (end in TIME and _rises(variable))
+
+
+def _rises(variable: Variable) -> bool:
+    """Whether the first column rises uniformly enough to be times."""
+    for count in (min(SHOWN_TIMES, variable.n_sample), min(MAX_TIMES, variable.n_sample)):
+        rise = np.diff(variable.read(0, 0, count))
+        if not ((rise > 0).all() and rise.max() < 2 * rise.min()):
+            return False
+    return True
+
+
+def _times_of(variable: Variable, times: list[Variable]) -> Variable | None:
+    """Return the times of an array: of the innermost group, and with the longest common begin."""
+    fitting = [
+        time
+        for time in times
+        if time.n_sample == variable.n_sample and variable.key.startswith(time.group)
+    ]
+
+    def closeness(time: Variable) -> tuple[int, int]:
+        pairs = zip(variable.key, time.key, strict=False)
+        return len(time.group), sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+
+    return max(fitting, key=closeness, default=None)
+
+
+def _rate(time: Variable, header: Header, name: str) -> tuple[float, str, tuple[str, ...]]:
+    """Return sample rate, Hz, the date of time zero if it is stated, and notes, from times."""
+    label = f"{name}: {time.key}"
+    if time.n_sample > MAX_TIMES:
+        refuse(f"{label}: {time.n_sample} times", f"up to {MAX_TIMES}, or a sample_rate")
+    own = _header_of(time, header)[0]
+    scale, since = 1.0, ""
+    factor, offset, _ = _scaling(own)
+    if time.n_column == 1:
+        unit, _, since = find_word(own, UNIT).partition(" since ")
+        scale = time_scale(unit or split_title(time.title)[1], label)
+    values = (time.read(0, 0, time.n_sample) * factor + offset) * scale
+    _, step, steps = uniform_grid(values, label)
+    return 1 / step, since, steps

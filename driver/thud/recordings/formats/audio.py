@@ -25,6 +25,8 @@ SUBTYPES = {
 }  # fmt: skip
 # Length of a chunk whose true length is in the 64-bit table of an RF64 file, or unknown.
 UNKNOWN = 0xFFFFFFFF
+# Lengths that streams begin with, by ffmpeg, SoX and arecord, as they cannot go back to their head.
+STREAMED = {UNKNOWN, 0x7FFFF000, 0x7FFFFF00}
 # Maximum number of channels, and of chunks of a file.
 MAX_CHANNELS = 1024
 MAX_CHUNKS = 10000
@@ -49,7 +51,7 @@ def read_channels(path: Path) -> list[Channel]:
     name = shown_path(path)
     with path.open("rb") as file:
         is_flac = file.read(4) == b"fLaC"
-        date = "" if is_flac else _read_chunks(file, name)
+        date, steps = ("", ()) if is_flac else _read_chunks(file, name)
     with soundfile.SoundFile(os.fsencode(path)) as file:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate = float(file.samplerate)
@@ -77,23 +79,30 @@ def read_channels(path: Path) -> list[Channel]:
             sample_rate=rate,
             counts=counts,
             date=date,
+            steps=steps,
             may_be_fractions=True,
         )
         for column in range(columns)
     ]
 
 
-def _read_chunks(file: BinaryIO, name: str) -> str:
-    """Return the date of a WAV file; raise InputError if it is cut off.
+def _read_chunks(file: BinaryIO, name: str) -> tuple[str, tuple[str, ...]]:
+    """Return the date of a WAV file, and notes; raise InputError if it is cut off.
 
     The library does not detect this.
     """
+    steps: tuple[str, ...] = ()
     size = os.fstat(file.fileno()).st_size
     lengths: dict[bytes, int] = {}
     date, missing = "", None
     for kind, begin, length in _chunks(file, lengths, size):
         if kind == b"data":
             missing = begin + length - size
+            if length in STREAMED and missing > 0:
+                missing = 0
+                steps = (
+                    "The header states no length; the samples were read to the end of the file.",
+                )
         if kind == b"ds64":
             file.seek(begin)
             lengths[b"data"] = struct.unpack("<QQ", file.read(16))[1]
@@ -108,7 +117,7 @@ def _read_chunks(file: BinaryIO, name: str) -> str:
         refuse(f"{name}: has no chunk of samples", "an undamaged WAV file")
     if missing > 0:
         refuse(f"{name}: is cut off, {missing} bytes are missing", "a complete file")
-    return date
+    return date, steps
 
 
 def _chunks(

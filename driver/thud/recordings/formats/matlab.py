@@ -1,9 +1,10 @@
-"""MATLAB files up to version 7 by SciPy; version 7.3 is HDF5."""
+"""MATLAB files of versions 4 to 7 by SciPy; version 7.3 is HDF5."""
 
 from __future__ import annotations
 
 import math
 import os
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +12,13 @@ import scipy.io
 
 from thud.base.checks import refuse
 from thud.recordings.channel import MAX_IN_MEMORY, MIB, require_small, shown_path, shown_text
-from thud.recordings.variables import channels_of_variables
+from thud.recordings.variables import (
+    Variable,
+    channels_of_variables,
+    header_entry,
+    may_hold_channels,
+    read_column,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -39,7 +46,14 @@ def read_channels(path: Path) -> list[Channel]:
     if len(variables) > MAX_VARIABLES:
         refuse(f"{name}: more than {MAX_VARIABLES} variables", "a recording")
     _require_size(sum(value.nbytes for value in variables.values()), name)
-    return channels_of_variables(variables, name)
+    arrays = [
+        Variable(key, value.shape, partial(read_column, value))
+        for key, value in variables.items()
+        if may_hold_channels(value.dtype.kind, value.shape)
+    ]
+    keys = {array.key for array in arrays}
+    header = [header_entry(key, value) for key, value in variables.items() if key not in keys]
+    return channels_of_variables(arrays, header, name)
 
 
 def _require_size(size: int, name: str) -> None:
@@ -62,5 +76,7 @@ def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray
             f"{name}: {shown_text(key)} is an array of structures, or damaged",
             "a single structure, or vectors as separate variables",
         )
+    if value.dtype == object and all(isinstance(element, str) for element in value.ravel()):
+        value = value.astype(str)  # a cell array of texts
     if value.dtype.kind in "iufU":
         yield key, value

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import logging
-import os
-import struct
 import weakref
+from contextlib import contextmanager
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel, guarded, library, shown_path
-from thud.recordings.header_aliases import DATE, UNIT, find_rate, find_word, text_of
+from thud.recordings.channel import Channel, guarded, library, shown_path, shown_text
+from thud.recordings.header_aliases import (
+    DATE,
+    UNIT,
+    find_rate,
+    find_unapplied,
+    find_word,
+    text_of,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
 
 MAX_CHANNELS = 1024
-MAX_SEGMENTS = 200_000
-# Lead-in of a segment: mark, flags, version, length of the segment, length of its metadata.
-LEAD = struct.Struct("<4sIIQQ")
 
 
 class _OpenFile:
@@ -40,36 +44,54 @@ class _OpenFile:
         """File opened by the library; it is closed with this object."""
         file = self.path.open("rb")
         weakref.finalize(self, file.close)
-        return _library().TdmsFile.open(file)
+        return library("nptdms", "TDMS").TdmsFile.open(file)
 
     def read(self, group: str, name: str, start: int, stop: int) -> NDArray[np.float64]:
         """Return the samples of a channel from start to before stop."""
-        with guarded(self.path, "TDMS"):
+        with guarded(self.path, "TDMS"), _refused_warnings(self.path):
             return np.asarray(self.tdms[group][name][start:stop], dtype=np.float64)
 
 
-def _library() -> Any:  # noqa: ANN401 - a module
-    """Return the library without its warnings; files that cause them are rejected here."""
-    nptdms = library("nptdms", "TDMS")
-    # Each module of the library has a logger with its own level.
-    nptdms.log.log_manager.set_level(logging.ERROR)
-    return nptdms
+@contextmanager
+def _refused_warnings(path: Path) -> Iterator[None]:
+    """Raise InputError for a warning of the library: what it returns is not what the file states.
+
+    It warns of scales that it does not know, whose raw values it returns, and of segments that are
+    cut off, whose remaining samples it returns.
+    """
+
+    def refuse_warning(record: logging.LogRecord) -> bool:
+        if record.levelno >= logging.WARNING:
+            refuse(
+                f"{shown_path(path)}: npTDMS cannot read it completely, and warns: "
+                f"{shown_text(record.getMessage())}",
+                "a complete file; if a scale is not supported, a table of the scaled values",
+            )
+        return True
+
+    # Each module of the library has a logger of its own.
+    loggers = list(library("nptdms", "TDMS").log.log_manager.loggers.values())
+    for logger in loggers:
+        logger.addFilter(refuse_warning)
+    try:
+        yield
+    finally:
+        for logger in loggers:
+            logger.removeFilter(refuse_warning)
 
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the numeric channels of a TDMS file."""
-    _library()
-    with path.open("rb") as raw:
-        _require_complete(raw, shown_path(path))
     file = _OpenFile(path)
-    entries = [(group, channel) for group in file.tdms.groups() for channel in group.channels()]
-    if len(entries) > MAX_CHANNELS:
-        refuse(f"{shown_path(path)}: {len(entries)} channels", f"up to {MAX_CHANNELS}")
-    return [
-        _channel(file, number, group, channel)
-        for number, (group, channel) in enumerate(entries, start=1)
-        if channel.dtype.kind in "iuf" and len(channel)
-    ]
+    with _refused_warnings(path):
+        entries = [(group, channel) for group in file.tdms.groups() for channel in group.channels()]
+        if len(entries) > MAX_CHANNELS:
+            refuse(f"{shown_path(path)}: {len(entries)} channels", f"up to {MAX_CHANNELS}")
+        return [
+            _channel(file, number, group, channel)
+            for number, (group, channel) in enumerate(entries, start=1)
+            if channel.dtype.kind in "iuf" and len(channel)
+        ]
 
 
 def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:  # noqa: ANN401
@@ -81,27 +103,14 @@ def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:
         )
     owners = [owner.properties for owner in (channel, group, file.tdms)]
     items = [(str(key), text_of(value)) for owner in owners for key, value in owner.items()]
+    unit = find_word(items, UNIT)
     return Channel(
         name=channel.name,
         number=number,
         n_sample=len(channel),
         samples=partial(file.read, group.name, channel.name),
-        unit=find_word(items, UNIT),
+        unit=unit,
         sample_rate=find_rate(items),
         date=find_word(items, DATE),
+        unapplied=find_unapplied(items, unit),
     )
-
-
-def _require_complete(file: BinaryIO, name: str) -> None:
-    """Raise InputError if a segment is cut off; the library only warns."""
-    size = os.fstat(file.fileno()).st_size
-    begin = 0
-    for _ in range(MAX_SEGMENTS):
-        file.seek(begin)
-        lead = file.read(LEAD.size)
-        if not lead:
-            return
-        if len(lead) < LEAD.size or begin + LEAD.size + LEAD.unpack(lead)[3] > size:
-            refuse(f"{name}: is cut off in the segment at byte {begin}", "a complete file")
-        begin += LEAD.size + LEAD.unpack(lead)[3]
-    refuse(f"{name}: more than {MAX_SEGMENTS} segments", "a recording")
