@@ -18,6 +18,7 @@ import thud
 from thud.cli import main
 from thud.export import floor_sound
 from thud.export.sound_levels import get_deviation
+from thud.export.wav import wav_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -309,3 +310,10 @@ def test_command_writes_a_file_and_says_what_it_is(
     construction = ["listen", "--construction", "no such floor", "-o", target]
     assert main(construction) == 1
     assert re.search(naming("no such floor"), capsys.readouterr().err.partition(": ")[2])
+
+
+def test_samples_next_to_full_scale_keep_their_sign() -> None:
+    samples = np.array([1.0, 0.99999999, 1 - 2.0**-24, 1 - 2.0**-23, -1.0, -0.99999999])
+    content = wav_file(samples, RATE, "comment", "thud")
+    read, _ = soundfile.read(io.BytesIO(content))
+    np.testing.assert_allclose(read, samples, rtol=0, atol=2.0**-23)
