@@ -267,6 +267,24 @@ def test_scales_of_tdms_are_applied_or_refused_by_name(
     assert not any(logger.filters for logger in loggers if logger.name.startswith("nptdms"))
 
 
+@pytest.mark.parametrize("order", ["little", "big"])
+def test_tdms_that_is_cut_off_anywhere_is_refused(order: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.tdms"
+    properties = {"wf_increment": 1 / RATE, "unit_string": "N"}
+    if order == "big":
+        path.write_bytes(2 * big_endian_tdms())
+    else:
+        with nptdms.TdmsWriter(path) as file:
+            for part in np.array_split(FORCE, 2):
+                file.write_segment([nptdms.ChannelObject("plate", "force", part, properties)])
+    data = path.read_bytes()
+    boundary = data.rindex(b"TDSm")
+    for cut in {*range(5, len(data), 97), *range(boundary + 1, boundary + 40)}:
+        path.write_bytes(data[:cut])
+        with pytest.raises(InputError, match=r"a\.tdms: "):
+            open_signals(path)
+
+
 def big_endian_tdms() -> bytes:
     """Return a TDMS file of one channel in newtons whose numbers are big-endian."""
 
@@ -307,6 +325,15 @@ def packed_times(path: Path) -> None:
         file["force"], file["time"] = FORCE, np.arange(FORCE.size)
         file["force"].attrs["units"] = "N"
         file["time"].attrs["units"], file["time"].attrs["scale_factor"] = "seconds", 1 / RATE
+
+
+def test_times_with_a_factor_give_no_rate(tmp_path: Path) -> None:
+    packed_times(tmp_path / "a.nc")
+    with h5py.File(tmp_path / "a.nc", "r+") as file:
+        file["time"].attrs["gain"] = 2.0
+    with pytest.raises(InputError, match=naming("sample rate", "sample_rate")):
+        open_signals(tmp_path / "a.nc")
+    np.testing.assert_allclose(read(tmp_path / "a.nc", sample_rate=RATE), FORCE)
 
 
 def nanoseconds(path: Path) -> None:

@@ -243,15 +243,20 @@ def _times_of(variable: Variable, times: list[Variable]) -> Variable | None:
     return max(fitting, key=closeness, default=None)
 
 
-def _rate(time: Variable, header: Header, name: str) -> tuple[float, str, tuple[str, ...]]:
-    """Return sample rate, Hz, the date of time zero if it is stated, and notes, from times."""
+def _rate(time: Variable, header: Header, name: str) -> tuple[float | None, str, tuple[str, ...]]:
+    """Return sample rate, Hz, the date of time zero if it is stated, and notes, from times.
+
+    The rate is None if it is not known whether the times were multiplied by a factor.
+    """
     label = f"{name}: {time.key}"
     if time.n_sample > MAX_TIMES:
         refuse(f"{label}: {time.n_sample} times", f"up to {MAX_TIMES}, or a sample_rate")
     own = _header_of(time, header)[0]
     scale, since = 1.0, ""
-    factor, offset, _ = _scaling(own)
+    factor, offset, applied = _scaling(own)
     if time.n_column == 1:
+        if find_unapplied((entry for entry in own if entry not in applied), "s"):
+            return None, "", ()
         unit, _, since = find_word(own, UNIT).partition(" since ")
         scale = time_scale(unit or split_title(time.title)[1], label)
     values = (time.read(0, 0, time.n_sample) * factor + offset) * scale

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
+import os
 import weakref
 from contextlib import contextmanager
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 MAX_CHANNELS = 1024
+# Bytes before the metadata of a segment, and the bit of its fifth byte that means big-endian.
+LEAD = 28
+BIG_ENDIAN = 64
 
 
 class _OpenFile:
@@ -87,11 +91,24 @@ def read_channels(path: Path) -> list[Channel]:
         entries = [(group, channel) for group in file.tdms.groups() for channel in group.channels()]
         if len(entries) > MAX_CHANNELS:
             refuse(f"{shown_path(path)}: {len(entries)} channels", f"up to {MAX_CHANNELS}")
-        return [
+        channels = [
             _channel(file, number, group, channel)
             for number, (group, channel) in enumerate(entries, start=1)
             if channel.dtype.kind in "iuf" and len(channel)
         ]
+    if _is_cut_in_lead(path) or not channels:
+        refuse(f"{shown_path(path)}: is cut off or has no channel of numbers", "a complete file")
+    return channels
+
+
+def _is_cut_in_lead(path: Path) -> bool:
+    """Whether a file ends within the lead of a segment, of which the library does not warn."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        while len(lead := file.read(LEAD)) == LEAD:
+            order: Literal["big", "little"] = "big" if lead[4] & BIG_ENDIAN else "little"
+            file.seek(min(int.from_bytes(lead[12:20], order), size), os.SEEK_CUR)
+    return bool(lead)
 
 
 def _channel(file: _OpenFile, number: int, group: Any, channel: Any) -> Channel:  # noqa: ANN401
