@@ -58,8 +58,8 @@ RATE_UNITS, TIME_UNITS = (
 # "Force [kN]", "Force (kN) 1"; "Force / kN", "Force, kN"; "Force in kN", "Force_kN", "Force kN".
 BRACKETS = re.compile(r"\[([^][]{0,30})\]|\{([^{}]{0,30})\}|\(((?:[^()]|\([^()]*\)){0,30})\)")
 LOOSE = re.compile(r"(?P<name>.*?\S)(?P<mark>\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s,_]{1,12})\s*")
-# Words that are units only after a mark.
-_AMBIGUOUS = {"g", "h", "min", "K", "rad"}
+# Words that are no units after a blank, or after an underscore.
+_AMBIGUOUS = {"": {"g", "h", "min", "K", "rad"}, "_": {"h", "K"}}
 NUMBER = re.compile(
     rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
     re.IGNORECASE,
@@ -90,7 +90,8 @@ def split_title(title: str) -> tuple[str, str]:
     text = title.strip().strip("\"'").strip()[:MAX_LENGTH].translate(_BRACKETS)
     loose = LOOSE.fullmatch(text)
     if loose and (unit := find_unit(loose["unit"])):
-        if unit not in _AMBIGUOUS or loose["mark"].strip() in {"/", ",", "in"}:
+        mark = loose["mark"].strip()
+        if unit not in _AMBIGUOUS.get(mark[:1], ()) or plain(loose["name"]) in TIME:
             return loose["name"].strip(), loose["unit"]
     groups = [(match, "".join(filter(None, match.groups()))) for match in BRACKETS.finditer(text)]
     for match, unit in groups:

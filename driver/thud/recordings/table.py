@@ -249,8 +249,10 @@ def time_and_force(table: Table) -> NDArray[np.float64]:
 def _is_known(word: str, is_known: Callable[[str], bool] | None) -> bool:
     """Whether a word of a header is known, or its unit."""
     name, unit = split_title(word)
-    known = plain(name) in WORDS or bool(find_unit(unit or name))
-    return known or (is_known is not None and is_known(word))
+    if unit and not unit.isascii():
+        return bool(find_unit(unit))
+    known = plain(name) in WORDS or bool(find_unit(name))
+    return known or (is_known is not None and is_known(name))
 
 
 def _lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
@@ -360,11 +362,14 @@ def _require_separators(layout: _Layout) -> None:
 
 def _require_rows(above: list[str], layout: _Layout) -> None:
     """Raise InputError if a line above the numbers looks like an unreadable row."""
+    last = max((number for number, line in enumerate(above, 1) if line.strip()), default=0)
     for number, line in enumerate(above, 1):
         cells = layout.cells(line)
         if line.lstrip()[:1] in COMMENTS or len(cells) != layout.width or not cells[0]:
             continue
         is_row = not any(map(str.isalpha, cells[0])) and any(map(is_number, cells))
+        # A word may stand in front of the numbers of the first row.
+        is_row |= number == last and all(is_number(cells[i]) for i in layout.used)
         if is_row or is_number(cells[0]):
             wrong = next(cell for cell in cells if not is_number(cell))
             text = f"{layout.name}: line {number}: {shown_text(wrong)!r} is not a number"
@@ -392,11 +397,13 @@ def _read_header(above: list[str], layout: _Layout) -> None:
     )
     others += [(number, "\t".join(cells)) for number, cells in titles if cells is not chosen[1]]
     last = lines[-1][0] if lines else 0
-    _sort_others(sorted(others), last, layout, has_titles=bool(chosen[1] or units or numbered))
+    _sort_others(sorted(others), last, layout, has_titles=bool(chosen[1] or numbered))
     layout.width = max([layout.width, *map(len, (chosen[1], *units))])
     layout.names = [""] * layout.width
     stated: list[list[str]] = [[] for _ in range(layout.width)]
     for i, cell in [*enumerate(chosen[1]), *numbered.items()]:
+        if i >= layout.width and plain(cell) in REMARK:
+            continue
         if i >= layout.width:
             refuse(f"{layout.name}: a title for column {i + 1} of {layout.width}", ONE_TITLE)
         layout.names[i], unit = split_title(cell)
@@ -453,13 +460,16 @@ def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
     if layout.width == 1:
         is_value = re.search(r"[:=]|[\t;]\s*\S", text) or is_number(text)
         return [] if is_value else [text.rstrip(";\t ").strip('"')]
-    for variant in (line, text, *(part.partition("#")[0].rstrip() for part in (line, text))):
+    # A separator in front of the titles is no comment.
+    starts = (line, text) if line[:1] == layout.separator else (text,)
+    for variant in (*starts, *(part.partition("#")[0].rstrip() for part in starts)):
         for cells in _splits(variant, layout.separator):
-            extra = cells[layout.width :]
-            is_title = len(cells) <= layout.full_width or all(plain(c) in REMARK for c in extra)
+            filled = _trimmed(cells)
+            extra = filled[layout.width :]
+            is_title = len(filled) <= layout.full_width or all(plain(c) in REMARK for c in extra)
             has_number = any(is_number(cell) or is_date(cell) for cell in cells)
-            if len(cells) >= layout.width and is_title and not has_number:
-                return cells
+            if len(cells) >= layout.width and is_title and filled and not has_number:
+                return cells[: max(layout.width, len(filled))]
     return []
 
 
@@ -467,21 +477,25 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
     """Yield the cells of a line by its separator, and by others."""
     for mark in dict.fromkeys((separator, "\t", ";", ",")):
         if mark and mark in text:
-            yield _trimmed(split_line(text, mark))
-    if not any(mark in text for mark in "\t;"):
-        yield re.split(r" {2,}|\t", text)
+            cells = split_line(text, mark)
+            # "Time, s   Force, N" is split by blanks.
+            if mark in {separator, "\t", ";"} or not any(map(find_unit, cells)) or _are_units(cells):
+                yield cells
+    if not any(mark in text for mark in '\t;"'):
+        yield re.split(r" {2,}", text)
+    if not any(mark in text for mark in '\t;,"'):
+        # "Force [N]" and "Force / N" are one title.
         joined = BRACKETS.sub(lambda match: match[0].replace(" ", "\0"), text)
-        words = re.sub(r"\s+(?=[\[({])|\s+(/)\s+", "\0\\1\0", joined).split()
-        yield [word.replace("\0", " ").replace("  ", " ").strip() for word in words]
-        yield text.split()
+        words = re.sub(r"(?<=[^\])}\s])\s+(?=[\[({])|\s+(/)\s+", "\0\\1\0", joined).split()
+        yield [" ".join(word.split("\0")) for word in words]
 
 
 def _are_units(cells: list[str]) -> bool:
     """Whether most cells of a line are units without a name."""
-    filled = [split_title(cell) for cell in cells if cell]
+    filled = [split_title(cell) for cell in cells if any(map(str.isalpha, cell))]
     known = sum(bool(find_unit(unit or name)) for name, unit in filled)
-    return (not any(name and unit for name, unit in filled)) and (
-        2 * known > len(filled) or all(unit for _, unit in filled)
+    return not any(name and unit for name, unit in filled) and (
+        2 * known > len(filled) or (bool(filled) and all(unit for _, unit in filled))
     )
 
 
@@ -502,11 +516,15 @@ def _sort_others(
             is_number(_value(piece)[0]) for piece in pieces
         )
         cells = next(_splits(text, layout.separator), [text])
-        is_title = number == last and not has_titles and (
-            any(map(is_time, (*cells, *text.split())))
-            or (line[:1] not in COMMENTS and (layout.separator or "\n") in text and ":" not in text)
+        is_title = not has_titles and (
+            (len(cells) > 1 or number == last) and any(map(is_time, cells))
+            or number == last
+            and line[:1] not in COMMENTS
+            and (layout.separator or "\n") in text
+            and ":" not in text
         )
-        if (is_title or any(map(_states_unit, pieces))) and not has_number:
+        is_unit = _are_units(cells) or any(map(_states_unit, pieces))
+        if (is_title or is_unit) and not has_number:
             count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
             reason = count if len(cells) != layout.width else "is a second line of titles"
             refuse(f"{layout.name}: line {number}: {shown_text(text)!r}: {reason}", ONE_TITLE)
