@@ -13,6 +13,7 @@ from conftest import naming
 
 import thud
 from thud.base.units import UNITS, find_unit
+from thud.recordings.date_times import seconds_of_day
 from thud.recordings.signal_files import open_signals
 from thud.recordings.table import read_table, time_and_force
 
@@ -184,3 +185,102 @@ def test_random_layouts_are_read_right_or_refused(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_ten_thousand_layouts_are_read_right_or_refused(tmp_path: Path) -> None:
     check_layouts(tmp_path / "plate.csv", 10_000, 1000)
+
+
+# Ordinary layouts of loggers and spreadsheets: lines above the numbers, and a row of
+# time, forces, N, and an acceleration; {t} in s, {m} in ms, {a} and {b} forces in the unit.
+LAYOUTS = [
+    ("lbf", "Time [s] Force [lbf]", "{t} {a}"),
+    ("lbf", "# Time [s]   Force [lbf]", "{t} {a}"),
+    ("lbf", "# Time [s]   Force [lbf]", "{t},{a}"),
+    ("lbf", "Time [s]\tForce [lbf]", "{t}   {a}"),
+    ("lbf", "Time [s];Force [lbf];", "{t};{a}"),
+    ("lbf", "Time [s],Force [lbf]", "{t},{a},"),
+    ("lbf", "Time [s],Force [lbf],", "{t},{a},"),
+    ("lbf", "Time [s];Force [lbf]\nlab 4\nhall B\ngate 7\nMiller", "{t};{a}"),
+    ("lbf", "Column 1: Time [s]\nColumn 2: Force [lbf]", "{t}\t{a}"),
+    ("kN", ";F1 [kN];F2 [kN];a [m/s2]", "{t};{a};{b};0.010"),
+    ("kN", "s;kN;kN;m/s2\nTime;F1;F2;a", "{t};{a};{b};0.010"),
+    ("kN", "Time;F1;F2;a\n[ms];[kN];[kN];[g]", "{m};{a};{b};0.010"),
+    ("kN", "Time;F1;F2;a\n\ns;kN;kN;m/s^2\n", "{t};{a};{b};0.010"),
+    ("kN", "Y_Unit_Label\tkN\tkN\tm/s^2\n***End_of_Header***\nX_Value\tF1\tF2\ta\tComment",
+     "{t}\t{a}\t{b}\t0.010"),
+    ("kN", "Units: s, kN, kN, V\nTime,F1,F2,Trigger", "{t},{a},{b},0.5"),
+    ("kN", "Unit;kN\nTime;F1;F2", "{t};{a};{b}"),
+    ("kN", "Time (ms)\tState\tF1 (kN)\tF2 (kN)", "{m}\tok\t{a}\t{b}"),
+    ("N", "t/s,F1/N,F2/N", "{t},{a},{b}"),
+    ("N", "F2 in N,F1 in N,Time in ms", "{b},{a},{m}"),
+    ("N", "\tTime [s]\tF1 (raw) [N]\tF2 [N] right", "\t{t}\t{a}\t{b}"),
+    ("N", "Time [s];Force [Newton]", "{t};{d}"),
+    ("daN", "\ufeffTime_ms;Force_daN;Remark", "{m};{a};"),
+    ("kgf", "Time, s;Force, kgf", "{t} s;{a} kgf"),
+    ("mV", "Time [s]\tForce [mV]", "{t}\t{a}"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "head", "row"), LAYOUTS)
+def test_ordinary_layouts_are_read_with_their_units(
+    unit: str, head: str, row: str, tmp_path: Path
+) -> None:
+    base, size = UNITS[unit]
+    size *= SENSITIVITY if base == "V" else 1.0
+    lines = [
+        row.format(t=f"{i / RATE:.6f}", m=f"{1e3 * i / RATE:.3f}", a=f"{force / size:.9f}",
+                   b=f"{force / size / 2:.9f}", d=f"{force:.8E}".replace("E", "D"))
+        for i, force in enumerate(PULSE)
+    ]  # fmt: skip
+    path = tmp_path / "plate.csv"
+    path.write_text("\n".join([head, *lines, ""]), encoding="utf-8")
+    stated = {"calibration": f"{SENSITIVITY} N/V"} if base == "V" else {}
+    sums = {"channels": "sum"} if "F2" in head else {}
+    (signal,) = open_signals(path, **stated, **sums)
+    force = signal.read(0, signal.n_sample)
+    np.testing.assert_allclose(force, PULSE * (1.5 if sums else 1.0), atol=1e-4)
+    assert signal.sample_rate == pytest.approx(RATE, rel=1e-5)
+    if "F2" not in head and base != "V":  # a record of time and force in s and N
+        record = time_and_force(read_table(path))
+        np.testing.assert_allclose(record[:, 1], PULSE, atol=1e-4)
+        np.testing.assert_allclose(record[:, 0], np.arange(ROWS) / RATE, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "words"),
+    [
+        ("Time [s];F1 [N];F2 [N]", "{t};{f}", naming("line 1", "3 titles", "2 columns")),
+        ("Time;F1", "{t};{f};{f}", naming("line 1", "2 titles", "3 columns")),
+        ("# Force [lbf]", "{t};{f}", naming("line 1", "1 title", "2 columns")),
+        ("# force in lbf", "{t} {f}", naming("line 1", "2 columns")),
+        ("Time [s];Force [stone]", "{t};{f}", naming("'stone'", "kN")),
+        ("Time [min^2];Force [N]", "{t};{f}", naming("column 1, 'Time'", "'min^2'", "ms")),
+        ("Time;Force [kN]\ns;N", "{t};{f}", naming("column 2", "kN", "N")),
+        ("Time;Force [kN]", "{t};{f} N", naming("column 2", "kN", "N")),
+        ("Unit: kN\nTime;Force [N]", "{t};{f}", naming("column 2", "kN", "N")),
+        ("Y_Unit_Label;N;N;m/s2\nTime;F1;F2", "{t};{f};{f}", naming("column 1, 'Time'", "'N'")),
+        ("Column 3: Force [lbf]", "{t};{f}", naming("column 3", 2)),
+        ("Time [s];Force [lbf]\nTime [s];Force [N]", "{t};{f}", naming("line 1", "second line")),
+    ],
+)
+def test_units_and_titles_that_do_not_fit_are_refused(
+    head: str, row: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    rows = [row.format(t=f"{i / RATE:.6f}", f=f"{force:.2f}") for i, force in enumerate(PULSE)]
+    path.write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    with pytest.raises(thud.InputError, match=words):
+        open_signals(path)
+    with pytest.raises(thud.InputError):
+        time_and_force(read_table(path))
+
+
+@pytest.mark.parametrize(("text", "time"), [("15:30,00", 930.0), ("15:30", 55_800.0)])
+def test_fractions_of_seconds_show_minutes(text: str, time: float) -> None:
+    assert seconds_of_day(text) == time
+
+
+@pytest.mark.parametrize("decimals", [4, 5])
+def test_exact_clock_shows_its_rate(decimals: int, tmp_path: Path) -> None:
+    path = tmp_path / "plate.csv"
+    rows = [f"10:00:{i / 1e4:0{decimals + 3}.{decimals}f};{force:.3f}" for i, force in enumerate(PULSE)]
+    path.write_text("\n".join(["Clock;Force [N]", *rows]), encoding="utf-8")
+    (signal,) = open_signals(path)
+    assert signal.sample_rate == pytest.approx(1e4, rel=1e-9)

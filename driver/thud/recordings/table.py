@@ -476,7 +476,7 @@ def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
 def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
     """Yield the cells of a line by its separator, and by others."""
     for mark in dict.fromkeys((separator, "\t", ";", ",")):
-        if mark and mark in text:
+        if mark and mark in text and not (mark == "," and re.search("[\t;]", text)):
             cells = split_line(text, mark)
             # "Time, s   Force, N" is split by blanks.
             if mark in {separator, "\t", ";"} or not any(map(find_unit, cells)) or _are_units(cells):
