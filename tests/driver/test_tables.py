@@ -20,6 +20,9 @@ from thud.recordings.table import read_table, time_and_force
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from thud.recordings.signal import Signal
+    from thud.recordings.table import Table
+
 RATE = 8000.0
 ROWS = 40
 PULSE = 1500 * np.sin(np.pi * np.arange(ROWS) / ROWS) ** 2
@@ -41,30 +44,29 @@ class Written:
     values: np.ndarray = field(default_factory=lambda: np.empty(0))
 
 
-def numbers(
-    chance: random.Random, kind: str, name: str, unit: str, values: np.ndarray, decimal: str
-) -> Written:
+def numbers(chance: random.Random, name: str, unit: str, values: np.ndarray) -> Written:
     """Return a column of numbers in a drawn notation."""
     base, size = UNITS[find_unit(unit)]
+    kind = "time" if base == "s" else "force" if name[0] == "F" else "other"
     scale = SENSITIVITY if kind == "force" and base == "V" else 1.0
     form = "{:.9f}" if kind == "time" else chance.choice(["{:.4f}", "{:.6e}", "{:.6E}", "{:.5f}"])
     cells = [form.format(value / scale / size) for value in values]
     exact = np.array(list(map(float, cells)))
     if "E" in form and chance.random() < 0.5:
         cells = [cell.replace("E", "D") for cell in cells]
-    return Written(kind, name, unit, [cell.replace(".", decimal) for cell in cells], exact)
+    return Written(kind, name, unit, cells, exact)
 
 
 def draw_columns(chance: random.Random, decimal: str, place: str) -> list[Written]:
     """Return the columns of a table in a drawn order."""
     force_unit = chance.choice(FORCE_UNITS)
     columns = [
-        numbers(chance, "force", f"F{i + 1}", force_unit, PULSE / (i + 1), decimal)
+        numbers(chance, f"F{i + 1}", force_unit, PULSE / (i + 1))
         for i in range(chance.choice([1, 1, 2, 3]))
     ]
     if chance.random() < 0.4 and place != "header":
         other = chance.choice(OTHER_UNITS)
-        columns.append(numbers(chance, "other", "Acc", other, np.cos(np.arange(ROWS)), decimal))
+        columns.append(numbers(chance, "Acc", other, np.cos(np.arange(ROWS))))
     if chance.random() < 0.4:
         words = chance.choice([["ok"] * ROWS, ["start"] + [""] * (ROWS - 1), [""] * ROWS])
         columns.append(Written("words", chance.choice(["Comment", "State", "Remark"]), "", words))
@@ -72,11 +74,12 @@ def draw_columns(chance: random.Random, decimal: str, place: str) -> list[Writte
         columns.append(Written("empty", chance.choice(["", "", "x"]), "", [""] * ROWS))
     if chance.random() < 0.3:
         chance.shuffle(columns)
-    times = np.arange(ROWS) / RATE
     # The header states the units of the other columns only.
     unit = "s" if place in {"header", "lvm", "none"} else chance.choice(TIME_UNITS)
-    time = numbers(chance, "time", chance.choice(["Time", "t", "Zeit"]), unit, times, decimal)
+    time = numbers(chance, chance.choice(["Time", "t", "Zeit"]), unit, np.arange(ROWS) / RATE)
     columns.insert(0 if chance.random() < 0.8 else chance.randrange(len(columns) + 1), time)
+    for column in columns:
+        column.cells = [cell.replace(".", decimal) for cell in column.cells]
     return columns
 
 
@@ -97,8 +100,8 @@ def draw_table(chance: random.Random) -> tuple[str, list[Written], bool]:
     style = chance.choice([" [{}]", " ({})", " / {}", "[{}]", " in {}", "_{}", ", {}"])
     comment = chance.choice(["", "", "", "# ", "% ", "#", "// "])
     titles = [title(c, style) if place == "title" else c.name for c in columns]
-    if "," in style and over.strip() in {",", ""}:
-        titles = [f'"{text}"' for text in titles] if over == separator == "," else titles
+    if "," in style and over == separator == ",":
+        titles = [f'"{text}"' for text in titles]
     units = [chance.choice(["{}", "{}", "[{}]"]).format(c.unit) if c.unit else "" for c in columns]
     lines = [comment + over.join(titles)]
     channels = [c.unit for c in columns if c.kind in {"force", "other"}]
@@ -120,6 +123,11 @@ def draw_table(chance: random.Random) -> tuple[str, list[Written], bool]:
              "Serial number;4711", "Range (kN): 20", "Messung vom 3. Mai", "---"]  # fmt: skip
     for _ in range(chance.choice([0, 0, 1, 2, 5])):
         lines.insert(chance.choice([0, 0, 0, len(lines)]), chance.choice(prose))
+    return "\n".join([*lines, *draw_rows(chance, columns, separator), ""]), columns, place != "none"
+
+
+def draw_rows(chance: random.Random, columns: list[Written], separator: str) -> list[str]:
+    """Return the rows of a table with drawn quotes, ends of lines and comments."""
     end = chance.choice(["", "", "", separator])
     rows = []
     for row in zip(*(column.cells for column in columns), strict=True):
@@ -128,7 +136,7 @@ def draw_table(chance: random.Random) -> tuple[str, list[Written], bool]:
         rows.append((text.rstrip(separator) if chance.random() < 0.5 and not end else text) + end)
     if chance.random() < 0.1:
         rows[chance.randrange(ROWS)] += "  # touch"
-    return "\n".join([*lines, *rows, ""]), columns, place != "none"
+    return rows
 
 
 def outcome(path: Path, chance: random.Random) -> str:
@@ -144,17 +152,30 @@ def outcome(path: Path, chance: random.Random) -> str:
         signals = open_signals(path, channel="F1" if stated else None, **stated)
     except thud.InputError:
         return "refused"
+    return (
+        _wrong_column(table, columns, has_units)
+        or _wrong_force(signals, columns, has_units)
+        or "read"
+    )
+
+
+def _wrong_column(table: Table, columns: list[Written], has_units: object) -> str:
+    """Return what is wrong with the columns of a table, or nothing."""
     written = {i: c for i, c in enumerate(columns, 1) if c.values.size}
     if {c.number for c in table.columns} != set(written):
         return f"columns {[str(c) for c in table.columns]}"
     for column in table.columns:
         exact = written[column.number]
+        is_unstated = not column.unit and (not has_units or exact.unit == "s")
         if not np.array_equal(column.values, exact.values):
             return f"values of {column}"
-        if column.unit and find_unit(column.unit) != find_unit(exact.unit):
+        if not is_unstated and find_unit(column.unit) != find_unit(exact.unit):
             return f"unit of {column}: {column.unit}"
-        if has_units and not column.unit and not (exact.kind == "time" and exact.unit == "s"):
-            return f"no unit of {column}"
+    return ""
+
+
+def _wrong_force(signals: list[Signal], columns: list[Written], has_units: object) -> str:
+    """Return what is wrong with the forces of a recording, or nothing."""
     for signal in signals:
         name = signal.name.rpartition(", ")[2] if ", " in signal.name else "F1"
         (exact,) = [c for c in columns if c.name == name] or [columns[0]]
@@ -165,13 +186,13 @@ def outcome(path: Path, chance: random.Random) -> str:
             return f"force of {signal.name}"
         if abs(signal.sample_rate / RATE - 1) > 1e-4 and has_units:
             return f"rate {signal.sample_rate:g}"
-    return "read"
+    return ""
 
 
 def check_layouts(path: Path, count: int, first: int) -> None:
     words: Counter[str] = Counter()
     for seed in range(first, first + count):
-        chance = random.Random(seed)
+        chance = random.Random(seed)  # noqa: S311 - layouts are no secrets
         word = outcome(path, chance)
         assert word in {"read", "refused"}, (seed, word, path.read_bytes()[:600])
         words[word] += 1
@@ -280,7 +301,9 @@ def test_fractions_of_seconds_show_minutes(text: str, time: float) -> None:
 @pytest.mark.parametrize("decimals", [4, 5])
 def test_exact_clock_shows_its_rate(decimals: int, tmp_path: Path) -> None:
     path = tmp_path / "plate.csv"
-    rows = [f"10:00:{i / 1e4:0{decimals + 3}.{decimals}f};{force:.3f}" for i, force in enumerate(PULSE)]
+    rows = [
+        f"10:00:{i / 1e4:0{decimals + 3}.{decimals}f};{force:.3f}" for i, force in enumerate(PULSE)
+    ]
     path.write_text("\n".join(["Clock;Force [N]", *rows]), encoding="utf-8")
     (signal,) = open_signals(path)
     assert signal.sample_rate == pytest.approx(1e4, rel=1e-9)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import UNITS, find_unit, scaled
 from thud.case.case import default_model

@@ -55,16 +55,14 @@ WORDS = {
 }
 TITLES = {word: kind for kind, words in WORDS.items() for word in words.split()}
 ALLOWED = (
-    "a header row with the titles frequency (Hz), P1, P2 and so on for levels of positions (dB, not "
-    "weighted) or mean for their mean, and, if known, background (dB) and reverberation_time (s)"
+    "a header row with the titles frequency (Hz), P1, P2 and so on for levels of positions (dB, "
+    "not weighted) or mean for their mean, and, if known, background (dB), reverberation_time (s)"
 )
 LEVELS = {"position", "mean"}
 # Units of the other kinds of columns; that of levels is dB.
 UNITS = {"frequency": "Hz", "time": "s"}
 # Maximum plausible difference between levels of two positions, dB, mean over the bands.
 MAX_DIFFERENCE = 15.0
-# Difference above which a column has no levels of a position, dB.
-MAX_OUTLIER = 40.0
 # Plausible levels, dB, and times, s.
 LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
 
@@ -161,10 +159,7 @@ class RoomLevels(Displayed):
             )
         difference = float(np.ptp(self.positions.mean(axis=1)))
         if difference > MAX_DIFFERENCE:
-            result.append(
-                f"the levels of two positions differ by {difference:.0f} dB on average: check that "
-                "every column without a known title has the levels of a position"
-            )
+            result.append(f"the levels of two positions differ by {difference:.0f} dB on average")
         if self.background is None:
             result.append("the background is not known: levels are not corrected for it")
         elif self.is_upper_bound.any():
@@ -244,9 +239,9 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     path
         Columns with a header row, as text or in the first sheet of a workbook (.xlsx) that has
         numbers: ``frequency``, Hz; ``background``, dB, and ``reverberation_time``, s, if known;
-        every other column holds the levels of a position, dB. Titles may be German, Korean or
-        Japanese, in UTF-8, or in the encodings of spreadsheets in these languages. There is
-        a row for each rated band, and optionally for other bands.
+        ``P1``, ``P2`` and so on for levels of positions, dB, or ``mean`` for their mean. Titles may
+        be German, Korean or Japanese, in UTF-8, or in the encodings of spreadsheets in these
+        languages. There is a row for each rated band, and optionally for other bands.
     volume
         Volume of the room, m3.
 
@@ -292,17 +287,6 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
                 f"{path}: {quantity} = {wrong[0]:g} {unit} is not allowed",
                 f"{low:g} to {high:g} {unit}",
             )
-    # Of two columns the lower one is an outlier: neither times nor a background are louder.
-    means = levels.mean(axis=1)
-    differences = abs(means - np.median(means)) * (2 if len(means) == 2 else 1)  # noqa: PLR2004
-    outlier = max(range(len(means)), key=lambda i: (differences[i], -means[i]))
-    if differences[outlier] > MAX_OUTLIER:
-        refuse(
-            f"{path}: {positions[outlier]} differs by {differences[outlier]:.0f} "
-            f"dB from other positions",
-            f"levels of positions, up to {MAX_OUTLIER:g} dB apart; other columns have the titles "
-            "background or reverberation_time",
-        )
     volume = None if volume is None else require_volume(volume)
     return RoomLevels(Path(path).stem, bands, frequency, levels, background, time, volume)
 

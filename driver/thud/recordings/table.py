@@ -31,6 +31,7 @@ from thud.recordings.date_times import continued, is_date, seconds_of_day
 from thud.recordings.header_aliases import (
     BRACKETS,
     DATE,
+    NUMBER,
     RATE,
     STEP,
     TIME_UNIT,
@@ -45,7 +46,7 @@ from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -62,8 +63,6 @@ UNUSUAL = {
 }
 # A comma that must be a decimal mark, as in 1,05 and -0,5.
 DECIMAL_COMMA = re.compile(r"[-+]?\d+,0\d|[-+]0,")
-# A number and its unit in one cell, such as 50Hz and 28.1 dB.
-WITH_UNIT = re.compile(rf"([-+]?[\d.,{GROUPING}]*\d\.?(?:[eEdD][-+]?\d+)?)\s*([^\d\s.,].*)")
 # Separators of name and value in a header, and maximum number of lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
 MAX_TITLES = 3
@@ -292,9 +291,9 @@ def _trimmed(cells: list[str]) -> list[str]:
 
 def _value(cell: str) -> tuple[str, str]:
     """Return the number of a cell as text and its unit; the cell itself if there is no unit."""
-    match = None if is_number(cell) else WITH_UNIT.fullmatch(cell)
-    is_value = match is not None and is_number(match[1]) and find_unit(match[2])
-    return (match[1], match[2]) if match and is_value else (cell, "")
+    match = None if is_number(cell) else NUMBER.fullmatch(cell)
+    is_value = match and is_number(match["number"]) and find_unit(match["unit"])
+    return (match["number"], match["unit"]) if match and is_value else (cell, "")
 
 
 def _find_numbers(layout: _Layout) -> list[str]:
@@ -362,14 +361,13 @@ def _require_separators(layout: _Layout) -> None:
 
 def _require_rows(above: list[str], layout: _Layout) -> None:
     """Raise InputError if a line above the numbers looks like an unreadable row."""
-    last = max((number for number, line in enumerate(above, 1) if line.strip()), default=0)
     for number, line in enumerate(above, 1):
         cells = layout.cells(line)
         if line.lstrip()[:1] in COMMENTS or len(cells) != layout.width or not cells[0]:
             continue
         is_row = not any(map(str.isalpha, cells[0])) and any(map(is_number, cells))
         # A word may stand in front of the numbers of the first row.
-        is_row |= number == last and all(is_number(cells[i]) for i in layout.used)
+        is_row |= number == len(above) and all(is_number(cells[i]) for i in layout.used)
         if is_row or is_number(cells[0]):
             wrong = next(cell for cell in cells if not is_number(cell))
             text = f"{layout.name}: line {number}: {shown_text(wrong)!r} is not a number"
@@ -479,7 +477,12 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
         if mark and mark in text and not (mark == "," and re.search("[\t;]", text)):
             cells = split_line(text, mark)
             # "Time, s   Force, N" is split by blanks.
-            if mark in {separator, "\t", ";"} or not any(map(find_unit, cells)) or _are_units(cells):
+            if (
+                mark != ","
+                or separator == ","
+                or _are_units(cells)
+                or not any(map(find_unit, cells))
+            ):
                 yield cells
     if not any(mark in text for mark in '\t;"'):
         yield re.split(r" {2,}", text)
@@ -516,13 +519,10 @@ def _sort_others(
             is_number(_value(piece)[0]) for piece in pieces
         )
         cells = next(_splits(text, layout.separator), [text])
-        is_title = not has_titles and (
-            (len(cells) > 1 or number == last) and any(map(is_time, cells))
-            or number == last
-            and line[:1] not in COMMENTS
-            and (layout.separator or "\n") in text
-            and ":" not in text
-        )
+        is_title = any(map(is_time, cells)) and (len(cells) > 1 or number == last)
+        if number == last and line[:1] not in COMMENTS and ":" not in text:
+            is_title |= (layout.separator or "\n") in text
+        is_title &= not has_titles
         is_unit = _are_units(cells) or any(map(_states_unit, pieces))
         if (is_title or is_unit) and not has_number:
             count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
@@ -546,51 +546,32 @@ def _states_unit(text: str) -> bool:
 
 def _apply_header_units(stated: list[list[str]], layout: _Layout) -> None:
     """Add units that the header states for the columns of times, or for the others."""
-    is_time_column = [
-        is_time(f"{name} [{''.join(units[:1])}]")
-        for name, units in zip(layout.names, stated, strict=True)
-    ]
+    used = [*layout.used]
+    times = [i for i in used if is_time(f"{layout.names[i]} [{''.join(stated[i][:1])}]")]
+    channels = [i for i in used if i not in times]
     for title, value in layout.header:
         words = plain(split_title(title)[0])
         if words not in UNIT | TIME_UNIT:
             continue
-        units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
-        if len(units) == 1 and len(value.split()) > 1 and all(map(find_unit, value.split())):
-            units = value.split()
-        units = _trimmed(units)
-        numeric = [i for i in layout.used if i != layout.clock]
-        channels = [i for i in numeric if not is_time_column[i]]
+        units = _trimmed([part.strip(" \"'") for part in re.split(r"[\t;,]", value)])
         if words in TIME_UNIT:
-            chosen = [i for i in numeric if is_time_column[i]] or numeric[:1]
-            chosen = chosen if len(set(units)) == 1 else []
-            units = units[:1] * len(chosen)
-        elif len(units) == 1:
-            chosen = [
-                i
-                for i in channels
-                if not any(_is_other(unit, units[0]) for unit in stated[i] if unit)
-            ]
-            units *= len(chosen)
+            chosen, units = times or used[:1], units[:1]
+        elif len(units) == 1:  # of the columns without a unit of another quantity
+            base = _quantity(units[0])
+            chosen = [i for i in channels if {*map(_quantity, filter(None, stated[i]))} <= {base}]
         else:
-            chosen = next(
-                (
-                    some
-                    for some in ([*range(layout.width)], numeric, channels, numeric[1:])
-                    if len(some) == len(units)
-                ),
-                [],
-            )
-        if len(chosen) != len(units) or (not chosen and words in TIME_UNIT):
+            lists = ([*range(layout.width)], used, channels, used[1:])
+            chosen = next((some for some in lists if len(some) == len(units)), [])
+        if len(units) not in {1, len(chosen)}:
             count = f"{len(units)} units for {len(channels)} channels"
             refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
-        for i, unit in zip(chosen, units, strict=True):
+        for i, unit in zip(chosen, itertools.cycle(units), strict=False):
             stated[i].append(unit)
 
 
-def _is_other(unit: str, common: str) -> bool:
-    """Whether a unit is of another quantity than a common one."""
-    quantities = [UNITS.get(find_unit(text), (text,))[0] for text in (unit, common)]
-    return quantities[0] != quantities[1]
+def _quantity(unit: str) -> str:
+    """Return the SI unit or base unit of a unit, or the unit itself if it is not known."""
+    return UNITS.get(find_unit(unit), (unit,))[0]
 
 
 def _one_unit(stated: list[str], column: int, layout: _Layout) -> str:
@@ -608,16 +589,15 @@ def _one_unit(stated: list[str], column: int, layout: _Layout) -> str:
 def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     """Return the columns of numbers and times of day by their index in the table."""
     columns = [*layout.used, *([] if layout.clock is None else [layout.clock])]
-    others = sorted({*range(layout.width)} - {*columns})
     blocks: list[NDArray[np.float64]] = []
     count = 0
     rows = layout.rows()
     while block := list(itertools.islice(rows, BLOCK)):
-        _require_words(block, others, layout)
         values = _convert([line for _, line in block], columns, layout)
         if values is None:
-            values = _convert_each(block, columns, layout)
-        blocks.append(values)
+            texts = [_convert_row(number, line, columns, layout) for number, line in block]
+            values = np.array(list(filter(None, texts)), dtype=np.float64)
+        blocks.append(values.reshape(-1, len(columns)))
         count += values.size
         if count > MAX_NUMBERS:
             refuse(
@@ -628,78 +608,56 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     return {column: table[:, k].copy() for k, column in enumerate(columns)}
 
 
-def _require_words(
-    block: Iterable[tuple[int, str]], word_columns: list[int], layout: _Layout
-) -> None:
-    for number, line in block if word_columns else ():
-        cells = layout.cells(line)
-        column = next((i for i in word_columns if i < len(cells) and is_number(cells[i])), None)
-        if column is not None:
-            refuse(
-                f"{layout.name}: line {number}: column {column + 1} has a number, "
-                f"{shown_text(cells[column])}, but none in line {layout.first}",
-                "columns of numbers or of words",
-            )
-
-
-def _convert(
-    block: list[str], columns: list[int], layout: _Layout
-) -> NDArray[np.float64] | None:
+def _convert(block: list[str], columns: list[int], layout: _Layout) -> NDArray[np.float64] | None:
     """Return the numbers of a block of lines; None if a line is empty, unusual or wrong."""
     separator, decimal = layout.separator, layout.decimal.mark
     joined = "\n".join(block)
-    if separator is None:
-        counts = {len(line.split()) for line in block}
-    else:
-        counts = {line.count(separator) + 1 for line in block}
-    is_even = len(counts) == 1 and max(columns) < max(counts) <= layout.width
-    if not is_even or UNUSUAL[decimal].search(joined) or layout.clock is not None:
+    counts = {len(line.split(separator)) for line in block}
+    if counts != {len(layout.used)} or columns != [*range(layout.width)]:
+        return None
+    if UNUSUAL[decimal].search(joined) or layout.clock is not None:
         return None
     lines = joined.replace(",", ".").split("\n") if decimal == "," else block
     try:
-        return np.loadtxt(
-            lines, delimiter=separator, comments=None, usecols=columns, ndmin=2, dtype=np.float64
-        )
+        return np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except (ValueError, OverflowError):
         return None
 
 
-def _convert_each(
-    block: Iterable[tuple[int, str]], columns: list[int], layout: _Layout
-) -> NDArray[np.float64]:
-    """Return the numbers of a block, line by line; raise InputError if a line is wrong."""
-    rows = []
-    needed = 1 + max(columns)
-    for number, line in block:
-        cells = layout.all_cells(line)
-        if not cells:
-            continue
-        row = [
-            _cell_value(cells[i], i, number, layout) for i in columns if i < len(cells)
-        ]
-        if not needed <= len(cells) or len(_trimmed(cells)) > layout.width:
-            count = f"{len(cells)} columns, {layout.width} in the lines above"
-            refuse(f"{layout.name}: line {number}: {count}", layout.allowed)
-        rows.append(row)
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(columns))
+def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) -> list[float] | None:
+    """Return the numbers of a line, None of an empty one; raise InputError if it is wrong."""
+    cells = layout.all_cells(line)
+    if not cells:
+        return None
+    row = [_cell_value(cells[i], i, number, layout) for i in columns if i < len(cells)]
+    if len(row) < len(columns) or len(_trimmed(cells)) > layout.width:
+        count = f"{len(cells)} columns, {layout.width} in the lines above"
+        refuse(f"{layout.name}: line {number}: {count}", layout.allowed)
+    for i, cell in enumerate(cells) if len(cells) > len(columns) else ():
+        if i not in columns and is_number(cell):
+            refuse(
+                f"{layout.name}: line {number}: column {i + 1} has a number, {shown_text(cell)}, "
+                f"but none in line {layout.first}",
+                "columns of numbers or of words",
+            )
+    return row
 
 
 def _cell_value(cell: str, column: int, number: int, layout: _Layout) -> float:
     """Return the number or the time of day, s, of a cell."""
+    first = layout.used.get(column, "")
     if column == layout.clock:
-        value = seconds_of_day(cell)
-        reason = f"{shown_text(cell)!r} is not a time"
+        value, reason = seconds_of_day(cell), f"{shown_text(cell)!r} is not a time"
+    elif first:
+        text, unit = _value(cell)
+        base, size = UNITS.get(find_unit(unit), ("", 0.0))
+        is_same = base == UNITS[find_unit(first)][0]
+        value = to_number(text, layout.decimal.mark) if is_same else None
+        value = None if value is None else value * size / UNITS[find_unit(first)][1]
+        reason = f"{shown_text(cell)!r} is not in {first}"
     else:
-        text, unit = _value(cell) if layout.used[column] else (cell, "")
-        value = to_number(text, layout.decimal.mark)
-        reason = layout.decimal.explain(shown_text(cell))
-        first = layout.used[column]
-        if value is not None and find_unit(unit) != find_unit(first):
-            (base, size), (other, other_size) = (
-                UNITS.get(find_unit(entry), ("", 1.0)) for entry in (first, unit)
-            )
-            value = value * other_size / size if base == other else None
-            reason = f"{shown_text(cell)!r} is not in {first}"
+        value = to_number(cell, layout.decimal.mark)
+        reason = "" if value is not None else layout.decimal.explain(shown_text(cell))
     if value is None:
         refuse(f"{layout.name}: line {number}: {reason}", layout.allowed)
     return value
