@@ -465,7 +465,7 @@ def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
             filled = _trimmed(cells)
             extra = filled[layout.width :]
             is_title = len(filled) <= layout.full_width or all(plain(c) in REMARK for c in extra)
-            has_number = any(is_number(cell) or is_date(cell) for cell in cells)
+            has_number = any(is_number(c) or is_date(c) or seconds_of_day(c) for c in cells)
             if len(cells) >= layout.width and is_title and filled and not has_number:
                 return cells[: max(layout.width, len(filled))]
     return []
@@ -612,14 +612,28 @@ def _convert(block: list[str], columns: list[int], layout: _Layout) -> NDArray[n
     """Return the numbers of a block of lines; None if a line is empty, unusual or wrong."""
     separator, decimal = layout.separator, layout.decimal.mark
     joined = "\n".join(block)
-    counts = {len(line.split(separator)) for line in block}
-    if counts != {len(layout.used)} or columns != [*range(layout.width)]:
+    if separator is None:
+        counts = {len(line.split()) for line in block}
+    else:
+        counts = {line.count(separator) + 1 for line in block}
+    count = max(counts)
+    is_even = len(counts) == 1 and count > max(columns) and layout.clock is None
+    if not is_even or UNUSUAL[decimal].search(joined):
         return None
-    if UNUSUAL[decimal].search(joined) or layout.clock is not None:
-        return None
+    if others := {*range(count)} - {*columns}:
+        texts = (
+            (i, cell.strip())
+            for line in block
+            for i, cell in enumerate(line.split(separator))
+            if i in others
+        )
+        if any(text and (i >= layout.width or is_number(text)) for i, text in texts):
+            return None
     lines = joined.replace(",", ".").split("\n") if decimal == "," else block
     try:
-        return np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
+        return np.loadtxt(
+            lines, delimiter=separator, comments=None, usecols=columns, ndmin=2, dtype=np.float64
+        )
     except (ValueError, OverflowError):
         return None
 
