@@ -171,6 +171,15 @@ def _wrong_column(table: Table, columns: list[Written], has_units: object) -> st
             return f"values of {column}"
         if not is_unstated and find_unit(column.unit) != find_unit(exact.unit):
             return f"unit of {column}: {column.unit}"
+    if sorted(c.kind for c in written.values()) == ["force", "time"] and has_units:
+        time, force = sorted(written.values(), key=lambda c: c.kind, reverse=True)
+        exact_table = [c.values * UNITS[find_unit(c.unit)][1] for c in (time, force)]
+        try:
+            record = time_and_force(table)
+        except thud.InputError:
+            return "" if UNITS[find_unit(force.unit)][0] == "V" else "record of time and force"
+        if not np.allclose(record.T, exact_table, rtol=1e-12, atol=0):
+            return "time and force"
     return ""
 
 
@@ -226,15 +235,15 @@ LAYOUTS = [
     ("kN", "Time;F1;F2;a\n\ns;kN;kN;m/s^2\n", "{t};{a};{b};0.010"),
     ("kN", "Y_Unit_Label\tkN\tkN\tm/s^2\n***End_of_Header***\nX_Value\tF1\tF2\ta\tComment",
      "{t}\t{a}\t{b}\t0.010"),
-    ("kN", "LabVIEW Measurement\nSeparator\tTab\nTime_Pref\tAbsolute\nOperator\tlab\n"
+    ("kN", ("LabVIEW Measurement\nSeparator\tTab\nTime_Pref\tAbsolute\nOperator\tlab\n"
      "Date\t2026/05/06\nTime\t14:20:11.123\n***End_of_Header***\t\n\t\nChannels\t1\t\t\n"
      "Samples\t40\t\nDate\t2026/05/06\t\nTime\t14:20:11.123\t\nY_Unit_Label\tkN\t\n"
      "X_Dimension\tTime\t\nX0\t0.0000E+0\t\nDelta_X\t0.000125\t\n***End_of_Header***\t\t\n"
-     "X_Value\tPlate\tComment", "{t}\t{a}"),
+     "X_Value\tPlate\tComment"), "{t}\t{a}"),
     ("V", "x-axis,1\nsecond,Volt", "{t},{a}"),
     ("V", "Zeitachse;Channel A\n(ms);(V)\n", "{m};{a}"),
-    ("N", "Start time: 5/6/2026 10:00:00\nSample rate: 8000\nRange: 20 kN, gain 4\nTime (s)\t"
-     "Plate (Collected) (N)", "{t}\t{a}"),
+    ("N", ("Start time: 5/6/2026 10:00:00\nSample rate: 8000\nRange: 20 kN, gain 4\nTime (s)\t"
+     "Plate (Collected) (N)"), "{t}\t{a}"),
     ("kN", "Units: s, kN, kN, V\nTime,F1,F2,Trigger", "{t},{a},{b},0.5"),
     ("kN", "Unit;kN\nTime;F1;F2", "{t};{a};{b}"),
     ("kN", "Time (ms)\tState\tF1 (kN)\tF2 (kN)", "{m}\tok\t{a}\t{b}"),

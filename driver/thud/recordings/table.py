@@ -476,13 +476,9 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
     for mark in dict.fromkeys((separator, "\t", ";", ",")):
         if mark and mark in text and not (mark == "," and re.search("[\t;]", text)):
             cells = split_line(text, mark)
-            # "Time, s   Force, N" is split by blanks.
-            if (
-                mark != ","
-                or separator == ","
-                or _are_units(cells)
-                or not any(map(find_unit, cells))
-            ):
+            # The commas of "Time, s" do not separate titles.
+            loose = text.split(", ")[1:] if separator == "," else cells
+            if mark != "," or _are_units(cells) or not any(map(find_unit, loose)):
                 yield cells
     if not any(mark in text for mark in '\t;"'):
         yield re.split(r" {2,}", text)
