@@ -311,6 +311,15 @@ def test_units_and_titles_that_do_not_fit_are_refused(
         time_and_force(read_table(path))
 
 
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("nanoseconds", "ns"), ("Newtons", "N"), ("KN", "kN"), ("µs", "us"), ("m·s^-2", ""),
+     ("m/s²", "m/s2"), ("m/(N s)", "m/(Ns)"), ("dB(A)", ""), ("dB re 20 µPa", "dB"), ("mn", "")],
+)  # fmt: skip
+def test_spellings_of_units(text: str, unit: str) -> None:
+    assert find_unit(text) == unit
+
+
 @pytest.mark.parametrize(("text", "time"), [("15:30,00", 930.0), ("15:30", 55_800.0)])
 def test_fractions_of_seconds_show_minutes(text: str, time: float) -> None:
     assert seconds_of_day(text) == time

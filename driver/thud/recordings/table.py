@@ -161,8 +161,9 @@ class Table:
 class _Layout:
     """Layout of a file: the numbers begin at line `first` and have `width` columns.
 
-    `used` are the numeric columns with the units in their cells. With `has_commas` the only column
-    has decimal commas.
+    `used` are the numeric columns with the units in their cells. With `has_gaps` there are empty
+    columns, which blanks between titles do not show; with `has_commas` the only column has decimal
+    commas.
     """
 
     name: str
@@ -173,6 +174,7 @@ class _Layout:
     first: int = 1
     width: int = 0
     full_width: int = 0
+    has_gaps: bool = False
     used: dict[int, str] = field(default_factory=dict)
     clock: int | None = None
     has_commas: bool = False
@@ -318,6 +320,7 @@ def _find_numbers(layout: _Layout) -> list[str]:
         ):
             layout.first, layout.width, layout.used = len(above) + 1, len(cells), used
             layout.full_width = len(layout.all_cells(line))
+            layout.has_gaps = len(filled) < len(cells)
             layout.clock = clocks[0] if clocks else None
             if len(cells) > MAX_COLUMNS:
                 refuse(f"{layout.name}: {len(cells)} columns", f"up to {MAX_COLUMNS}")
@@ -461,7 +464,7 @@ def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
     # A separator in front of the titles is no comment.
     starts = (line, text) if line[:1] == layout.separator else (text,)
     for variant in (*starts, *(part.partition("#")[0].rstrip() for part in starts)):
-        for cells in _splits(variant, layout.separator):
+        for cells in _splits(variant, layout):
             filled = _trimmed(cells)
             extra = filled[layout.width :]
             is_title = len(filled) <= layout.full_width or all(plain(c) in REMARK for c in extra)
@@ -471,8 +474,9 @@ def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
     return []
 
 
-def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
-    """Yield the cells of a line by its separator, and by others."""
+def _splits(text: str, layout: _Layout) -> Iterator[list[str]]:
+    """Yield the cells of a line of titles by the separator of the numbers, and by others."""
+    separator = layout.separator
     for mark in dict.fromkeys((separator, "\t", ";", ",")):
         if mark and mark in text and not (mark == "," and re.search("[\t;]", text)):
             cells = split_line(text, mark)
@@ -480,6 +484,8 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
             loose = text.split(", ")[1:] if separator == "," else cells
             if mark != "," or _are_units(cells) or not any(map(find_unit, loose)):
                 yield cells
+    if layout.has_gaps:
+        return
     if not any(mark in text for mark in '\t;"'):
         yield re.split(r" {2,}", text)
     if not any(mark in text for mark in '\t;,"'):
@@ -514,7 +520,7 @@ def _sort_others(
         has_number = re.search(r"[:=]\s*[-+]?\d", text) or any(
             is_number(_value(piece)[0]) for piece in pieces
         )
-        cells = next(_splits(text, layout.separator), [text])
+        cells = next(_splits(text, layout), [text])
         is_title = any(map(is_time, cells)) and (len(cells) > 1 or number == last)
         if number == last and line[:1] not in COMMENTS and ":" not in text:
             is_title |= (layout.separator or "\n") in text
