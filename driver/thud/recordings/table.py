@@ -482,7 +482,8 @@ def _splits(text: str, layout: _Layout) -> Iterator[list[str]]:
             cells = split_line(text, mark)
             # The commas of "Time, s" do not separate titles.
             loose = text.split(", ")[1:] if separator == "," else cells
-            if mark != "," or _are_units(cells) or not any(map(find_unit, loose)):
+            bases = {_quantity(cell) for cell in loose if find_unit(cell)} - {"counts", "FS"}
+            if mark != "," or _are_units(cells) or not bases:
                 yield cells
     if layout.has_gaps:
         return
