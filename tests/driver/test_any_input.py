@@ -11,7 +11,7 @@ from conftest import REPOSITORY, naming
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import thud
-from thud.base.columns import read_table
+from thud.recordings.table import read_table, time_and_force
 from thud.recordings.uniform_grid import read_record
 
 FLAGSHIP = (REPOSITORY / "inputs/rubber_ball_100cm.nml").read_text()
@@ -111,7 +111,7 @@ def test_any_table_of_a_record(
         path = Path(directory) / "plate.csv"
         path.write_text("\n".join([head, *lines]), encoding="utf-8")
         try:
-            record = read_record(read_table(path), str(path))
+            record = read_record(time_and_force(read_table(path)), str(path))
         except thud.InputError as error:
             check_sentence(error)
             assert str(path) in str(error)

@@ -113,7 +113,7 @@ def test_curve_that_the_model_does_not_explain_says_so(client: TestClient) -> No
         (
             "travel (in),force (N)\n0,0\n1,2",
             {},
-            "press 1.csv: column 1, 'travel': the unit 'in' is not known here",
+            "press 1.csv: column 1, 'travel': the unit 'in' is not known",
         ),
         (
             "travel (mm),force (N)\n0,0\n1,2",

@@ -331,10 +331,11 @@ def test_refusals_of_what_a_file_holds_name_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("titles", "count", "words"),
     [
-        ("frequency_kHz,real,imaginary", 3, naming("frequency_kHz")),
-        ("frequency,real (mm/Ns),imaginary (mm/Ns)", 3, naming("real (mm/Ns)")),
-        ("frequency,magnitude,phase (rad)", 3, naming("phase (rad)")),
-        ("frequency,magnitude (dB),phase", 3, naming("magnitude (dB)")),
+        ("frequency_rpm,real (mph),imaginary", 3, naming("column 2, 'real'", "mph")),
+        ("frequency,real (m/(N s)),imaginary [g/N]", 3, naming("mobility", "accelerance")),
+        ("frequency,real (mm/N),imaginary (N/m)", 3, naming("column 3, 'imaginary'", "N/m")),
+        ("frequency (ms),magnitude,phase", 3, naming("column 1, 'frequency'", "ms")),
+        ("frequency,magnitude (dB),phase", 3, naming("column 2, 'magnitude'", "dB")),
         ("frequency,,imaginary", 3, naming("'frequency, , imaginary'")),
         ("frequency,real,real", 3, naming("point.csv", "real")),
         ("frequency,real", 3, naming("point.csv", 2, "3 columns")),
@@ -347,6 +348,23 @@ def test_titles_that_do_not_fit_are_refused(
     columns = (FREQUENCY, MOBILITY.real, MOBILITY.imag)[:count]
     with pytest.raises(thud.InputError, match=words):
         thud.fit_mobility(write_table(tmp_path / "point.csv", titles, *columns))
+
+
+@pytest.mark.parametrize(
+    ("titles", "scales", "power"),
+    [
+        ("frequency_kHz,real (mm/Ns),imaginary [m/(N s)]", (1e-3, 1e3, 1), 0),
+        ("f (Hz),real [g/N],imaginary / (m/s^2)/N", (1, 1 / 9.80665, 1), 1),
+        ("f (Hz),real (mm/N),imaginary (m/N)", (1, 1e3, 1), -1),
+    ],
+)
+def test_units_of_titles_are_applied(
+    tmp_path: Path, titles: str, scales: tuple[float, ...], power: int, exact: thud.MobilityFit
+) -> None:
+    values = MOBILITY * S**power
+    columns = zip((FREQUENCY, values.real, values.imag), scales, strict=True)
+    path = write_table(tmp_path / "point.csv", titles, *(scale * x for x, scale in columns))
+    assert thud.fit_mobility(path, order=8).measured == pytest.approx(exact.measured)
 
 
 @pytest.mark.parametrize(

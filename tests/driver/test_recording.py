@@ -9,8 +9,9 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.base.columns import read_table
+from thud.recordings import table
 from thud.recordings.formats.text import read_channels
+from thud.recordings.table import time_and_force
 from thud.recordings.uniform_grid import read_record
 
 if TYPE_CHECKING:
@@ -18,6 +19,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 RATE = 44100.0
+
+
+def read_table(path: Path) -> np.ndarray:
+    """Return the numbers of a table."""
+    return np.column_stack([column.values for column in table.read_table(path).columns])
+
+
 FORCE = np.sin(np.linspace(0, np.pi, 500))
 TIME = 0.2 + np.arange(500) / RATE
 
@@ -215,28 +223,28 @@ def test_numbers_that_may_be_two_are_refused(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", naming("time", "force")),
-        ("time,force\n", naming("time", "force")),
-        ("a,b\nc,d\n", naming("time", "force")),
+        ("", naming("no numbers")),
+        ("time,force\n", naming("no numbers")),
+        ("a,b\nc,d\n", naming("no numbers")),
         ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
-        ("0,001,5,2\n0,002,5\n", naming("line 2", 3, 4)),
+        ("0.0,1,5,2\n0.0,2,5\n", naming("line 2", 3, 4)),
         ("1,0\n2,\n", naming("line 2", "''")),
         ("0,1\n1,2\0\n", naming("line 2", "zero")),
         ("0,1\n" + "1" * 70_000 + ",2\n", naming("line 2", "65536 characters")),
-        ("0,1\n1,2\n", naming("2 rows", 8)),
-        ("".join(f"{i},1,2\n" for i in range(9)), naming("9 rows", 3)),
+        ("0.0,1\n1,2\n", naming("2 rows", 8)),
+        ("".join(f"{i},1.0,2\n" for i in range(9)), naming("9 rows", 3)),
         ("".join(f"{i},nan\n" for i in range(9)), naming("finite")),
-        ("".join(f"{i**2},1\n" for i in range(9)), naming("row", "0.12")),
-        ("".join(f"{-i},1\n" for i in range(9)), naming("-1 s", "1000 s")),
-        ("".join("0,1\n" for _ in range(9)), naming("0 s", "1000 s")),
-        ("".join(f"{i},0\n" for i in range(9)), naming("force", "positive")),
-        ("".join(f"{i},1e200\n" for i in range(9)), naming("1e+200 N", "1e+12 N")),
+        ("".join(f"{i**2},1.0\n" for i in range(9)), naming("row", "0.12")),
+        ("".join(f"{-i},1.0\n" for i in range(9)), naming("-1 s", "1000 s")),
+        ("".join("0,1.0\n" for _ in range(9)), naming("0 s", "1000 s")),
+        ("".join(f"{i},0.0\n" for i in range(9)), naming("force", "positive")),
+        ("".join(f"{i},1.0e200\n" for i in range(9)), naming("1e+200 N", "1e+12 N")),
     ],
 )
 def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "plate.csv").write_text(text)
     with pytest.raises(thud.InputError, match=words) as caught:
-        read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
+        read_record(time_and_force(table.read_table(tmp_path / "plate.csv")), "plate.csv")
     assert "plate.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
 

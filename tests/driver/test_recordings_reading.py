@@ -469,7 +469,7 @@ def table_of(row: Callable[[int, float, float], str]) -> str:
         # Commas that separate and are decimal marks.
         (
             "t,F\n" + table_of(lambda _, t, v: f"{t:.6f},{v:.1f}".replace(".", ",")),
-            naming("line 2", "decimal marks"),
+            naming("line 1", "2 titles", "4 columns"),
         ),
         (
             table_of(lambda _, t, v: f"{t:.6f},{v:.1f}".replace(".", ",")),
@@ -782,7 +782,7 @@ def test_useless_tables_are_told(text: str, words: str, tmp_path: Path) -> None:
 
 def test_long_tables_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_pulse(tmp_path, "comma.csv")
-    monkeypatch.setattr("thud.recordings.formats.text.MAX_NUMBERS", 600)
+    monkeypatch.setattr("thud.recordings.table.MAX_NUMBERS", 600)
     assert "numbers" in refusal(path)
     path.write_bytes(b"1,2\n" * 2**20 * 65)
     assert "260 MiB" in refusal(path)

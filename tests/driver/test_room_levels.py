@@ -76,13 +76,63 @@ def test_levels_that_are_none_are_not_rated(level: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("title", "unit"), [("frequency (kHz)", "Hz"), ("T20 (ms)", "s"), ("mean_Pa", "dB")]
-)
+    ("title", "unit"),
+    [
+        ("frequency (ms)", "ms"), ("T20 (Hz)", "Hz"), ("mean_Pa", "Pa"), ("mean [dB(A)]", "dB(A)"),
+        ("mean, dBA", "dBA"), ("mean (phon)", "phon"),
+    ],
+)  # fmt: skip
 def test_columns_of_another_unit_are_refused(tmp_path: Path, title: str, unit: str) -> None:
     titles = {"f": "frequency", "T": "T20", "m": "mean"} | {title[0]: title}
     lines = [";".join(titles.values())] + [f"{f};0.5;70" for f in OCTAVES]
-    with pytest.raises(thud.InputError, match=naming("levels.csv", f"'{title}'", unit)):
+    with pytest.raises(thud.InputError, match=naming("levels.csv", unit)):
         thud.read_room_levels(write(tmp_path, "\n".join(lines)))
+
+
+LEVELS = ("70.5", "60", "50", "40.5")
+
+
+@pytest.mark.parametrize(
+    ("titles", "cells"),
+    [
+        ("frequency (kHz);T20 (ms);mean (dB)", ("{k};500;{v}",)),
+        ("Frequency;P1", ("{f}Hz;{v} dB",)),
+        ("Frequency;P1", ("{f} Hz;{v}", "0.125 kHz;60", "250 Hz;50", "0.5 kHz;40.5")),
+        ("f;L_i,Fmax;Remark", ("{f};{v};ok",)),
+        ("Frequency [Hz];LZFmax [dB]", ("{f};{v}",)),
+        ("frequency;L'i,Fmax", ("{f};{v}",)),
+        ("f;;Pos. 1 (dB);Comment", ("{f};;{v}",)),
+        ("Octave band\tLevel 1\nHz\tdB", ("{f}\t{v}",)),
+    ],
+)
+def test_levels_are_read_in_their_units(
+    tmp_path: Path, titles: str, cells: tuple[str, ...]
+) -> None:
+    rows = [
+        cells[min(i, len(cells) - 1)].format(f=f"{f:g}", k=f / 1000, v=v)
+        for i, (f, v) in enumerate(zip(OCTAVES, LEVELS, strict=True))
+    ]
+    found = thud.read_room_levels(write(tmp_path, "\n".join([titles, *rows])), volume=50.0)
+    assert found.positions.tolist() == [list(map(float, LEVELS))]
+    if "T20" in titles:
+        assert found.reverberation_time == pytest.approx([0.5] * 4)
+
+
+@pytest.mark.parametrize(
+    ("titles", "name"),
+    [
+        ("f;LAFmax", "LAFmax"), ("f;LZFmax;LZeq", "LZeq"), ("f;Value;A;C", "Value"),
+        ("f;Leq", "Leq"), ("f;L'i,Fmax;L'i,Fmax,V,T", "L'i,Fmax,V,T"), ("f;P1;B2", "B2"),
+        ("f;background;B2", "B2"), ("f;L1;No", "No"), ("f;L;Requirement", "Requirement"),
+        ("f;LCpeak", "LCpeak"), ("f;L'nT,w", "L'nT,w"), ("f;Umgebung", "Umgebung"),
+        ("f;LnT", "LnT"), ("f;P1;A1", "A1"),
+    ],
+)  # fmt: skip
+def test_titles_of_other_levels_are_refused(tmp_path: Path, titles: str, name: str) -> None:
+    count = titles.count(";")
+    rows = [f"{f:g}" + ";50" * count for f in OCTAVES]
+    with pytest.raises(thud.InputError, match=naming(repr(name), "P1", "mean", "background")):
+        thud.read_room_levels(write(tmp_path, "\n".join([titles, *rows])))
 
 
 @pytest.mark.parametrize("separator", [",", ", ", " , ", "; ", "\t "])
@@ -124,7 +174,7 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("", naming("frequency", "Hz")),
-        ("63,60\n125,60\n250,60\n500,60\n", naming("2 columns")),
+        ("63,60.0\n125,60\n250,60\n500,60\n", naming("2 columns")),
         ("level,P1\n63,60\n", naming("frequency")),
         ("frequency,T\n63,1\n125,1\n250,1\n500,1\n", naming("levels")),
         ("frequency,P1\n63,60\n125,60\n250,60\n", naming("500 Hz")),
@@ -184,21 +234,21 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "standardized_dB" in lines[0]
 
 
-@pytest.mark.parametrize("title", ["mean_dB", "std dev", "Standardized, dB", "EDT"])
+@pytest.mark.parametrize("title", ["mean", "std dev", "Standardized", "EDT"])
 def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
     rows = "".join(f"{f},60,55\n" for f in (63, 125, 250, 500))
-    (tmp_path / "levels.csv").write_text(f"frequency,first,{title.replace(',', '')}\n{rows}")
-    with pytest.raises(thud.InputError, match=naming("levels.csv", f"'{title.replace(',', '')}'")):
+    (tmp_path / "levels.csv").write_text(f"frequency,P1,{title}_dB\n{rows}")
+    with pytest.raises(thud.InputError, match=naming("levels.csv", "column 3", f"'{title}'")):
         thud.read_room_levels(tmp_path / "levels.csv")
 
 
 def test_column_that_hardly_is_a_position_raises_a_warning(tmp_path: Path) -> None:
     rows = "".join(f"{f},60,30\n" for f in (63, 125, 250, 500))
-    (tmp_path / "levels.csv").write_text(f"frequency,first,Umgebung\n{rows}")
+    (tmp_path / "levels.csv").write_text(f"frequency,P1,P2\n{rows}")
     assert any("30 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").warnings)
     # A known title is no position.
     rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
-    (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
+    (tmp_path / "levels.csv").write_text(f"frequency,P1,RT60\n{rows}")
     found = thud.read_room_levels(tmp_path / "levels.csv", volume=50.0)
     assert (len(found.positions), found.standardized is None) == (1, False)
 
@@ -376,11 +426,11 @@ def test_titles_are_read_in_four_languages(titles: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("titles", "encoding"),
     [
-        ("Frequenz;Küche 1;Küche 2;Störpegel;Nachhallzeit", "latin-1"),
-        ("주파수(Hz);거실 1;거실 2;배경소음 (dB);잔향시간(s)", "cp949"),
-        ("周波数（Hz）;居間1;居間2;暗騒音レベル（dB）;残響時間（s）", "cp932"),  # noqa: RUF001 - as printed
-        ("周波数;居間1;居間2;暗騒音;残響時間", "utf-16"),
-        ("Frequenz;Küche 1;Küche 2;Hintergrund;Nachhallzeit", "latin-1"),
+        ("Frequenz;Messpunkt 1;Messpunkt 2;Störpegel;Nachhallzeit", "latin-1"),
+        ("주파수(Hz);측정점 1;측정점 2;배경소음 (dB);잔향시간(s)", "cp949"),
+        ("周波数（Hz）;位置1;位置2;暗騒音レベル（dB）;残響時間（s）", "cp932"),  # noqa: RUF001 - as printed
+        ("周波数;位置1;位置2;暗騒音;残響時間", "utf-16"),
+        ("Frequenz;Messpunkt 1;Messpunkt 2;Hintergrund;Nachhallzeit", "latin-1"),
     ],
 )
 def test_titles_are_read_in_encodings_of_spreadsheets(
@@ -403,14 +453,14 @@ def test_titles_are_read_in_encodings_of_spreadsheets(
     [
         ("频率;声压级 1;背景噪声", "gb18030", naming("UTF-8")),
         ("주파수;위치 1;평균레벨", "utf-8", naming("평균레벨", "position")),
-        ("周波数(Hz);L1;残響時間(ms)", "utf-8", naming("残響時間(ms)", "s")),
+        ("周波数(Hz);L1;残響時間(ms)", "utf-8", naming("reverberation_time", "0.004 s", 0.01)),
     ],
 )
 def test_titles_that_would_mislead_are_refused(
     titles: str, encoding: str, words: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "levels.csv"
-    rows = [f"{f};50;40" for f in (63, 125, 250, 500)]
+    rows = [f"{f};50;4" for f in (63, 125, 250, 500)]
     path.write_bytes("\n".join([titles, *rows]).encode(encoding))
     with pytest.raises(thud.InputError, match=words):
         thud.read_room_levels(path)
@@ -433,7 +483,7 @@ def test_workbook_is_read_like_a_table(tmp_path: Path) -> None:
     assert found.reverberation_time is not None
     sheet["C6"] = "60 dB"
     book.save(path)
-    with pytest.raises(thud.InputError, match=naming("Pegel", "row 6", "60 dB")):
+    with pytest.raises(thud.InputError, match=naming("Pegel", "line 6", "60 dB")):
         thud.read_room_levels(path)
     path.write_bytes(b"PK no workbook")
     with pytest.raises(thud.InputError, match=naming("levels.xlsx", "cannot be read")):
@@ -458,4 +508,4 @@ def test_misspelled_title_is_no_position(
     cells = ",".join(f"{level}" for level in (60.0, *others))
     rows = "".join(f"{f},{value},{cells}\n" for f in (63, 125, 250, 500))
     path.write_text(f"frequency,backgruond,{titles}\n{rows}")
-    assert "column 'backgruond'" in errors_of("rate", path, "-o", tmp_path / "out")
+    assert "column 2, 'backgruond'" in errors_of("rate", path, "-o", tmp_path / "out")

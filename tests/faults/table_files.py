@@ -18,12 +18,12 @@ from sentences import INNER, fault_of
 
 import thud
 from thud.base.bridge import ask
-from thud.base.columns import read_table
 from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
 from thud.floors.survey import levels_csv, rating_table, read_room_levels
 from thud.recordings.config import read_config
 from thud.recordings.formats.text import read_channels
+from thud.recordings.table import read_table, time_and_force
 from thud.recordings.uniform_grid import read_record
 from thud.studies.compression_fit import fit_compression
 
@@ -92,7 +92,7 @@ def _attempt_notation(chance: random.Random) -> tuple[str, str]:
     recording = Path("recording.csv")
     recording.write_text("fs: 8000\n" + "\n".join(rows) + "\n")
     wrong, words = "", []
-    for file, read in ((path, read_table), (recording, _read_recording)):
+    for file, read in ((path, _read_numbers), (recording, _read_recording)):
         try:
             same = np.array_equal(read(file), table)
             words.append("read" if same else "wrong")
@@ -106,6 +106,10 @@ def _attempt_notation(chance: random.Random) -> tuple[str, str]:
     word = next((one for one in ("wrong", "raw", "refused") if one in words), "read")
     wrong = wrong or (word if word == "wrong" else "")
     return ("raw" if wrong else word), f"notation: {wrong}: {rows}" if wrong else ""
+
+
+def _read_numbers(path: Path) -> np.ndarray:
+    return np.column_stack([column.values for column in read_table(path).columns])
 
 
 def _read_recording(path: Path) -> np.ndarray:
@@ -150,7 +154,7 @@ def _read_levels(path: Path, chance: random.Random) -> str:
 
 
 def _read_force(path: Path, _: random.Random) -> str:
-    found = read_record(read_table(path), str(path))
+    found = read_record(time_and_force(read_table(path)), str(path))
     levels = [
         thud.force_exposure_levels(found.force, found.sample_rate, bands)
         for bands in ("octave", "third")
@@ -159,7 +163,7 @@ def _read_force(path: Path, _: random.Random) -> str:
 
 
 def _read_compression(path: Path, chance: random.Random) -> str:
-    table = read_table(path)
+    table = _read_numbers(path)
     if table.shape[1] != 2 or chance.random() < 0.9:
         return ""
     try:

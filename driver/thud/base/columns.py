@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import csv
-import errno
-import itertools
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TextIO
 
-import numpy as np
-
 from thud.base.checks import refuse
-from thud.base.errors import InputError
-from thud.base.workbooks import read_workbook
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterable, Iterator
 
-    from numpy.typing import NDArray
 
 # Separators of columns by precedence; a line without any of them is separated by blanks.
 SEPARATORS = ("\t", ";", ",")
@@ -41,10 +34,6 @@ _WORD_SEPARATOR = re.compile(r"[\t;,:=]")
 _MAX_HEADER_SIZE = 2**20
 # Maximum length of a line.
 MAX_LINE = 2**16
-ALLOWED = (
-    "columns of time, s, and force, N, separated by commas, semicolons, tabs or "
-    "blanks (decimal commas with semicolons, tabs and blanks, or in quotes)"
-)
 
 
 def _numbers(decimal: str) -> re.Pattern[str]:
@@ -56,7 +45,7 @@ def _numbers(decimal: str) -> re.Pattern[str]:
     fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
     grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
     return re.compile(
-        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:e[-+]?\d+)?"
+        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:[ed][-+]?\d+)?"
         rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*{fraction})",
         re.ASCII | re.IGNORECASE,
     )
@@ -77,11 +66,6 @@ class DecimalMark(NamedTuple):
         if is_number(cell) and self.line:
             reason += f" with the decimal {MARKS[self.mark]} of line {self.line}"
         return reason
-
-
-def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Return the numbers of a file of columns, shape (n_row, n_column), as `read_titled` does."""
-    return read_titled(path, ALLOWED)[1]
 
 
 def find_encoding(
@@ -121,64 +105,6 @@ def _count_known(
     return sum(not cell.isascii() and is_known(cell) for cell in cells) if is_known else 0
 
 
-def read_titled(
-    path: str | os.PathLike[str], allowed: str, is_known: Callable[[str], bool] | None = None
-) -> tuple[list[str], NDArray[np.float64]]:
-    """Return the titles of a file of columns and its numbers, shape (n_row, n_column).
-
-    The titles are the cells of the line above the first number, if there is such a line. Commas,
-    semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells may
-    be quoted. One decimal mark holds for the whole table, see `find_decimal`. Empty lines, comments
-    after ``#`` and lines above the first number are skipped. A workbook (.xlsx) is read in the same
-    way. Words of which `is_known` is true show the encoding, see `find_encoding`. Raise InputError,
-    naming file and line, if a line is not numeric or has a different number of columns.
-    """
-    is_workbook = Path(path).suffix.lower() == ".xlsx"
-    return read_workbook(path, allowed) if is_workbook else _read_text(path, allowed, is_known)
-
-
-def _read_text(
-    path: str | os.PathLike[str], allowed: str, is_known: Callable[[str], bool] | None
-) -> tuple[list[str], NDArray[np.float64]]:
-    """Return the titles and the numbers of a text."""
-    try:
-        if not Path(path).is_file():  # opening a pipe could block
-            raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
-        # A comment may be in an encoding that is not known.
-        with Path(path).open(encoding=find_encoding(path, is_known), errors="replace") as text:
-            lines = [strip_comment(line) for line in read_lines(text, str(path), allowed)]
-    except InputError:  # is a ValueError
-        raise
-    except (OSError, ValueError) as error:
-        refuse(f"{path}: cannot be read ({error})", allowed, error)
-    numbered: Iterator[tuple[int, str]] = (
-        (number, line) for number, line in enumerate(lines, start=1) if line
-    )
-    titles: list[str] = []
-    separator: str | None = None
-    for number, line in numbered:
-        separator = find_separator(line)
-        cells = split_line(line, separator)
-        if any(map(is_number, cells)):
-            numbered = itertools.chain([(number, line)], numbered)
-            break
-        titles = cells
-    rows = [(number, split_line(line, separator), '"' in line) for number, line in numbered]
-    if not rows:
-        refuse(f"{path}: cannot be read (no numbers)", allowed)
-    decimal = find_decimal(rows, separator, str(path))
-    width = len(rows[0][1])
-    table = np.empty((len(rows), width))
-    for row, (number, cells, _) in zip(table, rows, strict=True):
-        values = [to_number(cell, decimal.mark) for cell in cells]
-        if None in values:
-            refuse(f"{path}: line {number}: {decimal.explain(cells[values.index(None)])}", allowed)
-        if len(cells) != width:
-            refuse(f"{path}: line {number}: {len(cells)} columns, {width} above it", allowed)
-        row[:] = values
-    return titles, table
-
-
 def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
     """Yield the lines of a text without line ends.
 
@@ -194,8 +120,8 @@ def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
 
 
 def strip_comment(line: str) -> str:
-    """Return a line without its comment and its trailing semicolons."""
-    return COMMENT.split(line, 1)[0].strip().rstrip(";").rstrip()
+    """Return a line without its comment and the blanks around it."""
+    return COMMENT.split(line, 1)[0].strip(" \r")
 
 
 def find_separator(line: str) -> str | None:
@@ -240,7 +166,8 @@ def to_number(cell: str, decimal: str) -> float | None:
         return None
     if match["group"]:
         cell = cell.replace(match["group"], "")
-    return float(cell.replace(decimal, "."))
+    # Fortran writes 1.5D+03.
+    return float(re.sub("[dD]", "e", cell.replace(decimal, ".")))
 
 
 def is_number(cell: str) -> bool:

@@ -26,6 +26,53 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "K": {"K": 0},
     "": {"1": 0, "%": -2},
 }
+# Factors of further units in files of instruments and spreadsheets, by SI unit or base unit.
+_FURTHER: dict[str, dict[str, float]] = {
+    "N": {"MN": 1e6, "mN": 1e-3, "uN": 1e-6, "daN": 10.0, "kgf": 9.80665, "kp": 9.80665,
+          "lbf": 4.4482216152605},
+    "V": {"V": 1.0, "mV": 1e-3, "uV": 1e-6},
+    "pC": {"pC": 1.0, "nC": 1e3},
+    "counts": {"counts": 1.0},
+    "FS": {"FS": 1.0},
+    "s": {"ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "Hz": {"MHz": 1e6},
+    "m": {"nm": 1e-9},
+    "m/s": {"m/s": 1.0, "mm/s": 1e-3},
+    "m/s2": {"mm/s2": 1e-3, "g": 9.80665},
+    "dB": {"dB": 1.0, "dB(Z)": 1.0},
+    "deg": {"deg": 1.0, "rad": 180 / math.pi},
+    "m/(Ns)": {"m/(Ns)": 1.0, "mm/(Ns)": 1e-3},
+    "m/N": {"m/N": 1.0, "mm/N": 1e-3},
+    "m/(Ns2)": {"m/(Ns2)": 1.0, "1/kg": 1.0, "g/N": 9.80665},
+}  # fmt: skip
+# By unit of a file: SI unit or base unit, and its factor.
+UNITS: dict[str, tuple[str, float]] = {
+    unit: (base, factor)
+    for base in ("N", "s", "Hz", "m", "m/s2", "Pa", "degC", "K", *_FURTHER)
+    for unit, factor in (
+        {unit: float(f"1e{power}") for unit, power in MULTIPLES.get(base, {}).items()}
+        | _FURTHER.get(base, {})
+    ).items()
+}
+# Other spellings, in lower case and without blanks.
+SPELLINGS = {
+    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "n": "N", "kn": "kN",
+    "lb": "lbf", "lbs": "lbf", "volt": "V", "volts": "V", "v": "V", "mv": "mV", "millivolt": "mV",
+    "millivolts": "mV", "pc": "pC", "count": "counts", "digit": "counts", "digits": "counts",
+    "lsb": "counts", "bit": "counts", "bits": "counts", "cts": "counts", "adc": "counts",
+    "fs": "FS", "fullscale": "FS",
+    "sec": "s", "second": "s", "seconds": "s", "sekunden": "s", "msec": "ms", "millisecond": "ms",
+    "milliseconds": "ms", "usec": "us", "microsecond": "us", "microseconds": "us", "nsec": "ns",
+    "nanosecond": "ns", "nanoseconds": "ns", "minute": "min", "minutes": "min", "hour": "h",
+    "hours": "h", "hz": "Hz", "hertz": "Hz", "khz": "kHz", "mhz": "MHz",
+    "s/s": "Hz", "1/s": "Hz", "sps": "Hz",
+    "m/s/s": "m/s2", "db": "dB", "dbz": "dB", "db(lin)": "dB", "dbre20upa": "dB", "°": "deg",
+    "degree": "deg", "degrees": "deg", "grad": "deg", "°c": "degC",
+    "m/ns": "m/(Ns)", "m/s/n": "m/(Ns)", "(m/s)/n": "m/(Ns)", "mm/ns": "mm/(Ns)",
+    "mm/s/n": "mm/(Ns)", "(mm/s)/n": "mm/(Ns)", "m/s2/n": "m/(Ns2)", "(m/s2)/n": "m/(Ns2)",
+    "m/ns2": "m/(Ns2)", "kg-1": "1/kg",
+}  # fmt: skip
+_PLAIN = str.maketrans("\u00b5\u03bc\u00b2\u00b3", "uu23", " *\u00b7\u22c5^\u00a0")
 # The number at the beginning of a quantity.
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
@@ -37,6 +84,17 @@ DISPLAY_UNITS = {
     "N/m": ("N/m", "kN/m"),
     "N/m3": ("N/m3", "kN/m3", "MN/m3"),
 }
+
+
+def find_unit(text: str) -> str:
+    """Return the unit of `UNITS` that a text names, or an empty string.
+
+    >>> find_unit("Newtons"), find_unit("m/s^2"), find_unit("mmHg")
+    ('N', 'm/s2', '')
+    """
+    name = text.translate(_PLAIN)
+    lower = SPELLINGS.get(name.casefold(), name.casefold())
+    return name if name in UNITS else lower if lower in UNITS else ""
 
 
 def power_of(unit: object, key_unit: str, label: str) -> int:

@@ -2,34 +2,32 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import refuse, shown
-from thud.base.columns import read_titled
+from thud.base.checks import refuse
 from thud.base.errors import ThudError
-from thud.base.units import MULTIPLES, scaled
+from thud.base.units import UNITS, find_unit, scaled
 from thud.case.case import default_model
 from thud.explorer.answer import new_case
 from thud.explorer.form import fields_by_key
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.recording_fields import PRESS_FIELDS
-from thud.recordings import force_units
-from thud.recordings.header_aliases import plain, split_title
+from thud.recordings.header_aliases import plain
+from thud.recordings.table import read_table
 from thud.studies.compression_fit import fit_compression
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from thud.recordings.table import Column
+
     Values = dict[str, dict[str, Any]]
-    # Function that returns a unit in SI units, or None for a unit of another kind.
-    Scale = Callable[[str], float | None]
 
 # Maximum number of points of a fit; of more, every second, third and so on is used.
 MAX_POINTS = 2000
@@ -42,20 +40,6 @@ EXPECTED = (
     'a column of deflection and one of force, with their units in the titles, such as "Deflection, '
     'mm" and "Force, N"'
 )
-# Unit of a length at the end of a title, such as "Travel, mm".
-_LENGTH = re.compile(rf"(?:(.*?)[\s,;/_]+)?({'|'.join(MULTIPLES['m'])}|µm|μm)")
-
-
-class Column(NamedTuple):
-    """Column of a curve: its number from 1, name, and unit, which is empty if it is not stated."""
-
-    number: int
-    name: str
-    unit: str
-
-    def __str__(self) -> str:
-        """Return number and title for messages."""
-        return f"column {self.number}" + (f", {shown(self.name)}" if self.name else "")
 
 
 def fit_press(
@@ -139,25 +123,17 @@ def _read_curve(
     A column is found by its unit, or by its title, or in a file of two columns without titles
     by its order: deflection, force.
     """
-    titles, table = read_titled(path, EXPECTED)
-    width = table.shape[1]
-    if width < 2:  # noqa: PLR2004 - deflection and force
-        refuse(f"the file has {width} column of numbers", EXPECTED)
-    titles = titles if len(titles) == width else [""] * width
-    columns = [Column(i, *_split(title)) for i, title in enumerate(titles, start=1)]
-    if width == 2 and not any(titles):  # noqa: PLR2004 - deflection and force
+    table = read_table(path, EXPECTED)
+    columns = table.columns
+    if len(columns) < 2:  # noqa: PLR2004 - deflection and force
+        refuse(f"the file has {len(columns)} column of numbers", EXPECTED)
+    if len(columns) == 2 and not table.has_titles:  # noqa: PLR2004 - deflection and force
         deflection, force = columns
     else:
-        deflection = _find(columns, DEFLECTION_WORDS, _length_scale, "deflection")
-        force = _find(columns, FORCE_WORDS, _force_scale, "force")
-    scales = (
-        _scale(deflection, _length_scale, "press_deflection", units),
-        _scale(force, _force_scale, "press_force", units),
-    )
-    x, y = (
-        scale * table[:, column.number - 1]
-        for scale, column in zip(scales, (deflection, force), strict=True)
-    )
+        deflection = _find(columns, DEFLECTION_WORDS, "m", "deflection")
+        force = _find(columns, FORCE_WORDS, "N", "force")
+    x = deflection.values * _factor(deflection, "m", "press_deflection", units)
+    y = force.values * _factor(force, "N", "press_force", units)
     for column, numbers in ((deflection, x), (force, y)):
         if not np.isfinite(numbers).all():
             refuse(f"{column}: a value is not finite", "finite numbers")
@@ -172,35 +148,9 @@ def _read_curve(
     return x[used], y[used], "; ".join(notes)
 
 
-def _split(title: str) -> tuple[str, str]:
-    """Return name and unit of a title.
-
-    >>> _split("Travel, mm"), _split("Force [kN]"), _split("mm"), _split("Weg")
-    (('Travel', 'mm'), ('Force', 'kN'), ('', 'mm'), ('Weg', ''))
-    """
-    name, unit = split_title(title)
-    if not unit and (match := _LENGTH.fullmatch(name)):
-        return match[1] or "", match[2]
-    if not unit and force_units.find_unit(name):
-        return "", name
-    return name.rstrip(" ,;"), unit
-
-
-def _length_scale(unit: str) -> float | None:
-    """Return a length in m; None for another unit."""
-    power = MULTIPLES["m"].get(unit.replace("µ", "u").replace("μ", "u"))
-    return None if power is None else 10.0**power
-
-
-def _force_scale(unit: str) -> float | None:
-    """Return a force in N; None for another unit."""
-    base, scale = force_units.UNITS.get(force_units.find_unit(unit), ("", 0.0))
-    return scale if base == "N" else None
-
-
-def _find(columns: Sequence[Column], words: set[str], scale: Scale, kind: str) -> Column:
+def _find(columns: Sequence[Column], words: set[str], unit: str, kind: str) -> Column:
     """Return the column of a kind, by name and unit; raise InputError for none or several."""
-    by_unit = [column for column in columns if scale(column.unit) is not None]
+    by_unit = [c for c in columns if UNITS.get(find_unit(c.unit), ("",))[0] == unit]
     by_name = [column for column in columns if plain(column.name) in words]
     both = [column for column in by_name if column in by_unit]
     found = both or by_unit or by_name
@@ -211,16 +161,14 @@ def _find(columns: Sequence[Column], words: set[str], scale: Scale, kind: str) -
     return found[0]
 
 
-def _scale(column: Column, scale: Scale, name: str, units: Mapping[str, str]) -> float:
+def _factor(column: Column, unit: str, name: str, units: Mapping[str, str]) -> float:
     """Return the unit of a column in SI units; raise InputError if it is not stated or known."""
     field = next(item for item in PRESS_FIELDS if item.name == name)
     allowed = f"{', '.join(field.choices)} in its title, or under {field.quoted}"
     stated = units.get(name, "")
     if not column.unit and not stated:
         refuse(f"{column}: its unit is not stated", allowed)
-    factor: float | None = scale(column.unit or stated)
-    if factor is None:
-        refuse(f"{column}: the unit {shown(column.unit or stated)} is not known here", allowed)
-    if column.unit and stated and scale(stated) != factor:
+    factor = column.factor(unit, allowed) if column.unit else UNITS[stated][1]
+    if column.unit and stated and UNITS[stated][1] != factor:
         refuse(f"{column}: {column.unit} by its title, {stated} under {field.quoted}", "one unit")
     return factor

@@ -7,7 +7,7 @@ import re
 import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import f90nml
 import numpy as np
@@ -23,16 +23,16 @@ from thud.base.checks import (
     require_whole,
     shown,
 )
-from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import data_frame
+from thud.base.units import UNITS, find_unit
 from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
 from thud.recordings.channel import guarded
-from thud.recordings.force_units import UNITS, find_unit
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
+from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -68,11 +68,9 @@ _TITLES = {
     "周波数": "frequency", "実部": "real", "実数部": "real", "虚部": "imaginary",
     "虚数部": "imaginary", "振幅": "magnitude", "絶対値": "magnitude", "位相": "phase",
 }  # fmt: skip
-# Words in a title that state a unit other than SI units and degrees.
-_OTHER_UNITS = {
-    "khz", "mhz", "ghz", "rpm", "rad", "radian", "radians", "db", "mm", "cm", "um", "nm", "inch",
-    "ft", "kn", "mn", "lbf", "lb", "g", "mg", "percent",
-}  # fmt: skip
+# SI unit of the values by quantity, and of further columns by kind.
+_UNITS = {"mobility": "m/(Ns)", "accelerance": "m/(Ns2)", "receptance": "m/N"}
+_FURTHER_UNITS = {"frequency": "Hz", "phase": "deg"}
 # Minimum number of frequencies in an octave.
 _MIN_POINTS = 2
 # Numbers of poles to try, up to the maximum of the library.
@@ -372,28 +370,33 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     """Return frequencies, values and quantity, which is None if the file does not state it."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
-    titles, table = read_titled(path, _ALLOWED, lambda title: _words(title)[0] in _TITLES)
-    words = list(map(_words, titles))
-    for title, (_, *others) in zip(titles, words, strict=True):
-        if _OTHER_UNITS & {*others}:
-            refuse(f"{path}: {shown(title.strip())} is not in SI units and degrees", _ALLOWED)
+    table = read_table(path, _ALLOWED, lambda title: _words(title)[0] in _TITLES)
+    words = [_words(column.name) for column in table.columns]
     kinds = [_TITLES.get(first, "") for first, *_ in words]
     if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
         refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
-    if titles and len(titles) != table.shape[1]:
-        refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", _ALLOWED)
-    columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind}
-    quantities = [name for name in get_args(Quantity) if any(name in title for title in words)]
+    used = {kind: c for kind, c in zip(kinds, table.columns, strict=True) if kind}
+    units = {find_unit(c.unit) for kind, c in used.items() if kind not in _FURTHER_UNITS}
+    quantities = {
+        name
+        for name, unit in _UNITS.items()
+        if any(name in title for title in words) or any(UNITS[u][0] == unit for u in units if u)
+    }
+    if len(quantities) > 1:
+        refuse(f"{path}: titles and units state {' and '.join(sorted(quantities))}", "one quantity")
+    quantity = cast("Quantity", min(quantities)) if quantities else None
+    unit = _UNITS[quantity or "mobility"]
+    columns = {kind: c.to(_FURTHER_UNITS.get(kind, unit), _ALLOWED) for kind, c in used.items()}
     if {"frequency", "real", "imaginary"} <= columns.keys():
         values = columns["real"] + 1j * columns["imaginary"]
     elif {"frequency", "magnitude", "phase"} <= columns.keys():
         values = columns["magnitude"] * np.exp(1j * np.radians(columns["phase"]))
     else:
+        titles = ", ".join(column.name for column in table.columns)
         refuse(
-            f"{path}: the columns are {shown(', '.join(titles)) if titles else 'without titles'}",
+            f"{path}: the columns are {shown(titles) if table.has_titles else 'without titles'}",
             _ALLOWED,
         )
-    quantity = quantities[0] if len(quantities) == 1 else None
     return columns["frequency"], values, quantity
 
 

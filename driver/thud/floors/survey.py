@@ -7,7 +7,6 @@ background, standardization by reverberation time and volume, and rating by ISO 
 from __future__ import annotations
 
 import math
-import re
 import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,10 +16,10 @@ import numpy as np
 
 from thud.base.bridge import ask
 from thud.base.checks import refuse
-from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.level.levels import BANDWIDTHS
 from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
+from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
     import os
@@ -37,38 +36,33 @@ R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
 FREQUENCY_TOLERANCE = 0.03
 # Minimum number of positions (ISO 16283-2).
 MIN_POSITIONS = 4
-# Titles of the kinds of columns in English, German, Korean and Japanese, in lower case, without
-# unit and blanks; other columns are levels.
+# Titles of the kinds of columns in English, German, Korean and Japanese, in lower case, letters
+# only; those of positions may have a number. A column of a mean stands for all positions.
 WORDS = {
-    "frequency": "frequency f band hz centerfrequency centrefrequency midfrequency "
+    "frequency": "frequency f freq band hz centerfrequency centrefrequency midfrequency "
     "frequenz mittenfrequenz terzmittenfrequenz oktavmittenfrequenz terz terzband oktave oktavband "
+    "octave octaveband thirdoctave onethirdoctave "
     "주파수 중심주파수 밴드 옥타브밴드 周波数 中心周波数 バンド オクターブバンド",
     "time": "reverberationtime t t20 t30 t60 rt rt20 rt30 rt60 nachhallzeit 잔향시간 残響時間",
     "background": "background backgroundlevel backgroundnoise backgroundnoiselevel noise "
     "hintergrund hintergrundpegel hintergrundgeräusch grundgeräusch grundgeräuschpegel störpegel "
     "störgeräusch fremdgeräusch fremdgeräuschpegel ruhepegel "
     "배경소음 배경소음레벨 암소음 암소음레벨 暗騒音 暗騒音レベル 背景騒音",
+    "position": "position pos p point source level l lf lfmax lzf lzfmax lifmax lmax measurement "
+    "messung messposition messpunkt punkt pegel 측정점 측정위치 위치 레벨 測定点 位置 レベル",
+    "mean": "mean average mittelwert mittel mittlererpegel energymean meanlevel averagelevel "
+    "평균 평균값 평균레벨 平均 平均値 平均レベル",
 }
 TITLES = {word: kind for kind, words in WORDS.items() for word in words.split()}
 ALLOWED = (
-    "a header row, and for each band a row of frequency, Hz, levels, dB, of one or "
-    "more positions, and, if known, the columns background, dB, and reverberation_time, s"
+    "a header row with the titles frequency (Hz), P1, P2 and so on for levels of positions (dB, "
+    "not weighted) or mean for their mean, and, if known, background (dB), reverberation_time (s)"
 )
-# Units of the kinds of columns, and words in a title that state another unit.
-UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
-OTHER_UNITS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
-# Words in titles of columns that are not levels of a position.
-NO_POSITION = {
-    "mean", "average", "median", "standardized", "spread", "std", "sd", "stdev",
-    "deviation", "uncertainty", "edt", "nominal",
-    "mittelwert", "mittel", "mittlerer", "standardisiert", "standardabweichung", "streuung",
-    "unsicherheit", "평균", "평균값", "평균레벨", "표준편차", "표준화", "불확도", "平均", "平均値",
-    "平均レベル", "標準偏差", "標準化", "不確かさ",
-}  # fmt: skip
+LEVELS = {"position", "mean"}
+# Units of the other kinds of columns; that of levels is dB.
+UNITS = {"frequency": "Hz", "time": "s"}
 # Maximum plausible difference between levels of two positions, dB, mean over the bands.
 MAX_DIFFERENCE = 15.0
-# Difference above which a column has no levels of a position, dB.
-MAX_OUTLIER = 40.0
 # Plausible levels, dB, and times, s.
 LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
 
@@ -165,10 +159,7 @@ class RoomLevels(Displayed):
             )
         difference = float(np.ptp(self.positions.mean(axis=1)))
         if difference > MAX_DIFFERENCE:
-            result.append(
-                f"the levels of two positions differ by {difference:.0f} dB on average: check that "
-                "every column without a known title has the levels of a position"
-            )
+            result.append(f"the levels of two positions differ by {difference:.0f} dB on average")
         if self.background is None:
             result.append("the background is not known: levels are not corrected for it")
         elif self.is_upper_bound.any():
@@ -248,9 +239,9 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     path
         Columns with a header row, as text or in the first sheet of a workbook (.xlsx) that has
         numbers: ``frequency``, Hz; ``background``, dB, and ``reverberation_time``, s, if known;
-        every other column holds the levels of a position, dB. Titles may be German, Korean or
-        Japanese, in UTF-8, or in the encodings of spreadsheets in these languages. There is
-        a row for each rated band, and optionally for other bands.
+        ``P1``, ``P2`` and so on for levels of positions, dB, or ``mean`` for their mean. Titles may
+        be German, Korean or Japanese, in UTF-8, or in the encodings of spreadsheets in these
+        languages. There is a row for each rated band, and optionally for other bands.
     volume
         Volume of the room, m3.
 
@@ -259,29 +250,33 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     InputError
         If a column or band is missing, duplicate or not plausible; the message names it.
     """
-    titles, table = read_titled(path, ALLOWED, _is_known)
-    if len(titles) != table.shape[1]:
-        refuse(f"{path}: {len(titles)} titles for {table.shape[1]} columns", ALLOWED)
-    if broken := [title for title in titles if "\N{REPLACEMENT CHARACTER}" in title]:
+    read = read_table(path, ALLOWED, lambda title: bool(_kind(title)))
+    if broken := [c.name for c in read.columns if "\N{REPLACEMENT CHARACTER}" in c.name]:
         refuse(
             f"{path}: the title {broken[0].strip()!r} is in an unknown encoding", "a table in UTF-8"
         )
-    kinds = [_kind(title, path) for title in titles]
-    positions = [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"]
-    other = next((title for title in positions if NO_POSITION & {*_plain(title).split()}), "")
-    if other and len(positions) > 1:
-        refuse(f"{path}: column {other.strip()!r} is not a position", ALLOWED)
-    if double := [kind for kind in UNITS if kind != "level" and kinds.count(kind) > 1]:
+    if not read.has_titles:
+        refuse(f"{path}: {len(read.columns)} columns without titles", ALLOWED)
+    kinds = [_kind(column.name) for column in read.columns]
+    has_mean = kinds.count("mean") == 1 and "position" not in kinds
+    for column, kind in zip(read.columns, kinds, strict=True):
+        if not kind or (kind == "mean" and not has_mean):
+            refuse(f"{path}: {column} is not a level of a position", ALLOWED)
+    if double := [kind for kind in WORDS if kind != "position" and kinds.count(kind) > 1]:
         refuse(f"{path}: more than one column of {double[0]}", ALLOWED)
+    positions = [c for c, kind in zip(read.columns, kinds, strict=True) if kind in LEVELS]
     if "frequency" not in kinds or not positions:
         missing = "levels" if "frequency" in kinds else "frequency"
         refuse(f"{path}: there is no column of {missing}", ALLOWED)
+    table = np.column_stack(
+        [c.to(UNITS.get(kind, "dB")) for c, kind in zip(read.columns, kinds, strict=True)]
+    )
     frequency = np.array([_nominal(f, path) for f in table[:, kinds.index("frequency")]])
     table, frequency = table[np.argsort(frequency)], np.sort(frequency)
     bands = _bands_of(frequency, path)
     columns = {kind: table[:, i] for i, kind in enumerate(kinds)}
     background, time = columns.get("background"), columns.get("time")
-    levels = table[:, [kind == "level" for kind in kinds]].T
+    levels = table[:, [kind in LEVELS for kind in kinds]].T
     for quantity, values, (low, high), unit in (
         ("level", levels, LEVEL_RANGE, "dB"),
         ("background", background, LEVEL_RANGE, "dB"),
@@ -292,17 +287,6 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
                 f"{path}: {quantity} = {wrong[0]:g} {unit} is not allowed",
                 f"{low:g} to {high:g} {unit}",
             )
-    # Of two columns the lower one is an outlier: neither times nor a background are louder.
-    means = levels.mean(axis=1)
-    differences = abs(means - np.median(means)) * (2 if len(means) == 2 else 1)  # noqa: PLR2004
-    outlier = max(range(len(means)), key=lambda i: (differences[i], -means[i]))
-    if differences[outlier] > MAX_OUTLIER:
-        refuse(
-            f"{path}: column {positions[outlier].strip()!r} differs by {differences[outlier]:.0f} "
-            f"dB from other positions",
-            f"levels of positions, up to {MAX_OUTLIER:g} dB apart; other columns have the titles "
-            "background or reverberation_time",
-        )
     volume = None if volume is None else require_volume(volume)
     return RoomLevels(Path(path).stem, bands, frequency, levels, background, time, volume)
 
@@ -332,30 +316,16 @@ def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
     return rows
 
 
-def _is_known(title: str) -> bool:
-    """Whether a title has a known word."""
-    word = _plain(title)
-    return word.replace(" ", "") in TITLES or bool(NO_POSITION & {*word.split()})
+def _kind(title: str) -> str:
+    """Return the kind of a column, or an empty string if its title is not known.
 
-
-def _kind(title: str, path: object) -> str:
-    """Return the kind of a column; raise InputError if its title states another unit."""
-    kind = TITLES.get(_plain(title).replace(" ", ""), "level")
-    if OTHER_UNITS & {word.lower() for word in re.findall(r"[^\W\d_]+", title)[1:]}:
-        refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
-    return kind
-
-
-def _plain(title: str) -> str:
-    """Return a title in lower case without its unit.
-
-    >>> _plain("Reverberation_time (s)")
-    'reverberation time'
+    >>> _kind("Reverberation_time"), _kind("L_i,Fmax 3"), _kind("L_i,Fmax,V,T")
+    ('time', 'position', '')
     """
-    # NFKC replaces full-width brackets by those of ASCII.
-    text = unicodedata.normalize("NFKC", title).strip().strip('"').lower()
-    word = re.split(r"[,.;(\[/]", text)[0]
-    return re.sub(r"([_\s]+in)?[_\s]+(hz|s|db)$", "", word.strip()).replace("_", " ").strip()
+    text = unicodedata.normalize("NFKC", title).lower()
+    word = "".join(filter(str.isalnum, text))
+    kind = TITLES.get(word, "")
+    return kind or ("position" if TITLES.get(word.rstrip("0123456789")) == "position" else "")
 
 
 def _nominal(frequency: float, path: object) -> float:

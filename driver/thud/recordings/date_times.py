@@ -44,7 +44,7 @@ def seconds_of_day(cell: str) -> float | None:
     minutes, seconds = int(match["minutes"]), float(match["seconds"].replace(",", "."))
     if match["hours"] is not None:
         minutes += 60 * int(match["hours"])
-    elif seconds == int(seconds) and "." not in cell.rpartition(":")[2]:
+    elif match["seconds"].isdigit():
         # Without seconds: hours and minutes.
         minutes, seconds = 60 * minutes + int(seconds), 0.0
     half = (match["half"] or "").lower()
@@ -83,4 +83,5 @@ def step_of_date_times(times: NDArray[np.float64], name: str) -> float | None:
             f"{name}: the date-times are not uniformly spaced at row {worst + 1}",
             "a constant step, or a table without this column, and sample_rate",
         )
-    return step if 0 < rounding <= ROUNDED_TOLERANCE * step or not rounding else None
+    is_exact = deviation[worst] <= TOLERANCE * step
+    return step if is_exact or rounding <= ROUNDED_TOLERANCE * step else None

@@ -9,26 +9,17 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from thud.base import units
 from thud.base.checks import refuse, refuse_value, shown
 
 # By unit: base unit, and base units per unit.
-UNITS: dict[str, tuple[str, float]] = {
-    "N": ("N", 1.0), "kN": ("N", 1e3), "MN": ("N", 1e6), "mN": ("N", 1e-3), "daN": ("N", 10.0),
-    "kgf": ("N", 9.80665), "kp": ("N", 9.80665), "lbf": ("N", 4.4482216152605),
-    "V": ("V", 1.0), "mV": ("V", 1e-3), "uV": ("V", 1e-6), "µV": ("V", 1e-6), "μV": ("V", 1e-6),
-    "pC": ("pC", 1.0), "nC": ("pC", 1e3),
-    "counts": ("counts", 1.0), "FS": ("FS", 1.0),
-}  # fmt: skip
+UNITS = {
+    unit: entry
+    for unit, entry in units.UNITS.items()
+    if entry[0] in {"N", "V", "pC", "counts", "FS"}
+}
 # Unit of values that are assumed to be in N, because none is stated.
 ASSUMED = "N?"
-# Other spellings, in lower case.
-SPELLINGS = {
-    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "n": "N", "kn": "kN",
-    "lb": "lbf", "lbs": "lbf", "volt": "V", "volts": "V", "v": "V", "mv": "mV", "millivolt": "mV",
-    "millivolts": "mV", "pc": "pC", "count": "counts", "digit": "counts", "digits": "counts",
-    "lsb": "counts", "bit": "counts", "bits": "counts", "cts": "counts", "adc": "counts",
-    "fs": "FS", "full scale": "FS", "fullscale": "FS",
-}  # fmt: skip
 ALLOWED = ", ".join(UNITS)
 EXAMPLES = "such as 250 (N per unit), '250 N/V', '4.1 pC/N, 10 mV/pC', '10 V/FS, 4 mV/N'"
 FACTOR = re.compile(
@@ -107,13 +98,13 @@ class Calibration:
 
 
 def find_unit(text: str) -> str:
-    """Return the unit that a text names, or an empty string.
+    """Return the unit of a recorded value that a text names, or an empty string.
 
     >>> find_unit("Newtons"), find_unit("mmHg")
     ('N', '')
     """
-    name = text.strip()
-    return name if name in UNITS else SPELLINGS.get(name.casefold(), "")
+    unit = units.find_unit(text)
+    return unit if unit in UNITS else ""
 
 
 def require_unit(text: object, label: str) -> str:
@@ -166,8 +157,8 @@ def unit_of_chain(chain: str) -> str:
     'V'
     """
     factors = read_chain(chain)
-    units = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
-    ends = [unit for unit in units if _follow(unit, factors, None) is not None]
+    others = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
+    ends = [unit for unit in others if _follow(unit, factors, None) is not None]
     return ends[0] if len(ends) == 1 else ""
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.base.columns import GROUPING, MARKS, to_number
-from thud.recordings.force_units import UNITS, find_unit
+from thud.base.units import SPELLINGS, UNITS, find_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -38,24 +38,29 @@ DATE = _words(
     "wfstarttime startdate datestarted created 날짜 측정일 측정일시 日付 日時 測定日 測定日時"
 )
 UNIT = _words("unit units einheit unitstring yunit yunits yunitlabel forceunit unitsy 단위 単位")
+TIME_UNIT = _words("timeunit timeunits xunit xunits xunitlabel unitsx unittime zeiteinheit")
 TIME = _words(
     "time times t zeit temps tempo sec seconds xvalue abscissa timestamps 시간 시각 時間 時刻"
 )
 # Names of channels that show the encoding of a header.
 _FORCE = _words("kraft stoßkraft 힘 충격력 하중 力 衝撃力 荷重")
-WORDS = RATE | STEP | DATE | UNIT | TIME | _FORCE
+WORDS = RATE | STEP | DATE | UNIT | TIME_UNIT | TIME | _FORCE
 
-RATE_UNITS = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "1/s": 1.0, "sps": 1.0}
-TIME_UNITS = {
-    "": 1.0, "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "sekunden": 1.0, "ms": 1e-3,
-    "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "microseconds": 1e-6,
-    "ns": 1e-9, "nanoseconds": 1e-9,
-}  # fmt: skip
-# "Force [kN]", "Force (kN)", "Force / kN", "Force in kN", "Force_kN", "Force, kN".
-TITLE = (
-    re.compile(r"(?P<name>[^\[\](){}]*)[\[({](?P<unit>[^\[\](){}]{0,20})[\])}]\s*"),
-    re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s/,_]{1,12})\s*"),
+# Factors of units to Hz and to s, by spellings in lower case; without a unit 1.
+RATE_UNITS, TIME_UNITS = (
+    {"": 1.0}
+    | {
+        text.casefold(): UNITS[unit][1]
+        for text in (*UNITS, *SPELLINGS, "\u00b5s")
+        if UNITS[unit := find_unit(text)][0] == base
+    }
+    for base in ("Hz", "s")
 )
+# "Force [kN]", "Force (kN) 1"; "Force / kN", "Force, kN"; "Force in kN", "Force_kN", "Force kN".
+BRACKETS = re.compile(r"\[([^][]{0,30})\]|\{([^{}]{0,30})\}|\(((?:[^()]|\([^()]*\)){0,30})\)")
+LOOSE = re.compile(r"(?P<name>.*?\S)(?P<mark>\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s,_]{1,12})\s*")
+# Words that are no units after a blank, or after an underscore.
+_AMBIGUOUS = {"": {"g", "h", "min", "K", "rad"}, "_": {"h", "K"}}
 NUMBER = re.compile(
     rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
     re.IGNORECASE,
@@ -92,11 +97,16 @@ def split_title(title: str) -> tuple[str, str]:
     ('time', 's')
     """
     text = title.strip().strip("\"'").strip()[:MAX_LENGTH].translate(_BRACKETS)
-    bracket, loose = (pattern.fullmatch(text) for pattern in TITLE)
-    if bracket:
-        return bracket["name"].strip(), bracket["unit"].strip()
-    if loose and (find_unit(loose["unit"]) or loose["unit"].casefold() in TIME_UNITS | RATE_UNITS):
-        return loose["name"].strip(), loose["unit"]
+    loose = LOOSE.fullmatch(text)
+    if loose and (unit := find_unit(loose["unit"])):
+        mark = loose["mark"].strip()
+        if unit not in _AMBIGUOUS.get(mark[:1], ()) or plain(loose["name"]) in TIME:
+            return loose["name"].strip(), loose["unit"]
+    groups = [(match, "".join(filter(None, match.groups()))) for match in BRACKETS.finditer(text)]
+    for match, unit in groups:
+        if find_unit(unit) or (match is groups[-1][0] and text.endswith(match[0])):
+            name = f"{text[: match.start()]} {text[match.end() :]}"
+            return " ".join(name.split()), unit.strip()
     return text, ""
 
 
@@ -184,7 +194,7 @@ def find_word(items: Iterable[tuple[str, object]], words: frozenset[str]) -> str
 def is_time(title: str) -> bool:
     """Whether a title names a column of times."""
     name, unit = split_title(title)
-    return plain(name) in TIME or (unit.casefold() in TIME_UNITS and unit not in {"", *UNITS})
+    return plain(name) in TIME or UNITS.get(find_unit(unit), ("",))[0] == "s"
 
 
 def text_of(value: object) -> str:

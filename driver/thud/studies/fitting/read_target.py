@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_number
-from thud.base.columns import read_table
 from thud.base.units import power_of, scaled
 from thud.recordings.formats import FORMATS
 from thud.recordings.read_recording import read_recording
+from thud.recordings.table import read_table, time_and_force
 from thud.recordings.uniform_grid import read_record
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
@@ -77,7 +77,7 @@ def _read_record(
     suffixes = {end for item in FORMATS if item.module != "text" for end in item.suffixes}
     if measured or path.suffix.lower() in suffixes:
         return read_recording(path, config=config)
-    samples = read_table(path)
+    samples = time_and_force(read_table(path))
     read_record(samples, str(path))  # refuses what is not a record
     return samples[:, 0], samples[:, 1]
 

@@ -1,0 +1,336 @@
+"""Tables: random layouts around known numbers are read right or refused, with their units."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import naming
+
+import thud
+from thud.base.units import UNITS, find_unit
+from thud.recordings.date_times import seconds_of_day
+from thud.recordings.signal_files import open_signals
+from thud.recordings.table import read_table, time_and_force
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from thud.recordings.signal import Signal
+    from thud.recordings.table import Table
+
+RATE = 8000.0
+ROWS = 40
+PULSE = 1500 * np.sin(np.pi * np.arange(ROWS) / ROWS) ** 2
+# Sensitivity of a sensor whose values are voltages, N/V.
+SENSITIVITY = 250.0
+FORCE_UNITS = ["N", "N", "N", "kN", "lbf", "kgf", "daN", "mV", "V", "Newton", "KN", "lbs"]
+TIME_UNITS = ["s", "s", "s", "ms", "us", "µs", "sec", "milliseconds", "min"]
+OTHER_UNITS = ["m/s^2", "m/s2", "m/s²", "g", "degC", "mm", "V"]
+
+
+@dataclass
+class Written:
+    """A column as it is written: name, unit, cells, and numbers in the unit."""
+
+    kind: str
+    name: str
+    unit: str
+    cells: list[str]
+    values: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+
+def numbers(chance: random.Random, name: str, unit: str, values: np.ndarray) -> Written:
+    """Return a column of numbers in a drawn notation."""
+    base, size = UNITS[find_unit(unit)]
+    kind = "time" if base == "s" else "force" if name[0] == "F" else "other"
+    scale = SENSITIVITY if kind == "force" and base == "V" else 1.0
+    form = "{:.9f}" if kind == "time" else chance.choice(["{:.4f}", "{:.6e}", "{:.6E}", "{:.5f}"])
+    cells = [form.format(value / scale / size) for value in values]
+    exact = np.array(list(map(float, cells)))
+    if "E" in form and chance.random() < 0.5:
+        cells = [cell.replace("E", "D") for cell in cells]
+    return Written(kind, name, unit, cells, exact)
+
+
+def draw_columns(chance: random.Random, decimal: str, place: str) -> list[Written]:
+    """Return the columns of a table in a drawn order."""
+    force_unit = chance.choice(FORCE_UNITS)
+    columns = [
+        numbers(chance, f"F{i + 1}", force_unit, PULSE / (i + 1))
+        for i in range(chance.choice([1, 1, 2, 3]))
+    ]
+    if chance.random() < 0.4 and place != "header":
+        other = chance.choice(OTHER_UNITS)
+        columns.append(numbers(chance, "Acc", other, np.cos(np.arange(ROWS))))
+    if chance.random() < 0.4:
+        words = chance.choice([["ok"] * ROWS, ["start"] + [""] * (ROWS - 1), [""] * ROWS])
+        columns.append(Written("words", chance.choice(["Comment", "State", "Remark"]), "", words))
+    if chance.random() < 0.2:
+        columns.append(Written("empty", chance.choice(["", "", "x"]), "", [""] * ROWS))
+    if chance.random() < 0.3:
+        chance.shuffle(columns)
+    # The header states the units of the other columns only.
+    unit = "s" if place in {"header", "lvm", "none"} else chance.choice(TIME_UNITS)
+    time = numbers(chance, chance.choice(["Time", "t", "Zeit"]), unit, np.arange(ROWS) / RATE)
+    columns.insert(0 if chance.random() < 0.8 else chance.randrange(len(columns) + 1), time)
+    for column in columns:
+        column.cells = [cell.replace(".", decimal) for cell in column.cells]
+    return columns
+
+
+def title(column: Written, style: str) -> str:
+    """Return name and unit of a column in one of several styles."""
+    return column.name + (style.format(column.unit) if column.unit else "")
+
+
+def draw_table(chance: random.Random) -> tuple[str, list[Written], bool]:
+    """Return a text, its columns, and whether it states their units."""
+    separator = chance.choice(["\t", ";", ",", ", ", "; ", " ", "   "])
+    decimal = "." if "," in separator else chance.choice([".", ","])
+    place = chance.choice(["title"] * 5 + ["below", "above", "header", "lvm", "numbered", "none"])
+    columns = draw_columns(chance, decimal, place)
+    if not separator.strip(" "):
+        columns = [column for column in columns if column.kind not in {"words", "empty"}]
+    over = separator if chance.random() < 0.7 else chance.choice(["\t", ";", ", ", "   "])
+    style = chance.choice([" [{}]", " ({})", " / {}", "[{}]", " in {}", "_{}", ", {}"])
+    comment = chance.choice(["", "", "", "# ", "% ", "#", "// "])
+    titles = [title(c, style) if place == "title" else c.name for c in columns]
+    if "," in style and over == separator == ",":
+        titles = [f'"{text}"' for text in titles]
+    units = [chance.choice(["{}", "{}", "[{}]"]).format(c.unit) if c.unit else "" for c in columns]
+    lines = [comment + over.join(titles)]
+    channels = [c.unit for c in columns if c.kind in {"force", "other"}]
+    if place == "below":
+        lines.append(comment + over.join(units))
+    elif place == "above":
+        lines.insert(0, comment + over.join(units))
+    elif place == "header":
+        lines.insert(0, f"{comment}Unit: {channels[0]}")
+    elif place == "lvm":
+        lines.insert(0, over.join(["Y_Unit_Label", *channels]))
+    elif place == "numbered":
+        named = [(i, title(c, style)) for i, c in enumerate(columns, 1) if c.name]
+        lines = [f"{comment}Column {i}: {text}" for i, text in named]
+    if chance.random() < 0.15:  # one too few, or too many
+        cut = [*titles[:-1]] if chance.random() < 0.5 else [*titles, "F9 [lbf]"]
+        lines, place = [comment + over.join(cut)], place if place == "title" else "none"
+    prose = ["Impact test 3", "Operator: Miller", "# lab 4, hall B", "Date;2026-05-06", "",
+             "Serial number;4711", "Range (kN): 20", "Messung vom 3. Mai", "---"]  # fmt: skip
+    for _ in range(chance.choice([0, 0, 1, 2, 5])):
+        lines.insert(chance.choice([0, 0, 0, len(lines)]), chance.choice(prose))
+    return "\n".join([*lines, *draw_rows(chance, columns, separator), ""]), columns, place != "none"
+
+
+def draw_rows(chance: random.Random, columns: list[Written], separator: str) -> list[str]:
+    """Return the rows of a table with drawn quotes, ends of lines and comments."""
+    end = chance.choice(["", "", "", separator])
+    rows = []
+    for row in zip(*(column.cells for column in columns), strict=True):
+        cells = [f'"{cell}"' if chance.random() < 0.02 else cell for cell in row]
+        text = separator.join(cells)
+        rows.append((text.rstrip(separator) if chance.random() < 0.5 and not end else text) + end)
+    if chance.random() < 0.1:
+        rows[chance.randrange(ROWS)] += "  # touch"
+    return rows
+
+
+def outcome(path: Path, chance: random.Random) -> str:
+    """Return what becomes of a drawn table: "read", "refused", or what is wrong with it."""
+    text, columns, has_units = draw_table(chance)
+    coding = chance.choice(["utf-8", "utf-8", "utf-8-sig", "utf-16", "latin-1"])
+    end = chance.choice(["\n", "\r\n"])
+    path.write_bytes(text.replace("\n", end).encode(coding))
+    try:
+        table = read_table(path)
+        is_force = any(UNITS.get(find_unit(c.unit), ("",))[0] == "N" for c in table.columns)
+        stated = {} if is_force or not has_units else {"calibration": f"{SENSITIVITY} N/V"}
+        signals = open_signals(path, channel="F1" if stated else None, **stated)
+    except thud.InputError:
+        return "refused"
+    return (
+        _wrong_column(table, columns, has_units)
+        or _wrong_force(signals, columns, has_units)
+        or "read"
+    )
+
+
+def _wrong_column(table: Table, columns: list[Written], has_units: object) -> str:
+    """Return what is wrong with the columns of a table, or nothing."""
+    written = {i: c for i, c in enumerate(columns, 1) if c.values.size}
+    if {c.number for c in table.columns} != set(written):
+        return f"columns {[str(c) for c in table.columns]}"
+    for column in table.columns:
+        exact = written[column.number]
+        is_unstated = not column.unit and (not has_units or exact.unit == "s")
+        if not np.array_equal(column.values, exact.values):
+            return f"values of {column}"
+        if not is_unstated and find_unit(column.unit) != find_unit(exact.unit):
+            return f"unit of {column}: {column.unit}"
+    if sorted(c.kind for c in written.values()) == ["force", "time"] and has_units:
+        time, force = sorted(written.values(), key=lambda c: c.kind, reverse=True)
+        exact_table = [c.values * UNITS[find_unit(c.unit)][1] for c in (time, force)]
+        try:
+            record = time_and_force(table)
+        except thud.InputError:
+            return "" if UNITS[find_unit(force.unit)][0] == "V" else "record of time and force"
+        if not np.allclose(record.T, exact_table, rtol=1e-12, atol=0):
+            return "time and force"
+    return ""
+
+
+def _wrong_force(signals: list[Signal], columns: list[Written], has_units: object) -> str:
+    """Return what is wrong with the forces of a recording, or nothing."""
+    for signal in signals:
+        name = signal.name.rpartition(", ")[2] if ", " in signal.name else "F1"
+        (exact,) = [c for c in columns if c.name == name] or [columns[0]]
+        base, size = UNITS[find_unit(exact.unit)]
+        size *= SENSITIVITY if base == "V" else 1.0
+        force = signal.read(0, signal.n_sample)
+        if not np.allclose(force, exact.values * (size if has_units else 1.0), rtol=1e-12):
+            return f"force of {signal.name}"
+        if abs(signal.sample_rate / RATE - 1) > 1e-4 and has_units:
+            return f"rate {signal.sample_rate:g}"
+    return ""
+
+
+def check_layouts(path: Path, count: int, first: int) -> None:
+    words: Counter[str] = Counter()
+    for seed in range(first, first + count):
+        chance = random.Random(seed)  # noqa: S311 - layouts are no secrets
+        word = outcome(path, chance)
+        assert word in {"read", "refused"}, (seed, word, path.read_bytes()[:600])
+        words[word] += 1
+    assert words["read"] > 0.5 * count, words
+
+
+def test_random_layouts_are_read_right_or_refused(tmp_path: Path) -> None:
+    check_layouts(tmp_path / "plate.csv", 300, 0)
+
+
+@pytest.mark.slow
+def test_ten_thousand_layouts_are_read_right_or_refused(tmp_path: Path) -> None:
+    check_layouts(tmp_path / "plate.csv", 10_000, 1000)
+
+
+# Ordinary layouts of loggers and spreadsheets: lines above the numbers, and a row of
+# time, forces, N, and an acceleration; {t} in s, {m} in ms, {a} and {b} forces in the unit.
+LAYOUTS = [
+    ("lbf", "Time [s] Force [lbf]", "{t} {a}"),
+    ("lbf", "# Time [s]   Force [lbf]", "{t} {a}"),
+    ("lbf", "# Time [s]   Force [lbf]", "{t},{a}"),
+    ("lbf", "Time [s]\tForce [lbf]", "{t}   {a}"),
+    ("lbf", "Time [s];Force [lbf];", "{t};{a}"),
+    ("lbf", "Time [s],Force [lbf]", "{t},{a},"),
+    ("lbf", "Time [s],Force [lbf],", "{t},{a},"),
+    ("lbf", "Time [s];Force [lbf]\nlab 4\nhall B\ngate 7\nMiller", "{t};{a}"),
+    ("lbf", "Column 1: Time [s]\nColumn 2: Force [lbf]", "{t}\t{a}"),
+    ("kN", ";F1 [kN];F2 [kN];a [m/s2]", "{t};{a};{b};0.010"),
+    ("kN", "s;kN;kN;m/s2\nTime;F1;F2;a", "{t};{a};{b};0.010"),
+    ("kN", "Time;F1;F2;a\n[ms];[kN];[kN];[g]", "{m};{a};{b};0.010"),
+    ("kN", "Time;F1;F2;a\n\ns;kN;kN;m/s^2\n", "{t};{a};{b};0.010"),
+    ("kN", "Y_Unit_Label\tkN\tkN\tm/s^2\n***End_of_Header***\nX_Value\tF1\tF2\ta\tComment",
+     "{t}\t{a}\t{b}\t0.010"),
+    ("kN", ("LabVIEW Measurement\nSeparator\tTab\nTime_Pref\tAbsolute\nOperator\tlab\n"
+     "Date\t2026/05/06\nTime\t14:20:11.123\n***End_of_Header***\t\n\t\nChannels\t1\t\t\n"
+     "Samples\t40\t\nDate\t2026/05/06\t\nTime\t14:20:11.123\t\nY_Unit_Label\tkN\t\n"
+     "X_Dimension\tTime\t\nX0\t0.0000E+0\t\nDelta_X\t0.000125\t\n***End_of_Header***\t\t\n"
+     "X_Value\tPlate\tComment"), "{t}\t{a}"),
+    ("V", "x-axis,1\nsecond,Volt", "{t},{a}"),
+    ("V", "Zeitachse;Channel A\n(ms);(V)\n", "{m};{a}"),
+    ("N", ("Start time: 5/6/2026 10:00:00\nSample rate: 8000\nRange: 20 kN, gain 4\nTime (s)\t"
+     "Plate (Collected) (N)"), "{t}\t{a}"),
+    ("kN", "Units: s, kN, kN, V\nTime,F1,F2,Trigger", "{t},{a},{b},0.5"),
+    ("kN", "Unit;kN\nTime;F1;F2", "{t};{a};{b}"),
+    ("kN", "Time (ms)\tState\tF1 (kN)\tF2 (kN)", "{m}\tok\t{a}\t{b}"),
+    ("N", "t/s,F1/N,F2/N", "{t},{a},{b}"),
+    ("N", "F2 in N,F1 in N,Time in ms", "{b},{a},{m}"),
+    ("N", "\tTime [s]\tF1 (raw) [N]\tF2 [N] right", "\t{t}\t{a}\t{b}"),
+    ("N", "Time [s];Force [Newton]", "{t};{d}"),
+    ("daN", "\ufeffTime_ms;Force_daN;Remark", "{m};{a};"),
+    ("kgf", "Time, s;Force, kgf", "{t} s;{a} kgf"),
+    ("mV", "Time [s]\tForce [mV]", "{t}\t{a}"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "head", "row"), LAYOUTS)
+def test_ordinary_layouts_are_read_with_their_units(
+    unit: str, head: str, row: str, tmp_path: Path
+) -> None:
+    base, size = UNITS[unit]
+    size *= SENSITIVITY if base == "V" else 1.0
+    lines = [
+        row.format(t=f"{i / RATE:.6f}", m=f"{1e3 * i / RATE:.3f}", a=f"{force / size:.9f}",
+                   b=f"{force / size / 2:.9f}", d=f"{force:.8E}".replace("E", "D"))
+        for i, force in enumerate(PULSE)
+    ]  # fmt: skip
+    path = tmp_path / "plate.csv"
+    path.write_text("\n".join([head, *lines, ""]), encoding="utf-8")
+    stated = {"calibration": f"{SENSITIVITY} N/V"} if base == "V" else {}
+    sums = {"channels": "sum"} if "F2" in head else {}
+    (signal,) = open_signals(path, **stated, **sums)
+    force = signal.read(0, signal.n_sample)
+    np.testing.assert_allclose(force, PULSE * (1.5 if sums else 1.0), atol=1e-4)
+    assert signal.sample_rate == pytest.approx(RATE, rel=1e-5)
+    if "F2" not in head and base != "V":  # a record of time and force in s and N
+        record = time_and_force(read_table(path))
+        np.testing.assert_allclose(record[:, 1], PULSE, atol=1e-4)
+        np.testing.assert_allclose(record[:, 0], np.arange(ROWS) / RATE, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "words"),
+    [
+        ("Time [s];F1 [N];F2 [N]", "{t};{f}", naming("line 1", "3 titles", "2 columns")),
+        ("Time;F1", "{t};{f};{f}", naming("line 1", "2 titles", "3 columns")),
+        ("# Force [lbf]", "{t};{f}", naming("line 1", "1 title", "2 columns")),
+        ("# force in lbf", "{t} {f}", naming("line 1", "2 columns")),
+        ("Time [s];Force [stone]", "{t};{f}", naming("'stone'", "kN")),
+        ("Time [min^2];Force [N]", "{t};{f}", naming("column 1, 'Time'", "'min^2'", "ms")),
+        ("Time;Force [kN]\ns;N", "{t};{f}", naming("column 2", "kN", "N")),
+        ("Time;Force [kN]", "{t};{f} N", naming("column 2", "kN", "N")),
+        ("Unit: kN\nTime;Force [N]", "{t};{f}", naming("column 2", "kN", "N")),
+        ("Y_Unit_Label;N;N;m/s2\nTime;F1;F2", "{t};{f};{f}", naming("column 1, 'Time'", "'N'")),
+        ("Column 3: Force [lbf]", "{t};{f}", naming("column 3", 2)),
+        ("Time [s];Force [lbf]\nTime [s];Force [N]", "{t};{f}", naming("line 1", "second line")),
+    ],
+)
+def test_units_and_titles_that_do_not_fit_are_refused(
+    head: str, row: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    rows = [row.format(t=f"{i / RATE:.6f}", f=f"{force:.2f}") for i, force in enumerate(PULSE)]
+    path.write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    with pytest.raises(thud.InputError, match=words):
+        open_signals(path)
+    with pytest.raises(thud.InputError):
+        time_and_force(read_table(path))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("nanoseconds", "ns"), ("Newtons", "N"), ("KN", "kN"), ("µs", "us"), ("m·s^-2", ""),
+     ("m/s²", "m/s2"), ("m/(N s)", "m/(Ns)"), ("dB(A)", ""), ("dB re 20 µPa", "dB"), ("mn", "")],
+)  # fmt: skip
+def test_spellings_of_units(text: str, unit: str) -> None:
+    assert find_unit(text) == unit
+
+
+@pytest.mark.parametrize(("text", "time"), [("15:30,00", 930.0), ("15:30", 55_800.0)])
+def test_fractions_of_seconds_show_minutes(text: str, time: float) -> None:
+    assert seconds_of_day(text) == time
+
+
+@pytest.mark.parametrize("decimals", [4, 5])
+def test_exact_clock_shows_its_rate(decimals: int, tmp_path: Path) -> None:
+    path = tmp_path / "plate.csv"
+    rows = [
+        f"10:00:{i / 1e4:0{decimals + 3}.{decimals}f};{force:.3f}" for i, force in enumerate(PULSE)
+    ]
+    path.write_text("\n".join(["Clock;Force [N]", *rows]), encoding="utf-8")
+    (signal,) = open_signals(path)
+    assert signal.sample_rate == pytest.approx(1e4, rel=1e-9)
