@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import errno
 import json
 import pickle
 import re
@@ -11,32 +10,28 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import soundfile
-from conftest import REPOSITORY, contents, names_in, naming, recorded
+from conftest import REPOSITORY, names_in, naming, recorded
 from synthetic import half_sine, make_recording
 
 import thud
 from thud import cli
-from thud.base.errors import ReportWarning
-from thud.recordings import checkpoint, measure_drops
+from thud.recordings import measure_drops
 from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, checked_config, read_config
-from thud.recordings.measure_drops import measure_window
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.signal import Signal
-from thud.report import recording_files
 from thud.report.contents import report_data
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conftest import ErrorsOf
 
-    from thud.recordings.drops import Window
-    from thud.recordings.measured_drop import Drop
 
 FOLDER = REPOSITORY / "inputs/recordings"
 TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
@@ -113,7 +108,6 @@ def test_record_of_an_unknown_ball_cannot_be_decided(flagship: thud.Impact) -> N
         (["drop.wav", "--height", "-1"], naming("height", -1.0)),
         (["drop.wav", "--config", "no.toml"], naming("no.toml")),
         (["drop.wav", "--channel", "9"], naming("drop.wav", "channel", 9)),
-        (["drop.wav", "--workers", "0"], naming("workers", 0, 1, 1024)),
     ],
 )
 @pytest.mark.usefixtures("working_directory")
@@ -356,128 +350,11 @@ def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> Non
     assert (tmp_path / "out/report.json").exists()
 
 
-def test_interrupted_measurement_goes_on_where_it_ended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
-    folder = tmp_path / "results"
-    monkeypatch.setattr(checkpoint, "INTERVAL", -1.0)
-    measured: list[str] = []
-
-    def measure(window: Window, config: Config) -> Drop:
-        if len(measured) == 2:
-            raise KeyboardInterrupt
-        measured.append(window.name)
-        return measure_window(window, config)
-
-    monkeypatch.setattr(measure_drops, "measure_window", measure)
-    with pytest.raises(KeyboardInterrupt):
-        thud.read_recording(file, config=config, checkpoint=folder)
-    parts = sorted(folder.iterdir())
-    assert len(parts) == 2
-    # What is damaged or is no data is measured again, and nothing of it is called.
-    parts[0].write_bytes(pickle.dumps(Call(tmp_path / "called")))
-    measured.clear()
-    found = thud.read_recording(file, config=config, checkpoint=folder)
-    assert [name[-1] for name in measured] == ["1", "3"]
-    assert not (tmp_path / "results").exists()
-    assert not (tmp_path / "called").exists()
-    measured.clear()
-    with pytest.raises(KeyboardInterrupt):
-        thud.read_recording(file, config=config, checkpoint=folder)
-    measured.clear()
-    with pytest.raises(KeyboardInterrupt):
-        thud.read_recording(file, config=replace(config, mass=2.4), checkpoint=folder)
-    assert len(measured) == 2
-    measured.clear()
-    monkeypatch.setattr(measure_drops, "measure_window", measure_window)
-    whole = thud.read_recording(file, config=config)
-    assert [one.contact_time for one in found.drops] == [one.contact_time for one in whole.drops]
-    np.testing.assert_array_equal(found.levels(), whole.levels())
-
-
-def test_drops_that_cannot_be_kept_at_an_interrupt_are_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (drop,) = recorded(thud.solve()).drops
-    signal = Signal.from_array(drop.force, drop.sample_rate)
-
-    def fail(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(checkpoint, "replace_file", fail)
-
-    def measure() -> None:
-        with checkpoint.Checkpoint(tmp_path) as drops:
-            drops.open(signal, Config())
-            drops.add(0, drop)
-            raise KeyboardInterrupt
-
-    with (
-        pytest.warns(ReportWarning, match=naming(tmp_path, "No space left")) as told,
-        pytest.raises(KeyboardInterrupt),
-    ):
-        measure()
-    assert len(told) == 1
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
-def test_measurement_interrupted_in_its_report_is_not_measured_again(
-    error: type[BaseException] | BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    file, config = FOLDER / "three_drops.flac", str(FOLDER / "lab.toml")
-    command = ["measure", str(file), "--config", config, "--quiet", "--no-figures", "-o"]
-    measured: list[str] = []
-
-    def measure(window: Window, config: Config) -> Drop:
-        measured.append(window.name)
-        return measure_window(window, config)
-
-    def stop(*_: object) -> None:
-        raise error
-
-    monkeypatch.setattr(measure_drops, "measure_window", measure)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recording_files, "levels_csv", stop)
-        assert cli.main([*command, str(tmp_path / "out")]) != 0
-    assert len(measured) == 3
-    assert cli.main([*command, str(tmp_path / "out")]) == 0
-    assert len(measured) == 3
-    # The results have the bits of a measurement in one piece, and nothing else is left.
-    assert cli.main([*command, str(tmp_path / "whole")]) == 0
-    assert len(measured) == 6
-    written = contents(tmp_path / "whole")
-    found = contents(tmp_path / "out")
-    # HDF5 holds times of its own.
-    assert written.keys() == found.keys()
-    for name in written.keys() - {"recording.nc"}:
-        assert found[name] == written[name]
-
-
-class Call:
-    """Something that is called when a pickle is read."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Return what is called, and its arguments."""
-        return Path.touch, (self.path,)
-
-
 def test_drops_hold_no_more_than_their_force() -> None:
     recording = thud.read_recording(FOLDER / "three_drops.flac", config=FOLDER / "lab.toml")
     for drop in recording.drops:
         known = 3 * drop.force.nbytes + drop.contact.covariance.nbytes
         assert len(pickle.dumps(drop)) < known + 20_000
-
-
-def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
-    monkeypatch.setattr(measure_drops, "MIN_FOR_POOL", 1)
-    one, two = (thud.read_recording(file, config=config, workers=n) for n in (1, 2))
-    assert [drop.name for drop in two.drops] == [drop.name for drop in one.drops]
-    np.testing.assert_allclose(two.levels(), one.levels(), rtol=0, atol=1e-9)
 
 
 def test_outliers_of_all_quantities_are_marked() -> None:

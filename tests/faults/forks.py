@@ -210,14 +210,12 @@ def _be_humble() -> None:
 
 
 def _log_work() -> None:
-    """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
+    """Make blocks small, wait shortly, freeze the date, write down what is kept."""
     from thud.impact import datasets
-    from thud.recordings import checkpoint
     from thud.studies import backends, blocks, samples
 
     samples._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
     backends.WORKER_TIMEOUT, backends.CHECK_INTERVAL = 4.0, 0.5
-    checkpoint.INTERVAL = 0.0
 
     class Frozen(datasets.datetime):  # type: ignore[name-defined, misc]
         @classmethod
@@ -241,7 +239,6 @@ def _log_work() -> None:
         setattr(kind, name, log)
 
     logged(blocks.Blocks, "keep")
-    logged(checkpoint.Checkpoint, "add")
 
 
 def _serve() -> None:

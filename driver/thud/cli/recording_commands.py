@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,7 +34,6 @@ MAX_PRINTED = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.read_recording import read_recording
     from thud.report import recording_files
 
@@ -45,34 +43,30 @@ def measure(options: argparse.Namespace) -> int:
     )
     files.require(recording_files.file_names(figures=figures))
     folder = files.folder
-    # Measured drops are kept until the results are written.
-    with Checkpoint(folder) as checkpoint:
-        recording = read_recording(
-            options.recordings,
-            height=options.height,
-            mass=options.mass,
-            height_uncertainty=options.height_uncertainty,
-            mass_uncertainty=options.mass_uncertainty,
-            source=options.source,
-            channel=channel_of(options.channel),
-            channels=options.channels,
-            unit=options.unit,
-            calibration=_single(options.calibration),
-            calibration_uncertainty=options.calibration_uncertainty,
-            polarity=options.polarity,
-            sample_rate=options.sample_rate,
-            drops=options.drops,
-            leave_out=_left_out(options) or None,
-            begin=options.begin,
-            end=options.end,
-            low_pass=options.low_pass or None,
-            config=options.config,
-            progress=shows_progress(quiet=options.quiet),
-            workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
-            checkpoint=checkpoint,
-        )
-        verdict = recording.assess()
-        recording_files.save(recording, files, figures=figures)
+    recording = read_recording(
+        options.recordings,
+        height=options.height,
+        mass=options.mass,
+        height_uncertainty=options.height_uncertainty,
+        mass_uncertainty=options.mass_uncertainty,
+        source=options.source,
+        channel=channel_of(options.channel),
+        channels=options.channels,
+        unit=options.unit,
+        calibration=_single(options.calibration),
+        calibration_uncertainty=options.calibration_uncertainty,
+        polarity=options.polarity,
+        sample_rate=options.sample_rate,
+        drops=options.drops,
+        leave_out=_left_out(options) or None,
+        begin=options.begin,
+        end=options.end,
+        low_pass=options.low_pass or None,
+        config=options.config,
+        progress=shows_progress(quiet=options.quiet),
+    )
+    verdict = recording.assess()
+    recording_files.save(recording, files, figures=figures)
     if not options.quiet:
         rows = recording_files.drop_table(recording)
         print_results(format_rows(rows[: MAX_PRINTED + 1]))
@@ -173,16 +167,12 @@ MEASURE = Command(
             action="store_true",
             help="compute levels of the force low-passed at 1.25 kHz",
         ),
-        argument(
-            "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
-        ),
         *output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
         NO_FIGURES,
         QUIET,
     ),
     measure,
-    "run the command again to continue: measured drops are kept",
 )
 
 

@@ -27,7 +27,6 @@ from thud.recordings.recorded_levels import average_levels, compare_methods, mea
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterable
 
     import pandas as pd
@@ -38,7 +37,6 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
     from thud.level.assessment import Verdict
     from thud.level.estimate import Estimate
-    from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.measure_drops import Origin
     from thud.recordings.measured_drop import Drop
     from thud.recordings.outliers import Outlier
@@ -131,19 +129,13 @@ class Recording(Displayed):
         config: Config,
         *,
         progress: bool = False,
-        workers: int = 1,
-        checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
         """Measure the drops of signals; the other arguments are those of `read_recording`.
 
         Raise InputError if a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
-            signals,
-            checked_config(config),
-            progress=progress,
-            workers=workers,
-            checkpoint=checkpoint,
+            signals, checked_config(config), progress=progress
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)
