@@ -23,7 +23,12 @@ from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.polarity import check_peak, scan
-from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
+from thud.recordings.recorded_levels import (
+    average_levels,
+    compare_methods,
+    mean_force,
+    measure_levels,
+)
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -305,6 +310,14 @@ class Recording(Displayed):
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol
         """Return the corrected force of the first drop, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
+
+    def mean_force(self) -> NDArray[np.float64]:
+        """Return the force whose one-third-octave levels are those of the recording, N, shape (n,).
+
+        It has the mean energy of the drops within their gates without that of the noise, and the
+        phase of the first drop.
+        """
+        return mean_force(self.drops, self.average("third").level)
 
     def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - of the protocol
         """Return the mean maximum force, N."""
