@@ -273,7 +273,7 @@ class Recording(Displayed):
 
     @property
     def not_stated(self) -> tuple[str, ...]:
-        """What has an uncertainty that is not stated, so that no budget includes it."""
+        """What has an uncertainty that is not stated: what it affects is undecided."""
         config = self.config
         plate, stated = config.resonance, config.recorder_filter
         missing = {
@@ -355,7 +355,9 @@ class Recording(Displayed):
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
         """Contact time, restitution, peak count, mass and drop height with their budgets."""
-        return drop_estimates(self.drops, self.config, self.calibration_uncertainty)
+        return drop_estimates(
+            self.drops, self.config, self.calibration_uncertainty, self.not_stated
+        )
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
@@ -372,6 +374,7 @@ class Recording(Displayed):
                 self.average(bands),
                 self.calibration_uncertainty,
                 assumed_contributions(self.drops, self.config, bands),
+                self.not_stated,
             )
         return self._level_estimates[bands]
 
