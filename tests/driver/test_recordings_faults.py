@@ -159,7 +159,7 @@ def test_spikes_in_a_contact_are_filled(rate: float, size: float, count: int, af
     (drop,) = found.drops
     summary = f"1 spikes of {1e3 * count / rate:.3g} ms in all"
     assert f"{summary} were filled by linear interpolation" in drop.steps
-    assert f"the contact has {summary}" in drop.warnings
+    assert f"the record has {summary}" in drop.warnings
     # A line over three samples at 8 kHz.
     np.testing.assert_allclose(found.levels(), expected.levels(), rtol=0, atol=0.05)
 

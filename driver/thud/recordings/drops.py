@@ -334,6 +334,12 @@ def _assign_bounces(pulses: list[_Pulse], rate: float) -> tuple[list[_Pulse], li
             drops[-1].bounces.append(pulse)
             flight = gap
         else:
+            if before is not None and MIN_FLIGHT < gap < 1.02 * flight:
+                pulse.warnings.append(
+                    f"the pulse begins {gap:.2f} s after the one before it, as a bounce would, and "
+                    f"has {pulse.peak / before.peak:.2f} times its peak: if it is its bounce, the "
+                    "amplifier rounds the force off, and all levels are wrong"
+                )
             drops.append(pulse)
             flight = MAX_FLIGHT
         before = pulse

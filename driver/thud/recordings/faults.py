@@ -14,6 +14,7 @@ from thud.base.checks import refuse
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.recordings.contact import Contact
     from thud.recordings.drops import Window
     from thud.recordings.signal import Signal
 
@@ -63,8 +64,22 @@ MIN_SPIKE_RATIO = 4.0
 MIN_SPIKE_DEVIATIONS = 8.0
 MIN_SPIKE = 0.005
 CLEAN = (5, 12)
-# Time before and after the contact that is searched for spikes, s.
-SPIKE_MARGIN = 3e-3
+# Time before and after the contact that is searched for spikes, s, and time within which they count
+# as those of the contact.
+SPIKE_MARGIN = 0.12
+CONTACT_MARGIN = 3e-3
+# Minimum number of different values of a contact over the period of a bit that may be missing.
+MIN_VISITS = 4
+# Fraction of equal neighbors in noise of more than a quantization step, and fraction of a constant
+# background from which it is no dropout.
+MAX_EQUAL = 0.4
+MAX_CONSTANT = 0.5
+# Distance of the lines through four samples on either side, their mean at the middle; distance from
+# first touch and release, s, where forces have kinks and jumps, and minimum ratio to the distances
+# around it.
+JUMP = np.array([-0.2, 0.1, 0.4, 0.7, -0.7, -0.4, -0.1, 0.2])
+JUMP_MARGIN = 5e-4
+MIN_JUMP_RATIO = 3.0
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
@@ -89,6 +104,7 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         # The recorded force is repaired; its correction rings next to a fault.
         return force, (), ()
     refuse_clipped(window, force)
+    _refuse_missing_codes(window, force)
     return fill_dropouts(window, force)
 
 
@@ -131,6 +147,28 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         )
 
 
+def _refuse_missing_codes(window: Window, record: NDArray[np.float64]) -> None:
+    """Raise InputError if half of the values of a converter never occur in the contact.
+
+    These are the values in which a bit is set, or not set, of all within its period. A smooth force
+    may well leave out values.
+    """
+    step, force = window.quantization.step, record[slice(*window.contact)]
+    if not step or _deviation(force) < step:
+        return
+    codes = np.unique(np.rint((force - force.min()) / step).astype(np.int64))
+    period = 4
+    while MIN_VISITS * period < len(codes):
+        occupied = len(np.unique(codes % period))
+        if occupied <= period // 2:
+            refuse(
+                f"{window.name}: of {period} successive values of the converter, {step:.3g} N "
+                f"apart, {period - occupied} never occur",
+                "a converter without missing codes",
+            )
+        period *= 2
+
+
 def fill_dropouts(
     window: Window, force: NDArray[np.float64], peak: float | None = None
 ) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
@@ -155,18 +193,83 @@ def fill_dropouts(
         for name, bad in (("dropouts", dropouts), ("spikes", spikes))
         if bad.any()
     ]
-    if np.count_nonzero(dropouts | spikes) > MAX_REPAIRED * rate:
+    margin = int(CONTACT_MARGIN * rate)
+    near = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
+    if np.count_nonzero((dropouts | spikes)[near]) > MAX_REPAIRED * rate:
         refuse(
-            f"{window.name}: the contact has {' and '.join(summaries)}",
+            f"{window.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
         )
     return (
         filled,
         tuple(f"{summary} were filled by linear interpolation" for summary in summaries),
         (
-            *(f"the contact has {summary}" for summary in summaries),
+            *(f"the record has {summary}" for summary in summaries),
+            *check_constant(window, force),
             *_check_top(window, filled[slice(*window.contact)] - offset),
         ),
+    )
+
+
+def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return a warning if the background is constant, at least in part, and the contact noisy.
+
+    Raise InputError if the force is held over first touch or release.
+    """
+    rate, (first, stop) = window.sample_rate, window.contact
+    contact, step = force[first:stop], window.quantization.step
+    if not _deviation(contact) > max(step, MIN_NOISE * float(np.ptp(contact))):
+        return ()
+    least = math.log(len(force) / MAX_CHANCE) / -math.log(MAX_EQUAL) if step else MIN_CLIPPED
+    starts, lengths = _runs(force)
+    constant = lengths > max(least, MIN_BACKGROUND * rate)
+    if not constant.any():
+        return ()
+    starts, stops = starts[constant], (starts + lengths)[constant]
+    total = 1e3 * int((stops - starts).sum()) / rate
+    inside = (stops > first) & (starts < stop)
+    outside = len(force) - (stop - first)
+    if inside.any() and total < MAX_CONSTANT * 1e3 * outside / rate:
+        refuse(
+            f"{window.name}: the force is held for {total:.3g} ms at the contact while the samples "
+            "around it are noisy",
+            "a recording without lost samples",
+        )
+    return (
+        f"the background is constant for {total:.3g} ms while the force in the contact is noisy: "
+        "small forces are missing, as behind a gate, or samples are lost; offset, levels and "
+        "contact time may be wrong",
+    )
+
+
+def check_jumps(contact: Contact) -> tuple[str, ...]:
+    """Return a warning if the force jumps within a contact, away from first touch and release.
+
+    A jump is the distance between the lines through the four samples before and after it.
+    """
+    rate, force = contact.sample_rate, contact.gated
+    jump = np.abs(np.convolve(force, JUMP, mode="valid"))
+    margin = JUMP_MARGIN * rate
+    start = contact.gate[0] - len(JUMP) // 2
+    first = max(int(contact.touch.value * rate + margin) - start, len(JUMP)) - len(JUMP)
+    stop = int(contact.release.value * rate - margin) - start - len(JUMP)
+    if stop - first < 2 * len(JUMP):
+        return ()
+    near, far = CLEAN
+    extended = np.pad(jump, far, mode="edge")
+    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
+    around = np.maximum(largest[: len(jump)], largest[-len(jump) :])
+    limit = np.maximum(
+        MIN_JUMP_RATIO * around,
+        max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step),
+    )
+    found = np.flatnonzero(jump[first:stop] > limit[first:stop]) + first
+    if not found.size:
+        return ()
+    size = float(jump[found].max())
+    return (
+        f"the force jumps by {size:.3g} N within the contact: packets or samples are lost or "
+        "exchanged, or a contact is loose; levels and contact time may be wrong",
     )
 
 
