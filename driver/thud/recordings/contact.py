@@ -135,17 +135,16 @@ class Contact(Immutable):
     def white_variance(self) -> float:
         """Variance of the white noise of a sample in the gate, N2.
 
-        It is that of the background, or that of the differences of the force of order
-        `NOISE_ORDER` if these exceed it clearly: noise may grow with the force. At low rates they
-        are those of the force itself.
+        It is that of the background, or the largest of the thirds of the gate by differences of
+        the order `NOISE_ORDER`, if that exceeds it clearly: noise may grow with the force. At low
+        rates the differences are those of the force itself.
         """
         background = float(self.background.variances[0]) * self.sample_rate / 2
         if self.sample_rate < MIN_NOISE_RATE or len(self.gated) < MIN_NOISE_SAMPLES:
             return background
         differences = np.abs(np.diff(self.gated, NOISE_ORDER))
-        variance = (1.4826 * float(np.median(differences))) ** 2 / comb(
-            2 * NOISE_ORDER, NOISE_ORDER
-        )
+        medians = [np.median(third) for third in np.array_split(differences, 3)]
+        variance = (1.4826 * float(max(medians))) ** 2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
         return variance if variance > MIN_INCREASE * background else background
 
     @cached_property

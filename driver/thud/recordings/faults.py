@@ -25,6 +25,8 @@ MIN_SAMPLES = 4
 # is lower by more than MIN_FALL quantization steps. At a smooth top it is lower by 4.
 MIN_CLIPPED = 4
 MIN_FALL = 12.0
+# It is no clipping if samples are equal elsewhere for 1/MAX_ELSEWHERE of the time.
+MAX_ELSEWHERE = 2
 # The force, averaged over SMOOTHING, s, is flat at its top if it is above (1 - a) of its maximum
 # almost as long as above (1 - 4 a). The ratio of the times is 1 for a top that an amplifier clips,
 # 1.41 and at least 1.22 for tops of fourth order with one and two maxima, and 2 for parabolas.
@@ -98,7 +100,11 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         )
     for warning in window.warnings:
         if warning.startswith("two impacts"):
-            refuse(f"{name}: {warning}", "one impact, with background before and after it")
+            refuse(
+                f"{name}: {warning}",
+                "one impact, with background before and after it; --leave-out (leave_out) with the "
+                "number of this drop, or --from and --to (begin, end) without it",
+            )
     force = window.force
     if window.chain is not None:
         # The recorded force is repaired; its correction rings next to a fault.
@@ -135,7 +141,12 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         force[max(start - distance, 0)],
         force[min(start + length - 1 + distance, len(force) - 1)],
     ]
-    clipped = length >= MIN_CLIPPED and top - max(neighbors) > MIN_FALL * step
+    # Samples that are held, or the median of several, are equal elsewhere, too.
+    quiet = record[: max(first - int(MIN_BACKGROUND * window.sample_rate), 1)]
+    is_noisy = float(np.ptp(quiet)) > MIN_FALL * step
+    elsewhere = max(lengths[~at_top].max(initial=0), _runs(quiet)[1].max() if is_noisy else 0)
+    falls = top - max(neighbors) > MIN_FALL * step
+    clipped = length >= MIN_CLIPPED and falls and length > MAX_ELSEWHERE * elsewhere
     if window.signal.full_scale is not None:
         at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
@@ -196,6 +207,13 @@ def fill_dropouts(
     margin = int(CONTACT_MARGIN * rate)
     near = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
     if np.count_nonzero((dropouts | spikes)[near]) > MAX_REPAIRED * rate:
+        group = int(np.median(_runs(force[slice(*window.contact)])[1]))
+        if group >= MIN_FROZEN:
+            refuse(
+                f"{window.name}: {group} samples each are equal: the record was drawn up from "
+                f"{rate / group:g} Hz",
+                f"each sample once, at {rate / group:g} Hz",
+            )
         refuse(
             f"{window.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
@@ -220,8 +238,11 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...
     contact, step = force[first:stop], window.quantization.step
     if not _deviation(contact) > max(step, MIN_NOISE * float(np.ptp(contact))):
         return ()
-    least = math.log(len(force) / MAX_CHANCE) / -math.log(MAX_EQUAL) if step else MIN_CLIPPED
     starts, lengths = _runs(force)
+    short = lengths[lengths <= MIN_BACKGROUND * rate]
+    # As many neighbors are equal by quantization or by a median filter.
+    equal = max(MAX_EQUAL if step else 0.01, 1 - len(short) / max(short.sum(), 1))
+    least = math.log(len(force) / MAX_CHANCE) / -math.log(min(equal, 0.99))
     constant = lengths > max(least, MIN_BACKGROUND * rate)
     if not constant.any():
         return ()
@@ -235,11 +256,12 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...
             "around it are noisy",
             "a recording without lost samples",
         )
-    return (
+    warning = (
         f"the background is constant for {total:.3g} ms while the force in the contact is noisy: "
         "small forces are missing, as behind a gate, or samples are lost; offset, levels and "
-        "contact time may be wrong",
+        "contact time may be wrong"
     )
+    return (warning,)
 
 
 def check_jumps(contact: Contact) -> tuple[str, ...]:
@@ -249,13 +271,14 @@ def check_jumps(contact: Contact) -> tuple[str, ...]:
     """
     rate, force = contact.sample_rate, contact.gated
     jump = np.abs(np.convolve(force, JUMP, mode="valid"))
-    margin = JUMP_MARGIN * rate
-    start = contact.gate[0] - len(JUMP) // 2
-    first = max(int(contact.touch.value * rate + margin) - start, len(JUMP)) - len(JUMP)
-    stop = int(contact.release.value * rate - margin) - start - len(JUMP)
-    if stop - first < 2 * len(JUMP):
-        return ()
     near, far = CLEAN
+    # The jump at an index is between the samples half the kernel behind it.
+    margin = JUMP_MARGIN * rate + far
+    start = contact.gate[0] + len(JUMP) // 2
+    first = max(int(contact.touch.value * rate + margin) - start, 0)
+    stop = int(contact.release.value * rate - margin) - start
+    if stop <= first:
+        return ()
     extended = np.pad(jump, far, mode="edge")
     largest = sliding_window_view(extended, far - near + 1).max(axis=1)
     around = np.maximum(largest[: len(jump)], largest[-len(jump) :])
@@ -267,10 +290,11 @@ def check_jumps(contact: Contact) -> tuple[str, ...]:
     if not found.size:
         return ()
     size = float(jump[found].max())
-    return (
+    warning = (
         f"the force jumps by {size:.3g} N within the contact: packets or samples are lost or "
-        "exchanged, or a contact is loose; levels and contact time may be wrong",
+        "exchanged, or a contact is loose; levels and contact time may be wrong"
     )
+    return (warning,)
 
 
 def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
@@ -337,16 +361,25 @@ def _find_dropouts(
     is_background = np.abs(pulse[starts]) < limit / 2
     jumps = (before > limit).astype(int) + (after > limit)
     frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    held = _is_held(pulse, lengths, window.quantization.step, peak) & ~is_background
+    quiet = np.diff(force[: max(first - 2 * margin, 1)]) == 0
+    held = _is_held(pulse, lengths, window.quantization.step, peak, quiet) & ~is_background
     lost[first:stop] = np.repeat(zero | frozen | held, lengths)
     return lost
 
 
 def _is_held(
-    force: NDArray[np.float64], lengths: NDArray[np.intp], step: float, peak: float
+    force: NDArray[np.float64],
+    lengths: NDArray[np.intp],
+    step: float,
+    peak: float,
+    quiet: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return whether runs of equal samples are too long for the noise and the step, N."""
+    """Return whether runs of equal samples are too long for the noise and the step, N.
+
+    `quiet` is whether neighbors in the background are equal, as many are behind a median filter.
+    """
     equal = max(1 - len(lengths) / len(force), 1 / len(force))
+    equal = max(equal, float(quiet.mean()) if quiet.size else 0.0)
     # Without noise, the force may stay within a step.
     has_noise = _deviation(force) > max(step / 2, MIN_NOISE * peak)
     return has_noise & (len(force) * equal ** (lengths - 1.0) < MAX_CHANCE)
