@@ -142,9 +142,10 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         force[min(start + length - 1 + distance, len(force) - 1)],
     ]
     # Samples that are held, or the median of several, are equal elsewhere, too.
-    quiet = record[: max(first - int(MIN_BACKGROUND * window.sample_rate), 1)]
+    quiet = record[: max(first // 2, 1)]
     is_noisy = float(np.ptp(quiet)) > MIN_FALL * step
-    elsewhere = max(lengths[~at_top].max(initial=0), _runs(quiet)[1].max() if is_noisy else 0)
+    beside = ~at_top & (force[starts] > (top + force.min()) / 2)
+    elsewhere = max(lengths[beside].max(initial=0), _runs(quiet)[1].max() if is_noisy else 0)
     falls = top - max(neighbors) > MIN_FALL * step
     clipped = length >= MIN_CLIPPED and falls and length > MAX_ELSEWHERE * elsewhere
     if window.signal.full_scale is not None:
