@@ -147,7 +147,7 @@ class Contact(Immutable):
         variance = (1.4826 * float(max(medians))) ** 2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
         return variance if variance > MIN_INCREASE * background else background
 
-    @cached_property
+    @property
     def quiet_gates(self) -> NDArray[np.float64]:
         """Background in sections of the length of the gate on both sides, N, [n_section, n]."""
         first, count = self.span[0], len(self.gated)
