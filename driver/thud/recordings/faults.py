@@ -272,19 +272,15 @@ def check_jumps(contact: Contact) -> tuple[str, ...]:
     """
     rate, force = contact.sample_rate, contact.gated
     jump = np.abs(np.convolve(force, JUMP, mode="valid"))
-    near, far = CLEAN
     # The jump at an index is between the samples half the kernel behind it.
-    margin = JUMP_MARGIN * rate + far
+    margin = JUMP_MARGIN * rate + CLEAN[1]
     start = contact.gate[0] + len(JUMP) // 2
     first = max(int(contact.touch.value * rate + margin) - start, 0)
     stop = int(contact.release.value * rate - margin) - start
     if stop <= first:
         return ()
-    extended = np.pad(jump, far, mode="edge")
-    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
-    around = np.maximum(largest[: len(jump)], largest[-len(jump) :])
     limit = np.maximum(
-        MIN_JUMP_RATIO * around,
+        MIN_JUMP_RATIO * _largest_around(jump),
         max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step),
     )
     found = np.flatnonzero(jump[first:stop] > limit[first:stop]) + first
@@ -332,6 +328,14 @@ def _deviation(force: NDArray[np.float64]) -> float:
     """Return the standard deviation of the white noise of a force, N, by its median."""
     deviation = np.convolve(force, DIFFERENCE, mode="valid")
     return 1.4826 * float(np.median(np.abs(deviation))) / math.sqrt(float(DIFFERENCE @ DIFFERENCE))
+
+
+def _largest_around(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest of the values CLEAN samples before and after each one."""
+    near, far = CLEAN
+    extended = np.pad(values, far, mode="edge")
+    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
+    return np.asarray(np.maximum(largest[: len(values)], largest[-len(values) :]))
 
 
 def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -396,15 +400,11 @@ def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDA
     from_cubic = np.abs(np.convolve(padded, DIFFERENCE, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
-    near, far = CLEAN
-    extended = np.pad(from_cubic, far, mode="edge")
-    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
-    around = np.maximum(largest[: len(part)], largest[-len(part) :])
     usual = 1.4826 * float(np.median(from_cubic))
     least = max(
         MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
     )
-    limit = np.maximum(MIN_SPIKE_RATIO * around, least)
+    limit = np.maximum(MIN_SPIKE_RATIO * _largest_around(from_cubic), least)
     spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
     return spikes
 
