@@ -191,12 +191,12 @@ class Outcome:
 
     @property
     def material(self) -> list[int]:
-        """Indices of the errors that matter and exceed their uncertainty by far."""
+        """Indices of the errors that matter and exceed their expanded uncertainty."""
         limits = (*[LEVEL] * (len(self.errors) - 1), CONTACT)
         return [
             k
             for k, (error, u) in enumerate(zip(self.errors, self.expanded, strict=True))
-            if abs(error) > max(limits[k], 1.5 * u)
+            if abs(error) > max(limits[k], u)
         ]
 
     @property
