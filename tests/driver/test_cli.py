@@ -213,7 +213,7 @@ def test_measurement_and_run_that_nobody_reads_have_their_results(
     drop = REPOSITORY / "inputs/recordings/drop_1.wav"
     calls = [f"{executable} {case} -o out"]
     if command == "thud-driver":
-        measure = f"measure {drop} --calibration '5000 N/FS' --workers 1 --no-figures -o out"
+        measure = f"measure {drop} --calibration '5000 N/FS' --no-figures -o out"
         calls = [f"{sys.executable} -m thud {measure}"]
     for screen in (">&-", "| true"):
         shell = f"{{ {calls[0]} 2> errors; echo $? > code; }} {screen}"

@@ -540,7 +540,9 @@ RECORDINGS = REPOSITORY / "inputs/recordings"
 def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: TestClient) -> None:
     content = (RECORDINGS / "drop_1.csv").read_bytes()
     truth = tomllib.loads((RECORDINGS / "truth.toml").read_text())["drop"][0]
-    fields = {"name": "drop_1.csv", "height": 1, "mass": 2.5}
+    fields = {
+        "name": "drop_1.csv", "height": 1, "mass": 2.5, "calibration_uncertainty": 0.1,
+    }  # fmt: skip
     answer = measured(client, content, **fields)["answer"]
     octave = answer["criteria"][4]
     # The plate lifts the level, but the range holds the truth: nothing is decided.
@@ -557,7 +559,7 @@ def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: Tes
     answer = measured(client, content, **fields, **asked["values"])["answer"]
     assert answer["headline"]["result"] == "undecided"
     assert [ask["values"] for ask in answer["asks"]] == [{"plate_share": ""}]
-    stated = asked["values"] | {"plate_share": 1}
+    stated = asked["values"] | {"plate_share": 1, "plate_f0_uncertainty": 0.1}
     answer = measured(client, content, **fields, **stated)["answer"]
     octave = answer["criteria"][4]
     assert octave["value"] == pytest.approx(truth["levels"][4], abs=0.1)
@@ -566,22 +568,26 @@ def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: Tes
     assert answer["asks"] == []
 
 
-def test_warning_that_can_change_the_verdict_stands_open(client: TestClient) -> None:
+def test_calibration_that_is_not_stated_leaves_the_verdict_undecided(client: TestClient) -> None:
     query: dict[str, Any] = {
         "name": "drop.csv", "height": 1, "mass": 2.5, "plate_f0": 1100, "plate_Q": 25,
+        "plate_share": 1, "plate_f0_uncertainty": 0.01,
     }  # fmt: skip
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
-    answer = measured(client, content, **query, plate_share=1)["answer"]
-    level = next(entry for entry in answer["criteria"] if entry["name"] == "500 Hz")
-    distance = level["lower"] - level["value"] - level["uncertainty"]
-    (calibration,) = answer["open_warnings"]
-    # The error that moves 500 Hz to its limit.
-    error = float(
-        re.search(r"an error of ([\d.]+) % changes the verdict on 500 Hz", calibration)[1]
-    )  # type: ignore[index]
-    assert 20 * np.log10(1 + error / 100) == pytest.approx(distance, abs=0.02)
-    stated = {"plate_share": 1, "calibration_uncertainty": 1}
-    assert measured(client, content, **query | stated)["answer"]["open_warnings"] == []
+    answer = measured(client, content, **query)["answer"]
+    assert answer["headline"]["result"] == answer["verdict"] == "undecided"
+    assert "uncertainty of calibration not stated" in answer["headline"]["text"]
+    # The uncertainty that the headline names for 500 Hz is the largest that decides it.
+    detail = answer["headline"]["detail"]
+    found = re.search(r"500 Hz does not conform up to ([\d.]+) % of calibration", detail)
+    assert found
+    verdicts = [
+        measured(client, content, **query, calibration_uncertainty=factor * float(found[1]))[
+            "answer"
+        ]["criteria"][4]["verdict"]
+        for factor in (0.9, 1.1)
+    ]
+    assert verdicts == ["does not conform", "undecided"]
 
 
 def test_share_of_the_plate_that_is_not_stated_leaves_the_verdict_undecided(
@@ -589,6 +595,8 @@ def test_share_of_the_plate_that_is_not_stated_leaves_the_verdict_undecided(
 ) -> None:
     query: dict[str, Any] = {
         "name": "drop.csv", "height": 1, "mass": 2.5, "plate_f0": 1100, "plate_Q": 25,
+        "height_uncertainty": 0.002, "mass_uncertainty": 0.01, "calibration_uncertainty": 0.01,
+        "plate_f0_uncertainty": 0.01,
     }  # fmt: skip
     content = (RECORDINGS / "drop_1.csv").read_bytes()
     answers = {

@@ -307,7 +307,7 @@ RESPONSE = (
         (["run", str(INPUTS[0])], ["force.csv", "summary.nml"]),
         (["compare", *STEPS], ["comparison.html"]),
         (["measure", str(REPOSITORY / "inputs/recordings/drop_1.wav"), "--calibration",
-          "5000 N/FS", "--workers", "1"], ["levels.csv", "report.json", "report.html"]),
+          "5000 N/FS"], ["levels.csv", "report.json", "report.html"]),
         (["floor", *FLOORS], ["floors.html"]),
         (["rate", str(REPOSITORY / "inputs/floors/field_levels.csv")], []),
         (["mobility", "response.csv"], []),

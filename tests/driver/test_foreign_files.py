@@ -56,7 +56,7 @@ WRITERS = {
     "run": Writer(["run", "case.nml"], {"case.nml": MINIMAL}),
     "compare": Writer(["compare", "case.nml"], {"case.nml": MINIMAL}),
     "measure": Writer(
-        ["measure", "drop.csv", "--config", "lab.toml", "--workers", "1"],
+        ["measure", "drop.csv", "--config", "lab.toml"],
         {
             "drop.csv": (RECORDINGS / "drop_1.csv").read_bytes(),
             "lab.toml": 'laboratory = "Lab"',

@@ -140,6 +140,24 @@ def test_recording_is_predicted_as_the_impact_that_it_records(shell: thud.Impact
     assert found.level == pytest.approx(expected.level, abs=0.1)
 
 
+def test_room_hears_the_mean_of_the_drops_without_noise(shell: thud.Impact) -> None:
+    quiet = np.zeros(int(0.1 * shell.sample_rate))
+    drops = [np.concatenate([quiet, gain * shell.floor_force, quiet]) for gain in (0.9, 1.1)]
+    force = np.concatenate(drops)
+    force += np.random.default_rng(1).normal(scale=15.0, size=len(force))
+    recording = thud.Recording.from_array(force, shell.sample_rate, mass=2.5, height=1.0)
+    mean = thud.force_exposure_levels(recording.mean_force(), shell.sample_rate, "third")
+    assert mean == pytest.approx(recording.levels("third"), abs=0.01)
+    plate, room = thud.Plate(), thud.Room(length=5.0, width=4.0)
+    expected = thud.predict_level(shell, plate, room)
+    energy = 10 * np.log10((1.1**2 + 0.9**2) / 2)
+    error = thud.predict_level(recording, plate, room).level - expected.level - energy
+    # What the noise in the contact leaves, for which the levels have their uncertainty.
+    assert np.abs(error).max() < 0.5
+    heard = thud.modal_room(recording, plate, room).mean - energy
+    assert heard == pytest.approx(thud.modal_room(shell, plate, room).mean, abs=0.2)
+
+
 def test_implausibly_low_rating_raises_a_warning(shell: thud.Impact) -> None:
     floor = thud.Plate(thickness=0.3, screed_thickness=0.08, layer_stiffness=6.0e6)
     quiet = thud.predict_level(shell, floor, thud.Room(ceiling_mass=30.0, ceiling_depth=0.5))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY, naming, python
 from recording_files import WRITERS, half_sine
+from scipy.ndimage import median_filter
 
 import thud
 from thud.base.errors import InputError
@@ -66,7 +67,7 @@ def test_spikes_in_a_contact_are_filled(rate: float, size: float, count: int, af
     (drop,) = found.drops
     summary = f"1 spikes of {1e3 * count / rate:.3g} ms in all"
     assert f"{summary} were filled by linear interpolation" in drop.steps
-    assert f"the contact has {summary}" in drop.warnings
+    assert f"the record has {summary}" in drop.warnings
     # A line over three samples at 8 kHz.
     np.testing.assert_allclose(found.levels(), expected.levels(), rtol=0, atol=0.05)
 
@@ -156,3 +157,47 @@ def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, re
     force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
     (drop,) = measured(force, 48e3).drops
     assert not any("dropouts" in step or "spikes" in step for step in drop.steps)
+
+
+def later(force: np.ndarray, share: float) -> np.ndarray:
+    """Return a force with a smaller one behind it."""
+    return np.concatenate([force, np.zeros(2 * len(force)), share * force])
+
+
+@pytest.mark.parametrize(
+    ("change", "present", "absent"),
+    [
+        (lambda f: median_filter(f, 25), "noise of the background ends", "clipped"),
+        (lambda f: np.repeat(f[::24], 24)[: len(f)], "24 samples each are equal", "clipped"),
+        (lambda f: f / 150, "unit = 'kN'", "probably wrong"),
+        (np.maximum.accumulate, "", "polarity"),
+        (lambda f: np.minimum(f, 1200), "clipped", "equal"),
+        (lambda f: later(f, 0.2), "below 0.25 of the highest peak", "bounce"),
+        (lambda f: f + np.roll(f, 420), "--leave-out", "clipped"),
+    ],
+    ids=["median", "hold", "10 N", "peak hold", "clipped", "small drop", "two impacts"],
+)
+def test_messages_name_the_cause_and_the_mend(
+    change: Callable[[np.ndarray], np.ndarray], present: str, absent: str
+) -> None:
+    force = change(drop_force(25.6e3))
+    try:
+        found = measured(force, 25.6e3)
+        said = " ".join((*found.warnings, *found.steps))
+    except InputError as error:
+        said = str(error)
+    assert present in said
+    assert absent not in said
+
+
+def test_inverted_load_cell_does_not_make_another_one_the_sum(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    shape = drop_force(25.6e3)
+    cells = [sign * shape / 4 + rng.normal(0, 0.3, len(shape)) for sign in (1, 1, 1, -1)]
+    rows = np.column_stack([np.arange(len(shape)) / 25.6e3, *cells])
+    header = "time_s,F1_N,F2_N,F3_N,F4_N"
+    np.savetxt(tmp_path / "cells.csv", rows, "%.9g", ",", header=header, comments="")
+    found = thud.read_recording(tmp_path / "cells.csv", channels="sum")
+    (warning,) = [text for text in found.warnings if "load cell" in text]
+    assert "F4" in warning
+    assert "sign" in warning

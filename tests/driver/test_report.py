@@ -218,7 +218,8 @@ def numbers(recording: Recording) -> list[list[str]]:
         has_budget = bool(decision.estimate.contributions) and not np.isnan(value)
         # LAB states no uncertainties: U lacks those of calibration, mass and height, at least
         # one of which matters to all but the contact time, and the scatter of a single drop.
-        is_known = recording.calibration_uncertainty is not None and len(recording.drops) > 1
+        is_stated = not decision.estimate.not_stated
+        is_known = is_stated and len(recording.drops) > 1
         is_complete = decision.name == "contact_time" or decision.name.startswith("octave")
         mark = "" if is_known and is_complete else " †"
         # Two significant digits of U decide.
@@ -231,7 +232,7 @@ def numbers(recording: Recording) -> list[list[str]]:
         cells.append(" to ".join(dict.fromkeys(limits)))
         if not (is_bound or is_count or np.isnan(value)):
             cells.append(f"{decision.margin / unit:.{places}f}")
-        if has_budget and not is_bound:
+        if has_budget and is_stated and not is_bound:
             risk = 100 * (1 - decision.probability)
             text = f"{risk:.{1 if risk >= 1 else 2}f} %" if risk >= 0.01 else "< 0.01 %"
             cells.append("> 99.9 %" if text == "100.0 %" else text)
@@ -726,11 +727,11 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
     assert lacking["mass"] == ["mass"]
     assert lacking["drop_height"] == ["drop height"]
     assert lacking["peak_count"] == []
-    note = (
-        "† U excludes, and the verdict treats as zero: calibration, mass, drop height (uncertainty "
-        "not stated); scatter between drops (unknown from one drop)."
+    note = uncertainty_text(one)
+    assert note.startswith(
+        "† U excludes calibration, mass, drop height (uncertainty not stated: undecided); scatter "
+        "between drops (unknown from one drop). Stated standard uncertainties that decide:"
     )
-    assert uncertainty_text(one) == note
     page = report_page(report_data(one), [], "")
     assert note in words_of(page)
     assert "U is incomplete where it is marked †" in words_of(page)

@@ -13,20 +13,18 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from multiprocessing import connection
 
 
 @contextmanager
-def process_pool(
-    n_process: int, prepare: Callable[[], object] | None = None
-) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of processes that call `prepare` first; an interrupt ends the processes."""
+def process_pool(n_process: int) -> Iterator[ProcessPoolExecutor]:
+    """Open a pool of processes; an interrupt ends the processes."""
     # Forked processes would inherit locks held by threads that they do not have.
     context = get_context("spawn")
     child_end, parent_end = context.Pipe(duplex=False)
-    start = (child_end, prepare)
-    with child_end, parent_end, ProcessPoolExecutor(n_process, context, _start, start) as processes:
+    pool = ProcessPoolExecutor(n_process, context, _start, (child_end,))
+    with child_end, parent_end, pool as processes:
         try:
             yield processes
         except KeyboardInterrupt:
@@ -44,7 +42,7 @@ def no_interrupt_in_processes() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous)
 
 
-def _start(pipe: connection.Connection, prepare: Callable[[], object] | None) -> None:
+def _start(pipe: connection.Connection) -> None:
     """Let this process exit when the parent ends or closes its end of the pipe."""
     # The default lock is a semaphore of the system, which would outlive such an exit.
     tqdm.set_lock(RLock())
@@ -54,5 +52,3 @@ def _start(pipe: connection.Connection, prepare: Callable[[], object] | None) ->
         os._exit(1)
 
     Thread(target=exit_with_parent, daemon=True).start()
-    if prepare:
-        prepare()

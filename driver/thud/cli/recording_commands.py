@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -65,7 +64,6 @@ def measure(options: argparse.Namespace) -> int:
         low_pass=options.low_pass or None,
         config=options.config,
         progress=shows_progress(quiet=options.quiet),
-        workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
     )
     verdict = recording.assess()
     recording_files.save(recording, files, figures=figures)
@@ -169,16 +167,12 @@ MEASURE = Command(
             action="store_true",
             help="compute levels of the force low-passed at 1.25 kHz",
         ),
-        argument(
-            "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
-        ),
         *output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
         NO_FIGURES,
         QUIET,
     ),
     measure,
-    "run the command again to continue: measured drops are kept",
 )
 
 

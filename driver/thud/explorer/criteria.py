@@ -103,7 +103,7 @@ def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
     """Return the title of the first undecided level and its largest contribution, if any."""
     for entry in verdict.criteria:
         parts = [part for part in entry.estimate.contributions if part.counted]
-        if entry.result == VERDICTS[2] and entry.unit == "dB" and parts:
+        if entry.result_if_stated == VERDICTS[2] and entry.unit == "dB" and parts:
             return entry.quantity.title, max(parts, key=lambda part: part.uncertainty).name
     return None
 
@@ -239,6 +239,9 @@ def _cause(criterion: Criterion) -> str:
         if _number(criterion, value) == _number(criterion, limit):
             shown = f"{quantity.show(value)} {quantity.display_unit}".rstrip()
         return f"{quantity.title} {shown}, {word} {limit * quantity.display_scale:g}"
+    if criterion.result_if_stated != criterion.result:
+        missing = " and ".join(criterion.estimate.not_stated)
+        return f"{quantity.title} {_shown(criterion, value)}, uncertainty of {missing} not stated"
     if not math.isfinite(expanded):
         return f"{quantity.title} {_shown(criterion, value)}, uncertainty not known"
     low, high = _number(criterion, value - expanded), _shown(criterion, value + expanded)

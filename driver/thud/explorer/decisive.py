@@ -12,9 +12,6 @@ if TYPE_CHECKING:
 
     from thud.level.assessment import Criterion
 
-# Errors of a calibration up to this fraction are common.
-CALIBRATION_ERROR = 0.05
-
 
 def decisive_warnings(effects: Mapping[str, float], criteria: Sequence[Criterion]) -> list[str]:
     """Return the warnings that can change the verdict on a level.
@@ -27,21 +24,8 @@ def decisive_warnings(effects: Mapping[str, float], criteria: Sequence[Criterion
     return [text for text, size in effects.items() if 0 < size >= distance]
 
 
-def calibration_warning(criteria: Sequence[Criterion]) -> str:
-    """Return a warning if a common error of a calibration changes the verdict on a level."""
-    levels = [entry for entry in criteria if entry.unit == "dB"]
-    closest = min(levels, key=_distance)
-    error = 10 ** (_distance(closest) / 20) - 1
-    if error >= CALIBRATION_ERROR:
-        return ""
-    return (
-        f"The uncertainty of the calibration is not stated: an error of {100 * error:.2g} % "
-        f"changes the verdict on {closest.quantity.title}."
-    )
-
-
 def _distance(criterion: Criterion) -> float:
     """Return the change of a level, dB, that changes its verdict; infinite if it is undecided."""
-    if criterion.result == VERDICTS[2]:
+    if criterion.result_if_stated == VERDICTS[2]:
         return math.inf
     return abs(criterion.margin) - criterion.estimate.expanded

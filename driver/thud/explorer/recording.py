@@ -11,7 +11,7 @@ from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import largest_contribution, recording_headline
-from thud.explorer.decisive import calibration_warning, decisive_warnings
+from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import TABLES, name_fields
 from thud.plot.impact_figures import contact_force
 from thud.recordings.assumptions import ASSUMED_SHARE
@@ -61,8 +61,6 @@ def answer_recording(
     prefix = f"{signals[0]}: " if len(signals) == 1 else ""
     answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
     open_warnings = decisive_warnings(recording.level_effects, verdict.criteria)
-    if "calibration" in recording.not_stated:
-        open_warnings += filter(None, [calibration_warning(verdict.criteria)])
     answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
     return answer
 

@@ -185,7 +185,7 @@ def positions_below(
     answer = ask(
         "modal_room",
         case=case_text(case),
-        force=source.force("floor"),
+        force=source.mean_force(),
         sample_rate=source.sample_rate,
         pressure=1.0,
         ball=_positions("balls", balls, size[:2]),

@@ -354,7 +354,7 @@ def predict_level(
     impact = _on_floor(source, floor_case)
     level = source.room_level
     if level is None or (floor, room) != (case.floor, case.room):
-        force = (impact or source).force("floor")
+        force = (impact or source).mean_force()
         answer = ask(
             "room_level", case=case_text(floor_case), force=force, sample_rate=source.sample_rate
         )

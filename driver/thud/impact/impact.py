@@ -203,6 +203,10 @@ class Impact(ImpactQuantities, Displayed):
         """Return the ``"floor"`` or ``"elastic"`` force, N, by default the assessed force."""
         return self.elastic_force if self.assessed_force(kind) == "elastic" else self.floor_force
 
+    def mean_force(self) -> NDArray[np.float64]:
+        """Return the force on the floor, N, shape (n_sample,)."""
+        return self.floor_force
+
     def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, N, by default of the assessed force."""
         return (

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 VERDICTS = ("conforms", "does not conform", "undecided")
 _MAX_PEAKS = 2**31
+_BISECTIONS = 40
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,8 +82,14 @@ class Criterion(Displayed):
     def result(self) -> str:
         """``"conforms"``, ``"does not conform"`` or ``"undecided"`` at 95 % confidence.
 
-        The guard band is the expanded uncertainty (JCGM 106). An upper bound cannot conform.
+        The guard band is the expanded uncertainty (JCGM 106). An upper bound cannot conform, and an
+        uncertainty that lacks a contribution which is not stated decides nothing.
         """
+        return VERDICTS[2] if self.estimate.not_stated else self.result_if_stated
+
+    @property
+    def result_if_stated(self) -> str:
+        """`result` if what is not stated contributed up to `allowance`."""
         value, expanded = self.value, self.estimate.expanded
         conforms, fails, undecided = VERDICTS
         if math.isnan(value) or not math.isfinite(expanded):
@@ -101,6 +108,22 @@ class Criterion(Displayed):
         return self.result == VERDICTS[0]
 
     @property
+    def allowance(self) -> float:
+        """Largest standard uncertainty by what is not stated with which `result_if_stated` holds.
+
+        Zero if that is undecided.
+        """
+        if self.result_if_stated == VERDICTS[2]:
+            return 0.0
+        # Half an interval is narrower than two standard uncertainties of any freedom.
+        low, high, distance = 0.0, abs(self.margin), abs(self.margin)
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            fits = self.estimate.widened(middle).expanded <= distance
+            low, high = (middle, high) if fits else (low, middle)
+        return low
+
+    @property
     def margin(self) -> float:
         """Distance of the value from the nearer limit; negative outside the range."""
         return min(self.value - self.lower, self.upper - self.value)
@@ -109,7 +132,7 @@ class Criterion(Displayed):
     def probability(self) -> float:
         """Probability that the true value lies within the limits (JCGM 106, 7.2)."""
         estimate = self.estimate
-        if estimate.upper_bound:
+        if estimate.upper_bound or estimate.not_stated:
             return math.nan
         if estimate.uncertainty == 0:
             return float(self.lower <= self.value <= self.upper)
@@ -201,8 +224,9 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     """Assess a source by the criteria of the standards, with the stated uncertainties at 95 %.
 
     A criterion conforms if the value and its expanded uncertainty lie within the limits, does not
-    conform if they lie outside, and is undecided otherwise (guard band, JCGM 106) or if value or
-    uncertainty are NaN (unknown). Plain numbers have no uncertainty.
+    conform if they lie outside, and is undecided otherwise (guard band, JCGM 106), if value or
+    uncertainty are NaN (unknown), or if a contribution is not stated. Plain numbers have no
+    uncertainty.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import Self
 
@@ -80,6 +80,8 @@ class Estimate(Immutable):
     upper_bound : bool
         Whether `value` is only an upper bound of the true value, such as of a level masked by the
         background; the uncertainty is that of the bound.
+    not_stated : tuple of str
+        Contributions whose size is not stated: the uncertainty lacks them.
     """
 
     value: float
@@ -88,6 +90,7 @@ class Estimate(Immutable):
     freedom: float = math.inf
     contributions: tuple[Contribution, ...] = ()
     upper_bound: bool = False
+    not_stated: tuple[str, ...] = ()
 
     @classmethod
     def from_budget(
@@ -113,6 +116,12 @@ class Estimate(Immutable):
     def unknown(cls) -> Self:
         """Return an unknown value."""
         return cls(math.nan, math.nan)
+
+    def widened(self, uncertainty: float) -> Self:
+        """Return the estimate with a further standard uncertainty of infinite freedom."""
+        combined = math.hypot(self.uncertainty, uncertainty)
+        ratio = combined / self.uncertainty if self.uncertainty else math.inf
+        return replace(self, uncertainty=combined, freedom=self.freedom * ratio**4)
 
     @property
     def coverage_factor(self) -> float:

@@ -149,6 +149,9 @@ class ImpactResult(Protocol):
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return a force, by default the assessed force, N, shape (n_sample,)."""
 
+    def mean_force(self) -> NDArray[np.float64]:
+        """Return the force on the floor whose levels are `levels`, N, shape (n,), from any time."""
+
     def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, by default of the assessed force, N."""
 

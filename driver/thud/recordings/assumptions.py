@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 ASSUMED_FLAT = 1000.0
 # Effect on an octave above which an assumption is a warning, dB.
 MIN_WARNED = 0.1
+# Cutoff of a filter over the equivalent bandwidth of its noise: 0.89 of a mean, 0.96 of a Bessel
+# filter of order 4. White noise up to half the rate has more than a quarter of the rate.
+CUTOFF_RATIO = 0.9
 # Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines; for
 # the peak, longer responses do not return to the beginning.
 PADDING = 16
@@ -106,6 +109,14 @@ def assumption_warnings(drops: Sequence[Drop], config: Config) -> dict[str, floa
             "the filter of the recorder is at a quarter of the sample rate or above "
             f"([filter]; {size(ASSUMED_FILTER)})"
         )
+    slowest = min(drops, key=_effective_rate)
+    if config.filter is None and _effective_rate(slowest) < slowest.sample_rate:
+        smooth = (
+            f"the noise of the background ends near {slowest.contact.noise_bandwidth:.2g} Hz: the "
+            "samples were smoothed, or drawn up from a lower rate, which changes levels up to 500 "
+            "Hz and the contact time; state the filter in [filter], or record without it"
+        )
+        result[smooth] = 0.0
     if assumed:
         result[f"not stated, and assumed for levels and peak: {'; '.join(assumed)}"] = 0.0
     limit = _flat_limit(config)
@@ -216,9 +227,15 @@ def _share_gain(config: Config) -> Gain | None:
     return lambda f: np.abs(plate.response(f) / smaller.response(f))
 
 
+def _effective_rate(drop: Drop) -> float:
+    """Return the sample rate, Hz, or the one that the noise of the background would have."""
+    bandwidth = drop.contact.noise_bandwidth
+    return min(drop.sample_rate, 4 * CUTOFF_RATIO * bandwidth)
+
+
 def _filter_gain(drops: Sequence[Drop], config: Config) -> Gain | None:
     """Return the gain of the filter that is assumed if none is stated."""
     if config.filter is not None:
         return None
-    assumed = assumed_filter(min(drop.sample_rate for drop in drops))
+    assumed = assumed_filter(min(map(_effective_rate, drops)))
     return lambda f: np.abs(assumed.response(f))

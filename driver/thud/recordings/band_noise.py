@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 
 # Energy of a functional, as a fraction of the largest, below which it is negligible.
 NEGLIGIBLE = 1e-14
+# Minimum number of sections of the background whose energy is compared with that of the fitted
+# noise, and standard deviations by which it exceeds it.
+MIN_GATES = 3
+CHANCE = 4.0
 # Maximum number of drops whose covariances are in memory at the same time.
 MAX_DROPS = 64
 
@@ -62,6 +67,21 @@ def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
     return energies
 
 
+def _excess(
+    gates: NDArray[np.float64], covariance: NDArray[np.float64], rows: NDArray[np.float64]
+) -> float:
+    """Return the energy of the background in sections over that of the fitted noise in the gate.
+
+    It is 1 unless the former is larger by more than chance: the background is no noise of the fit.
+    """
+    if len(gates) < MIN_GATES:
+        return 1.0
+    expected = float(np.trace(covariance))
+    deviation = math.sqrt(2 * float((covariance**2).sum()) / len(gates))
+    energy = float(((gates @ rows.T) ** 2).sum()) / len(gates)
+    return energy / expected if energy > expected + CHANCE * deviation else 1.0
+
+
 def _energies(
     drops: Sequence[Drop],
     functionals: Sequence[NDArray[np.float64]],
@@ -71,22 +91,30 @@ def _energies(
     contacts = [drop.contact for drop in drops]
     forces = np.array([drop.force[slice(*drop.gate)] for drop in drops])
     slow_covariance = np.array([contact.covariance for contact in contacts])
-    white_variance = np.array(
-        [contact.background.variances[0] * contact.sample_rate / 2 for contact in contacts]
-    )
+    white_variance = np.array([contact.white_variance for contact in contacts])
+    further_variance = white_variance - [
+        contact.background.variances[0] * contact.sample_rate / 2 for contact in contacts
+    ]
+    quiet = [contact.quiet_gates for contact in contacts]
     errors = [contact.quantization_errors for contact in contacts]
     energies = np.empty((len(drops), len(edges), 3))
     for band, (rows, edge) in enumerate(zip(functionals, edges, strict=True)):
         values, summed = forces @ rows.T, contacts[0].summed(rows)
         covariance = white_variance[:, None, None] * (rows @ rows.T)
         covariance += summed @ slow_covariance @ summed.T
-        noise = np.trace(covariance, axis1=1, axis2=2)
+        # What the contact has beyond the background may be the force: it is not subtracted.
+        further = further_variance * (rows**2).sum()
+        noise = np.trace(covariance, axis1=1, axis2=2) - further
+        excess = np.array([_excess(*pair, rows) for pair in zip(quiet, covariance, strict=True)])
+        covariance *= excess[:, None, None]
+        noise *= excess
         squares = (covariance**2).sum(axis=(1, 2))
         # The noise in `values` makes the first term too large by twice the second, on average.
         variance = 4 * np.einsum("di,dij,dj->d", values, covariance, values) - 2 * squares
         middle = sum(edge) / 2
         density, spread = np.array([contact.background.density(middle) for contact in contacts]).T
         variance = np.maximum(variance, 2 * squares) + (noise * spread / density) ** 2
+        variance += further**2
         # An error e changes the energy by 2 (R f)' R e + |R e|**2.
         changes = [error @ rows.T for error in errors]
         quantized = [

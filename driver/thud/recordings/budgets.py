@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 # Change of a level per relative change of a force, dB.
 AMPLITUDE_DECIBEL = 20 / math.log(10)
+# Uncertainties of levels that a laboratory may not have stated.
+LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
 # Prominence of a counted peak as a fraction of the peak force, and the minimum of this prominence
 # in standard deviations of the noise.
 PROMINENCE = 0.1
@@ -68,12 +71,15 @@ def level_estimates(
     levels: AverageLevels,
     calibration: float | None = None,
     systematic: Mapping[str, NDArray[np.float64]] | None = None,
+    not_stated: Sequence[str] = (),
 ) -> tuple[Estimate, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
 
-    `calibration` is the relative standard uncertainty of the force, None if unknown; `systematic`
-    are further standard uncertainties that all drops share, dB, shape (n_band,), by name.
+    `calibration` is the relative standard uncertainty of the force, None if not stated;
+    `systematic` are further standard uncertainties that all drops share, dB, shape (n_band,), by
+    name, and `not_stated` uncertainties of the recording.
     """
+    lacking = tuple(name for name in not_stated if name in LEVEL_CAUSES)
     count = len(levels.names)
     contributions = dict(levels.contributions)
     rectangular = ("method", "filter", "offset step", *ASSUMED)
@@ -102,18 +108,24 @@ def level_estimates(
         for band in range(len(levels.level))
     )
     return tuple(
-        Estimate.from_budget(float(level), *budget, upper_bound=bool(flag == "background"))
+        replace(
+            Estimate.from_budget(float(level), *budget, upper_bound=bool(flag == "background")),
+            not_stated=lacking,
+        )
         for level, budget, flag in zip(levels.level, budgets, levels.flag, strict=True)
     )
 
 
 def drop_estimates(
-    drops: Sequence[Drop], config: Config, calibration: float | None
+    drops: Sequence[Drop],
+    config: Config,
+    calibration: float | None,
+    not_stated: Sequence[str] = (),
 ) -> dict[str, Estimate]:
     """Return contact time, restitution, peak count, mass and drop height, as `assess` needs them.
 
     If no mass is stated, it is the effective mass; `calibration` is the relative standard
-    uncertainty of the force.
+    uncertainty of the force, and `not_stated` are uncertainties of the recording.
     """
     times = [drop.contact_time for drop in drops]
     # The flanks of all drops have the same shape: its error does not average out.
@@ -121,12 +133,25 @@ def drop_estimates(
     edges = [Contribution("edges of the pulse", common)] if len(times) > 1 else []
     conditions = config.conditions(calibration)
     mass = _stated(config.mass, config.mass_uncertainty)
-    return {
+    by_impulse = any(IMPULSE in drop.restitutions for drop in drops)
+    causes = {
+        "restitution": ("drop height", *(("calibration", "mass") if by_impulse else ())),
+        "mass": ("calibration", "drop height") if config.mass is None else ("mass",),
+        "drop_height": ("drop height",),
+    }
+    estimates = {
         "contact_time": average_estimates(times, *edges),
         "restitution": average_restitution(drops, conditions)[0],
         "peaks": Estimate(float(np.max([_count_peaks(drop) for drop in drops]))),
         "mass": average_mass(drops, conditions) if config.mass is None else mass,
         "drop_height": _stated(config.height, config.height_uncertainty),
+    }
+    return {
+        name: replace(
+            estimate,
+            not_stated=tuple(cause for cause in not_stated if cause in causes.get(name, ())),
+        )
+        for name, estimate in estimates.items()
     }
 
 

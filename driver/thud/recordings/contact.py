@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
+from scipy.special import comb
 
 from thud.base.immutable import Immutable
 from thud.impact.contact_time import THRESHOLD
@@ -60,6 +61,15 @@ CORRECTION_ERROR = 0.06
 N_PHASE = 16
 # Weights of neighboring samples that give values between the steps.
 NO_GRID = np.array([0.21, 0.58, 0.21])
+# Order of the differences that tell noise in the contact from the force, and the rate, Hz, and the
+# number of samples from which they do: a force of 600 Hz has 1e-3 of its amplitude in them. The
+# variance by which they exceed the background's.
+NOISE_ORDER = 8
+MIN_NOISE_RATE = 5e3
+MIN_NOISE_SAMPLES = 50
+MIN_INCREASE = 4.0
+# Band in which the noise of the background is compared with its fit, Hz.
+NOISE_BAND = (100.0, 600.0)
 # Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
 SAMPLE_ERROR = 2e-4
 
@@ -121,6 +131,52 @@ class Contact(Immutable):
         """Removed background, N, shape (span[1] - span[0],): linear between the cells."""
         return np.interp(np.arange(*self.span) / self.sample_rate, *self.removed_means)
 
+    @cached_property
+    def white_variance(self) -> float:
+        """Variance of the white noise of a sample in the gate, N2.
+
+        It is that of the background, or the largest of the thirds of the gate by differences of
+        the order `NOISE_ORDER`, if that exceeds it clearly: noise may grow with the force. At low
+        rates the differences are those of the force itself.
+        """
+        background = float(self.background.variances[0]) * self.sample_rate / 2
+        if self.sample_rate < MIN_NOISE_RATE or len(self.gated) < MIN_NOISE_SAMPLES:
+            return background
+        differences = np.abs(np.diff(self.gated, NOISE_ORDER))
+        medians = [np.median(third) for third in np.array_split(differences, 3)]
+        variance = (1.4826 * float(max(medians))) ** 2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
+        return variance if variance > MIN_INCREASE * background else background
+
+    @property
+    def quiet_gates(self) -> NDArray[np.float64]:
+        """Background in sections of the length of the gate on both sides, N, [n_section, n]."""
+        first, count = self.span[0], len(self.gated)
+        begin, end = self.gate[0] - first, self.gate[1] - first
+        before, after = self.force[:begin], self.force[end:]
+        sections = [
+            side[k * count : (k + 1) * count]
+            for side in (before[::-1], after)
+            for k in range(len(side) // count)
+        ]
+        return np.array(sections).reshape(-1, count)
+
+    @cached_property
+    def noise_bandwidth(self) -> float:
+        """Equivalent bandwidth of the noise of the background, Hz; infinite if it is not known.
+
+        The noise is that of the fit below a filter, and ends at it.
+        """
+        gates = self.quiet_gates
+        if not gates.size or self.background.quantization.offset:
+            return math.inf
+        frequency = np.fft.rfftfreq(gates.shape[1], 1 / self.sample_rate)[1:]
+        window = np.hanning(gates.shape[1] + 2)[1:-1]
+        power = (np.abs(np.fft.rfft(window * gates, axis=1)[:, 1:]) ** 2).mean(axis=0)
+        white, pink, brown = self.background.variances[:3]
+        ratio = power / (white + pink / frequency + brown / frequency**2)
+        reference = np.median(ratio[(frequency > NOISE_BAND[0]) & (frequency < NOISE_BAND[1])])
+        return float(ratio.sum() / reference * frequency[0]) if reference > 0 else math.inf
+
     @property
     def quantization_errors(self) -> NDArray[np.float64]:
         """Possible errors of the force in the gate by quantization, N, [n_phase, n]; empty if none.
@@ -162,9 +218,8 @@ class Contact(Immutable):
 
         The rows of `functionals`, [k, n], are the weights of the samples.
         """
-        white_variance = self.background.variances[0] * self.sample_rate / 2
         summed = self.summed(functionals)
-        result: NDArray[np.float64] = white_variance * functionals @ functionals.T
+        result: NDArray[np.float64] = self.white_variance * functionals @ functionals.T
         return result + summed @ self.covariance @ summed.T
 
 

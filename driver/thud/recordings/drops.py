@@ -180,7 +180,7 @@ def search_drops(
     if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
     windows = list(_windows(signal, drops, pulses, section, stop_sample))
-    return Search(windows, tuple(f"{text} is no drop" for text in ignored))
+    return Search(windows, tuple(f"{text} is no drop and has no number" for text in ignored))
 
 
 def _pieces(
@@ -272,6 +272,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         start = max(_find_edge(corrected, low, -1, FOOT * peak) - MARGIN, earliest)
         stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
         warning = _double_peak_warning(corrected[max(group[0], earliest) : group[-1] + 1])
+        warning = warning and f"{warning}, at {(first + top * width) / rate:.2f} s"
         span = first + start * width, first + stop * width
         # A second impact next to this one is shorter than half of STEP.
         sides = (
@@ -328,12 +329,24 @@ def _assign_bounces(pulses: list[_Pulse], rate: float) -> tuple[list[_Pulse], li
         )
         lowest = MIN_BOUNCE * before.peak if bounced and before else MIN_DROP * highest
         if pulse.is_step or pulse.peak < lowest:
-            ignored.append(f"a pulse of {pulse.peak:.0f} N at {pulse.start / rate:.2f} s")
+            text = f"a pulse of {pulse.peak:.0f} N at {pulse.start / rate:.2f} s"
+            if not (pulse.is_step or bounced):
+                text += (
+                    f", below {MIN_DROP:g} of the highest peak (a section from --from to --to, "
+                    "without the higher ones, measures it),"
+                )
+            ignored.append(text)
             continue
         if bounced:
             drops[-1].bounces.append(pulse)
             flight = gap
         else:
+            if before is not None and MIN_FLIGHT < gap < 1.02 * flight:
+                pulse.warnings.append(
+                    f"the pulse begins {gap:.2f} s after the one before it, as a bounce would, and "
+                    f"has {pulse.peak / before.peak:.2f} times its peak: if it is its bounce, the "
+                    "amplifier rounds the force off, and all levels are wrong"
+                )
             drops.append(pulse)
             flight = MAX_FLIGHT
         before = pulse

@@ -14,6 +14,7 @@ from thud.base.checks import refuse
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.recordings.contact import Contact
     from thud.recordings.drops import Window
     from thud.recordings.signal import Signal
 
@@ -24,6 +25,8 @@ MIN_SAMPLES = 4
 # is lower by more than MIN_FALL quantization steps. At a smooth top it is lower by 4.
 MIN_CLIPPED = 4
 MIN_FALL = 12.0
+# It is no clipping if samples are equal elsewhere for 1/MAX_ELSEWHERE of the time.
+MAX_ELSEWHERE = 2
 # The force, averaged over SMOOTHING, s, is flat at its top if it is above (1 - a) of its maximum
 # almost as long as above (1 - 4 a). The ratio of the times is 1 for a top that an amplifier clips,
 # 1.41 and at least 1.22 for tops of fourth order with one and two maxima, and 2 for parabolas.
@@ -63,8 +66,22 @@ MIN_SPIKE_RATIO = 4.0
 MIN_SPIKE_DEVIATIONS = 8.0
 MIN_SPIKE = 0.005
 CLEAN = (5, 12)
-# Time before and after the contact that is searched for spikes, s.
-SPIKE_MARGIN = 3e-3
+# Time before and after the contact that is searched for spikes, s, and time within which they count
+# as those of the contact.
+SPIKE_MARGIN = 0.12
+CONTACT_MARGIN = 3e-3
+# Minimum number of different values of a contact over the period of a bit that may be missing.
+MIN_VISITS = 4
+# Fraction of equal neighbors in noise of more than a quantization step, and fraction of a constant
+# background from which it is no dropout.
+MAX_EQUAL = 0.4
+MAX_CONSTANT = 0.5
+# Distance of the lines through four samples on either side, their mean at the middle; distance from
+# first touch and release, s, where forces have kinks and jumps, and minimum ratio to the distances
+# around it.
+JUMP = np.array([-0.2, 0.1, 0.4, 0.7, -0.7, -0.4, -0.1, 0.2])
+JUMP_MARGIN = 5e-4
+MIN_JUMP_RATIO = 3.0
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
@@ -83,12 +100,17 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         )
     for warning in window.warnings:
         if warning.startswith("two impacts"):
-            refuse(f"{name}: {warning}", "one impact, with background before and after it")
+            refuse(
+                f"{name}: {warning}",
+                "one impact, with background before and after it; --leave-out (leave_out) with the "
+                "number of this drop, or --from and --to (begin, end) without it",
+            )
     force = window.force
     if window.chain is not None:
         # The recorded force is repaired; its correction rings next to a fault.
         return force, (), ()
     refuse_clipped(window, force)
+    _refuse_missing_codes(window, force)
     return fill_dropouts(window, force)
 
 
@@ -119,7 +141,13 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         force[max(start - distance, 0)],
         force[min(start + length - 1 + distance, len(force) - 1)],
     ]
-    clipped = length >= MIN_CLIPPED and top - max(neighbors) > MIN_FALL * step
+    # Samples that are held, or the median of several, are equal elsewhere, too.
+    quiet = record[: max(first // 2, 1)]
+    is_noisy = float(np.ptp(quiet)) > MIN_FALL * step
+    beside = ~at_top & (force[starts] > (top + force.min()) / 2)
+    elsewhere = max(lengths[beside].max(initial=0), _runs(quiet)[1].max() if is_noisy else 0)
+    falls = top - max(neighbors) > MIN_FALL * step
+    clipped = length >= MIN_CLIPPED and falls and length > MAX_ELSEWHERE * elsewhere
     if window.signal.full_scale is not None:
         at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
@@ -129,6 +157,28 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
             f"{1e3 * length / window.sample_rate:.3g} ms",
             "a measuring range that includes the peak",
         )
+
+
+def _refuse_missing_codes(window: Window, record: NDArray[np.float64]) -> None:
+    """Raise InputError if half of the values of a converter never occur in the contact.
+
+    These are the values in which a bit is set, or not set, of all within its period. A smooth force
+    may well leave out values.
+    """
+    step, force = window.quantization.step, record[slice(*window.contact)]
+    if not step or _deviation(force) < step:
+        return
+    codes = np.unique(np.rint((force - force.min()) / step).astype(np.int64))
+    period = 4
+    while MIN_VISITS * period < len(codes):
+        occupied = len(np.unique(codes % period))
+        if occupied <= period // 2:
+            refuse(
+                f"{window.name}: of {period} successive values of the converter, {step:.3g} N "
+                f"apart, {period - occupied} never occur",
+                "a converter without missing codes",
+            )
+        period *= 2
 
 
 def fill_dropouts(
@@ -155,19 +205,93 @@ def fill_dropouts(
         for name, bad in (("dropouts", dropouts), ("spikes", spikes))
         if bad.any()
     ]
-    if np.count_nonzero(dropouts | spikes) > MAX_REPAIRED * rate:
+    margin = int(CONTACT_MARGIN * rate)
+    near = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
+    if np.count_nonzero((dropouts | spikes)[near]) > MAX_REPAIRED * rate:
+        group = int(np.median(_runs(force[slice(*window.contact)])[1]))
+        if group >= MIN_FROZEN:
+            refuse(
+                f"{window.name}: {group} samples each are equal: the record was drawn up from "
+                f"{rate / group:g} Hz",
+                f"each sample once, at {rate / group:g} Hz",
+            )
         refuse(
-            f"{window.name}: the contact has {' and '.join(summaries)}",
+            f"{window.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
         )
     return (
         filled,
         tuple(f"{summary} were filled by linear interpolation" for summary in summaries),
         (
-            *(f"the contact has {summary}" for summary in summaries),
+            *(f"the record has {summary}" for summary in summaries),
+            *check_constant(window, force),
             *_check_top(window, filled[slice(*window.contact)] - offset),
         ),
     )
+
+
+def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return a warning if the background is constant, at least in part, and the contact noisy.
+
+    Raise InputError if the force is held over first touch or release.
+    """
+    rate, (first, stop) = window.sample_rate, window.contact
+    contact, step = force[first:stop], window.quantization.step
+    if not _deviation(contact) > max(step, MIN_NOISE * float(np.ptp(contact))):
+        return ()
+    starts, lengths = _runs(force)
+    short = lengths[lengths <= MIN_BACKGROUND * rate]
+    # As many neighbors are equal by quantization or by a median filter.
+    equal = max(MAX_EQUAL if step else 0.01, 1 - len(short) / max(short.sum(), 1))
+    least = math.log(len(force) / MAX_CHANCE) / -math.log(min(equal, 0.99))
+    constant = lengths > max(least, MIN_BACKGROUND * rate)
+    if not constant.any():
+        return ()
+    starts, stops = starts[constant], (starts + lengths)[constant]
+    total = 1e3 * int((stops - starts).sum()) / rate
+    inside = (stops > first) & (starts < stop)
+    outside = len(force) - (stop - first)
+    if inside.any() and total < MAX_CONSTANT * 1e3 * outside / rate:
+        refuse(
+            f"{window.name}: the force is held for {total:.3g} ms at the contact while the samples "
+            "around it are noisy",
+            "a recording without lost samples",
+        )
+    warning = (
+        f"the background is constant for {total:.3g} ms while the force in the contact is noisy: "
+        "small forces are missing, as behind a gate, or samples are lost; offset, levels and "
+        "contact time may be wrong"
+    )
+    return (warning,)
+
+
+def check_jumps(contact: Contact) -> tuple[str, ...]:
+    """Return a warning if the force jumps within a contact, away from first touch and release.
+
+    A jump is the distance between the lines through the four samples before and after it.
+    """
+    rate, force = contact.sample_rate, contact.gated
+    jump = np.abs(np.convolve(force, JUMP, mode="valid"))
+    # The jump at an index is between the samples half the kernel behind it.
+    margin = JUMP_MARGIN * rate + CLEAN[1]
+    start = contact.gate[0] + len(JUMP) // 2
+    first = max(int(contact.touch.value * rate + margin) - start, 0)
+    stop = int(contact.release.value * rate - margin) - start
+    if stop <= first:
+        return ()
+    limit = np.maximum(
+        MIN_JUMP_RATIO * _largest_around(jump),
+        max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step),
+    )
+    found = np.flatnonzero(jump[first:stop] > limit[first:stop]) + first
+    if not found.size:
+        return ()
+    size = float(jump[found].max())
+    warning = (
+        f"the force jumps by {size:.3g} N within the contact: packets or samples are lost or "
+        "exchanged, or a contact is loose; levels and contact time may be wrong"
+    )
+    return (warning,)
 
 
 def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
@@ -206,6 +330,14 @@ def _deviation(force: NDArray[np.float64]) -> float:
     return 1.4826 * float(np.median(np.abs(deviation))) / math.sqrt(float(DIFFERENCE @ DIFFERENCE))
 
 
+def _largest_around(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest of the values CLEAN samples before and after each one."""
+    near, far = CLEAN
+    extended = np.pad(values, far, mode="edge")
+    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
+    return np.asarray(np.maximum(largest[: len(values)], largest[-len(values) :]))
+
+
 def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return a force, N, with a line in place of bad samples."""
     result = force.copy()
@@ -234,16 +366,25 @@ def _find_dropouts(
     is_background = np.abs(pulse[starts]) < limit / 2
     jumps = (before > limit).astype(int) + (after > limit)
     frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    held = _is_held(pulse, lengths, window.quantization.step, peak) & ~is_background
+    quiet = np.diff(force[: max(first - 2 * margin, 1)]) == 0
+    held = _is_held(pulse, lengths, window.quantization.step, peak, quiet) & ~is_background
     lost[first:stop] = np.repeat(zero | frozen | held, lengths)
     return lost
 
 
 def _is_held(
-    force: NDArray[np.float64], lengths: NDArray[np.intp], step: float, peak: float
+    force: NDArray[np.float64],
+    lengths: NDArray[np.intp],
+    step: float,
+    peak: float,
+    quiet: NDArray[np.bool_],
 ) -> NDArray[np.bool_]:
-    """Return whether runs of equal samples are too long for the noise and the step, N."""
+    """Return whether runs of equal samples are too long for the noise and the step, N.
+
+    `quiet` is whether neighbors in the background are equal, as many are behind a median filter.
+    """
     equal = max(1 - len(lengths) / len(force), 1 / len(force))
+    equal = max(equal, float(quiet.mean()) if quiet.size else 0.0)
     # Without noise, the force may stay within a step.
     has_noise = _deviation(force) > max(step / 2, MIN_NOISE * peak)
     return has_noise & (len(force) * equal ** (lengths - 1.0) < MAX_CHANCE)
@@ -259,15 +400,11 @@ def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDA
     from_cubic = np.abs(np.convolve(padded, DIFFERENCE, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
-    near, far = CLEAN
-    extended = np.pad(from_cubic, far, mode="edge")
-    largest = sliding_window_view(extended, far - near + 1).max(axis=1)
-    around = np.maximum(largest[: len(part)], largest[-len(part) :])
     usual = 1.4826 * float(np.median(from_cubic))
     least = max(
         MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
     )
-    limit = np.maximum(MIN_SPIKE_RATIO * around, least)
+    limit = np.maximum(MIN_SPIKE_RATIO * _largest_around(from_cubic), least)
     spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
     return spikes
 

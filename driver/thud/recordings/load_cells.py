@@ -206,6 +206,10 @@ def _refuse_total(window: Window, forces: Sequence[NDArray[np.float64]]) -> tupl
     if len(forces) < 3:  # noqa: PLR2004 - two cells may have equal forces
         return ()
     total = np.sum(forces, axis=0)
+    impulses = np.array([(force - force[0]).sum() for force in forces])
+    # A cell of the wrong sign, which `check_signs` names, makes another one the sum of the others.
+    if impulses.min() < -MIN_OPPOSITE * impulses.sum():
+        return ()
     for cell, force in zip(window.signal.cells, forces, strict=True):
         others = total - force
         if np.ptp(others - force) < MAX_DEVIATION * np.ptp(others):

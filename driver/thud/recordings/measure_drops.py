@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.base.checks import refuse
-from thud.base.errors import NumericalError
-from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.assumptions import with_assumptions
 from thud.recordings.choice import choose, require_chosen
 from thud.recordings.drops import search_drops
@@ -33,17 +27,12 @@ from thud.recordings.same_drops import (
 from thud.recordings.tones import remove_tones
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-    from concurrent.futures import ProcessPoolExecutor
+    from collections.abc import Iterable, Sequence
 
     from thud.recordings.config import Config
     from thud.recordings.drops import Window
     from thud.recordings.measured_drop import Drop
     from thud.recordings.signal import Signal
-
-# Minimum number of drops, or duration of a signal, s, for processes, which take a second to start.
-MIN_FOR_POOL = 40
-MIN_DURATION = 600.0
 
 
 @dataclass(frozen=True)
@@ -81,7 +70,6 @@ def measure_signals(
     config: Config,
     *,
     progress: bool = False,
-    workers: int = 1,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
@@ -95,14 +83,11 @@ def measure_signals(
     uncertainties: list[float | None] = []
     count = 0
     # BLAS threads slow down the many small matrix products.
-    with threadpool_limits(1, "blas"), _Processes(workers) as processes:
+    with threadpool_limits(1, "blas"):
         for signal in signals:
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
             refuse_copy(signal, records)
-            # The processes start during the search for drops.
-            if signal.path and signal.n_sample > MIN_DURATION * signal.sample_rate:
-                processes.start()
             search = search_drops(
                 signal, config.begin or 0.0, config.end or math.inf, progress=progress
             )
@@ -110,9 +95,9 @@ def measure_signals(
             count += len(search.windows)
             refuse_simultaneous_channels(search.windows, searched)
             searched.append((signal.path, search.windows))
-            measured = _measure(windows, config, processes, progress=progress)
+            measured = _measure(windows, config, progress=progress)
             notes = (*_section(config), *search.ignored, *left_out)
-            records.append(Record(signal.name, signal.path, signal.checksum, tuple(measured)))
+            records.append(Record(signal.name, signal.path, signal.checksum, measured))
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows), notes))
     if not records:
@@ -125,71 +110,11 @@ def measure_signals(
     return drops, tuple(origins), uncertainty
 
 
-def _measure(
-    windows: Sequence[Window],
-    config: Config,
-    processes: _Processes,
-    *,
-    progress: bool,
-) -> list[Drop]:
+def _measure(windows: Sequence[Window], config: Config, *, progress: bool) -> tuple[Drop, ...]:
     """Return the drops in the windows of one signal."""
-    if not windows:
-        return []
-    signal = windows[0].signal
-    # A signal in memory would be copied to the processes with each window.
-    if signal.path and len(windows) >= MIN_FOR_POOL:
-        processes.start()
-    call = partial(measure_window, config=config)
-    results = processes.map(call, windows) if signal.path else map(call, windows)
-    return list(
-        tqdm(
-            results, total=len(windows), unit="drop", desc=signal.name, disable=not progress,
-            leave=False,
-        )
-    )  # fmt: skip
-
-
-def _limit_threads() -> None:
-    """Limit the BLAS libraries that this module loads to one thread."""
-    threadpool_limits(1, "blas")
-
-
-class _Processes(ExitStack):
-    """Pool of processes that measure drops; a context manager."""
-
-    def __init__(self, workers: int) -> None:
-        super().__init__()
-        self.workers = workers
-        self._pool: ProcessPoolExecutor | None = None
-
-    def start(self) -> None:
-        """Start the processes, without waiting for them."""
-        if self.workers < 2 or self._pool:  # noqa: PLR2004 - 1 is this process
-            return
-        self._pool = self.enter_context(process_pool(self.workers, _limit_threads))
-        with no_interrupt_in_processes():
-            for _ in range(self.workers):
-                self._pool.submit(int)
-
-    def map(self, call: Callable[[Window], Drop], windows: Sequence[Window]) -> Iterator[Drop]:
-        """Yield the results of calls in order; without a pool, this process makes the calls."""
-        if not self._pool:
-            yield from map(call, windows)
-            return
-        calls = deque(self._pool.submit(call, window) for window in windows)
-        try:
-            while calls:
-                # The queue must not keep a yielded result in memory.
-                yield calls.popleft().result()
-        except BrokenExecutor as error:
-            message = (
-                f"{windows[0].signal.name}: a process that measured drops has died; allowed: "
-                "measure again, or with one worker"
-            )
-            raise NumericalError(message) from error
-        finally:
-            for future in calls:
-                future.cancel()
+    name = windows[0].signal.name if windows else ""
+    bar = tqdm(windows, unit="drop", desc=name, disable=not progress, leave=False)
+    return tuple(measure_window(window, config) for window in bar)
 
 
 def measure_window(window: Window, config: Config) -> Drop:

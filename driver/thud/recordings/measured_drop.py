@@ -18,7 +18,7 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.contact import SAMPLE_ERROR, Contact, estimate_limits, find_contact
-from thud.recordings.faults import min_background, repair
+from thud.recordings.faults import check_jumps, min_background, repair
 from thud.recordings.noise import Noise
 from thud.recordings.offset_step import find_offset_step, step_errors
 from thud.recordings.recorded_levels import measure_levels
@@ -176,6 +176,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
     level_effects: dict[str, float] = {}
+    if window.chain is None:
+        warnings += check_jumps(contact)
     offset_step = find_offset_step(contact)
     if offset_step:
         changed = (

@@ -31,11 +31,15 @@ EDGE = 0.01
 
 @dataclass(frozen=True)
 class Extremes:
-    """Minimum, maximum and background level of a channel, in its own unit."""
+    """Minimum, maximum and background level of a channel, in its own unit.
+
+    `stays` is whether it ends at least half of its range away from where it begins.
+    """
 
     low: float
     high: float
     background: float
+    stays: bool = False
 
     def peak(self, scale: float) -> float:
         """Return the positive peak above the background, N, if `scale` is N per value."""
@@ -66,7 +70,8 @@ def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: s
     # If the pulse fills the record, the background is at one end only; with many drops, overall.
     levels = [float(np.median(section)) for section in (thin[:edge], thin[-edge:], thin)]
     middle = low + (high - low) / 2
-    return Extremes(low, high, max(levels, key=lambda level: abs(level - middle)))
+    background = max(levels, key=lambda level: abs(level - middle))
+    return Extremes(low, high, background, abs(levels[1] - levels[0]) > (high - low) / 2)
 
 
 def find_sign(
@@ -80,6 +85,7 @@ def find_sign(
         return sign, (changed,) if sign * scale < 0 else ()
     up, down = extremes.peak(scale), extremes.peak(-scale)
     if max(up, down) < MIN_PEAK_RATIO * min(up, down):
+        _refuse_staying(extremes, max(up, down), name)
         refuse(
             f"{name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
             "polarity = 'positive' or 'negative', the sign of a compression",
@@ -87,6 +93,16 @@ def find_sign(
     if up > down:
         return 1.0, ()
     return -1.0, (f"The sign was changed: the largest peak, {-down:.4g} N, is negative.",)
+
+
+def _refuse_staying(extremes: Extremes, peak: float, name: str) -> None:
+    """Raise InputError if a force, of a peak in N, does not return to its background."""
+    if extremes.stays:
+        refuse(
+            f"{name}: the force does not return from its peak, {peak:.4g} N, to where it begins: "
+            "peak hold, or a load that stays",
+            "the force over time, with background before and after the contact",
+        )
 
 
 def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
@@ -100,15 +116,18 @@ def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) ->
     if assumed and not low <= peak <= high:
         refuse(f"{name}: the values are without a unit and reach {peak:.4g}", f"{allowed}, or unit")
     if not low <= peak <= high and low <= opposite_peak <= high:
+        _refuse_staying(extremes, max(peak, opposite_peak), name)
         refuse(
             f"{name}: the peaks are {-opposite_peak:.4g} N and {peak:.4g} N; the polarity is "
             "probably wrong",
             allowed,
         )
-    for ratio, cause in ((THOUSAND, "kN instead of N"), (1 / THOUSAND, "mN instead of N")):
+    for ratio, unit in ((THOUSAND, "kN"), (1 / THOUSAND, "mN")):
         if low <= peak * ratio <= high:
             refuse(
-                f"{name}: the peak is {peak:.4g} N; the unit is probably wrong, {cause}", allowed
+                f"{name}: the peak is {peak:.4g} N: too {'low' if ratio > 1 else 'high'} for a "
+                f"drop, or the values are {unit}",
+                f"{allowed}; unit = {unit!r}, or a calibration",
             )
     if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
         refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong", allowed)

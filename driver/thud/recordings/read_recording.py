@@ -6,8 +6,6 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import require_whole
-from thud.impact.ensemble import MAX_THREADS
 from thud.recordings.config import Config, read_config
 from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
@@ -40,7 +38,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     low_pass: bool | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
-    workers: int = 1,
 ) -> Recording:
     """Measure recorded drops of one source, from files with one or more drops each.
 
@@ -72,9 +69,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         Configuration of the laboratory, or its file; other arguments override it.
     progress
         Show progress bars.
-    workers
-        Number of processes that measure drops. Scripts with more than one need
-        ``if __name__ == "__main__":``.
 
     Returns
     -------
@@ -95,7 +89,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         "drops": drops, "leave_out": leave_out, "begin": begin, "end": end,
     }  # fmt: skip
     stated = {key: value for key, value in stated.items() if value is not None}
-    require_whole("workers", workers, 1, MAX_THREADS)
     # Either choice of channels overrides both of the configuration.
     if stated.keys() & {"channel", "channels"}:
         settings = replace(settings, channel=None, channels=None)
@@ -116,4 +109,4 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
             sample_rate=settings.sample_rate,
         )
     )
-    return Recording.from_signals(signals, settings, progress=progress, workers=workers)
+    return Recording.from_signals(signals, settings, progress=progress)

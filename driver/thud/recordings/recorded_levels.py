@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
+from scipy.signal import czt
 from scipy.special import stdtrit
 
 from thud.base.checks import refuse, require_choice
@@ -35,6 +37,9 @@ BACKGROUND = (6.0, 15.0)
 MARGIN = 3e-3
 # Change of a level per relative change of an energy, dB.
 ENERGY_DECIBEL = 10 / math.log(10)
+# Length of a mean force in gates, and number of times that it is scaled to its levels: they then
+# differ by less than 0.01 dB.
+PADDING, N_SCALING = 4, 5
 # Contribution that is independent between drops: their scatter includes it.
 NOISE, REPEATABILITY = "noise", "repeatability"
 
@@ -230,6 +235,32 @@ def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
         _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown,
         contributions, _level_outliers(estimates, drops),
     )  # fmt: skip
+
+
+def mean_force(drops: Sequence[Drop], level: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a force with the mean energy of drops and the phase of the first, N, shape (n,).
+
+    In each one-third-octave band it has the given level, dB, shape (n_band,); a NaN changes
+    nothing. The sample rate is that of the first drop.
+    """
+    rate, bands = drops[0].sample_rate, get_bands("third")
+    forces = [drop.contact.gated for drop in drops]
+    count = next_fast_len(PADDING * max(map(len, forces)), real=True)
+    frequency = np.fft.rfftfreq(count, 1 / rate)
+    spectra = [
+        czt(force, len(frequency), np.exp(-2j * np.pi * frequency[1] / drop.sample_rate))
+        / drop.sample_rate
+        * (frequency < drop.sample_rate / 2)
+        for force, drop in zip(forces, drops, strict=True)
+    ]
+    size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=0))
+    spectrum = rate * size * np.exp(1j * np.angle(spectra[0]))
+    below, band = frequency < bands.upper[-1], np.searchsorted(bands.upper, frequency)
+    for _ in range(N_SCALING):
+        force = np.fft.irfft(spectrum, count)
+        gain = np.nan_to_num(level - force_exposure_levels(force, rate, "third"))
+        spectrum[below] *= 10 ** (gain[band[below]] / 20)
+    return np.asarray(np.fft.irfft(spectrum, count))
 
 
 def noise_exceeds(scatter: ArrayLike, noise: ArrayLike, count: int) -> NDArray[np.bool_]:

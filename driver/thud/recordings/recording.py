@@ -23,7 +23,12 @@ from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.polarity import check_peak, scan
-from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
+from thud.recordings.recorded_levels import (
+    average_levels,
+    compare_methods,
+    mean_force,
+    measure_levels,
+)
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -129,14 +134,13 @@ class Recording(Displayed):
         config: Config,
         *,
         progress: bool = False,
-        workers: int = 1,
     ) -> Recording:
         """Measure the drops of signals; the other arguments are those of `read_recording`.
 
         Raise InputError if a drop cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
-            signals, checked_config(config), progress=progress, workers=workers
+            signals, checked_config(config), progress=progress
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)
@@ -269,7 +273,7 @@ class Recording(Displayed):
 
     @property
     def not_stated(self) -> tuple[str, ...]:
-        """What has an uncertainty that is not stated, so that no budget includes it."""
+        """What has an uncertainty that is not stated: what it affects is undecided."""
         config = self.config
         plate, stated = config.resonance, config.recorder_filter
         missing = {
@@ -307,6 +311,14 @@ class Recording(Displayed):
         """Return the corrected force of the first drop, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
 
+    def mean_force(self) -> NDArray[np.float64]:
+        """Return the force whose one-third-octave levels are those of the recording, N, shape (n,).
+
+        It has the mean energy of the drops within their gates without that of the noise, and the
+        phase of the first drop.
+        """
+        return mean_force(self.drops, self.average("third").level)
+
     def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - of the protocol
         """Return the mean maximum force, N."""
         return self.peak_force
@@ -343,7 +355,9 @@ class Recording(Displayed):
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
         """Contact time, restitution, peak count, mass and drop height with their budgets."""
-        return drop_estimates(self.drops, self.config, self.calibration_uncertainty)
+        return drop_estimates(
+            self.drops, self.config, self.calibration_uncertainty, self.not_stated
+        )
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
@@ -360,6 +374,7 @@ class Recording(Displayed):
                 self.average(bands),
                 self.calibration_uncertainty,
                 assumed_contributions(self.drops, self.config, bands),
+                self.not_stated,
             )
         return self._level_estimates[bands]
 

@@ -106,9 +106,11 @@ def refuse_same_drops(records: Sequence[Record]) -> None:
         for other in records[:k]:
             if record.path != other.path and _are_simultaneous(record.drops, other.drops):
                 refuse(
-                    f"{record.name}: has the drops of {other.name} at the same instants, at a "
-                    "different scale; simultaneous forces are never averaged",
-                    f"one file with all channels and {HINT}",
+                    f"{record.name}: has the drops of {other.name} at the same instants of its "
+                    "file, in the same shape, at a different scale; simultaneous forces are never "
+                    "averaged",
+                    f"one file with all channels and {HINT}; other balls or heights, which a "
+                    "trigger records at the same instant, in a measurement of their own",
                 )
 
 

@@ -15,8 +15,7 @@ from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.config import Instrument
 from thud.recordings.dates import read_date
 from thud.recordings.measured_drop import ESTIMATES
-from thud.recordings.recorded_levels import REPEATABILITY
-from thud.recordings.restitution import IMPULSE
+from thud.recordings.recorded_levels import NOISE, REPEATABILITY
 from thud.report.rows import SCATTER
 
 if TYPE_CHECKING:
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
     from thud.recordings.recording import Recording
 
 FORMAT = "thud calibration report 1"
-# Contributions to the uncertainty of a level that the laboratory may not have stated.
-LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter", SCATTER)
 # What ISO/IEC 17025:2017, 7.8.2 to 7.8.4, asks of a report, by the key that states it.
 FIELDS = {
     "number": "number of the report",
@@ -121,7 +118,8 @@ def criteria_data(recording: Recording, source: LimitsSource | None = None) -> l
     """Return the criteria of a recording with their budgets, as in ``report.json``.
 
     None: an uncertainty that is not stated, and the margin of an upper bound or a count. The
-    uncertainty of a criterion lacks the contributions that are ``"excluded"``.
+    uncertainty of a criterion lacks the contributions that are ``"excluded"``; ``"allowance"`` is
+    the largest standard uncertainty by them with which ``"verdict_if_stated"`` holds.
     """
     verdict = recording.assess(source)
     finite: list[dict[str, Any]] = _finite(_criteria(recording, verdict.source, verdict.criteria))
@@ -163,7 +161,9 @@ def _criteria(
                 "freedom": estimate.freedom,
                 "coverage_factor": estimate.coverage_factor,
                 "expanded_uncertainty": estimate.expanded if has_budget else None,
-                "excluded": _excluded(recording, criterion, is_level=is_level),
+                "excluded": _excluded(criterion),
+                "verdict_if_stated": criterion.result_if_stated,
+                "allowance": criterion.allowance,
                 "upper_bound": estimate.upper_bound,
                 "lower": criterion.lower,
                 "upper": criterion.upper,
@@ -183,21 +183,13 @@ def _criteria(
     return rows
 
 
-def _excluded(recording: Recording, criterion: Criterion, *, is_level: bool) -> list[str]:
+def _excluded(criterion: Criterion) -> list[str]:
     """Return the contributions that the uncertainty of a criterion should have, but lacks."""
-    by_impulse = any(IMPULSE in drop.restitutions for drop in recording.drops)
-    is_stated = recording.config.mass is not None
-    causes = {
-        "contact_time": (SCATTER,),
-        "restitution": ("drop height", SCATTER, *(("calibration", "mass") if by_impulse else ())),
-        "mass": ("mass",) if is_stated else ("calibration", "drop height", SCATTER),
-        "drop_height": ("drop height",),
-    }
-    relevant = LEVEL_CAUSES if is_level else causes.get(criterion.name, ())
-    lacking = list(recording.not_stated)
-    if REPEATABILITY not in {part.name for part in criterion.estimate.contributions}:
+    lacking = list(criterion.estimate.not_stated)
+    names = {part.name for part in criterion.estimate.contributions}
+    if NOISE in names and REPEATABILITY not in names:
         lacking.append(SCATTER)
-    return [] if math.isnan(criterion.value) else [name for name in lacking if name in relevant]
+    return [] if math.isnan(criterion.value) else lacking
 
 
 def missing_fields(config: Config, origins: Iterable[Origin]) -> list[str]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.level.estimate import NORMAL_FACTOR
+from thud.recordings.budgets import AMPLITUDE_DECIBEL
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -105,12 +108,31 @@ def criterion_rows(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
 def excluded_text(criteria: Sequence[dict[str, Any]]) -> str:
     """Return what the marked uncertainties lack, as a sentence; empty if none is marked."""
     names = list(dict.fromkeys(name for criterion in criteria for name in criterion["excluded"]))
-    stated = [name for name in names if name != SCATTER]
-    parts = [f"{', '.join(stated)} (uncertainty not stated)"] if stated else []
+    lacking = [name for name in names if name != SCATTER]
+    parts = [f"{', '.join(lacking)} (uncertainty not stated: undecided)"] if lacking else []
     parts += [f"{SCATTER} (unknown from one drop)"] if SCATTER in names else []
     if not parts:
         return ""
-    return f"{INCOMPLETE} U excludes, and the verdict treats as zero: {'; '.join(parts)}."
+    decided = list(filter(None, map(_allowance_text, criteria)))
+    allowed = (
+        f" Stated standard uncertainties that decide: {'; '.join(decided)}." if decided else ""
+    )
+    return f"{INCOMPLETE} U excludes {'; '.join(parts)}.{allowed}"
+
+
+def _allowance_text(criterion: dict[str, Any]) -> str:
+    """Return with which uncertainty of what is not stated a criterion is decided, if any."""
+    lacking = [name for name in criterion["excluded"] if name != SCATTER]
+    if not lacking or not criterion["allowance"]:
+        return ""
+    style = criterion_style(criterion)
+    title, _, unit = style.title.partition(", ")
+    size = f"{criterion['allowance'] / style.unit:.2g} {unit}".rstrip()
+    if lacking == ["calibration"] and criterion["band"] is not None:
+        percent = 100 * criterion["allowance"] / AMPLITUDE_DECIBEL
+        size = f"{percent:.2g} % of calibration (U {NORMAL_FACTOR * percent:.2g} %)"
+    name = title if criterion["band"] is not None else title.lower()
+    return f"{name} {criterion['verdict_if_stated']} up to {size}"
 
 
 def limits_of(criterion: dict[str, Any]) -> tuple[float, float]:
