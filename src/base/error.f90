@@ -23,7 +23,7 @@ module thud_error
       character(len=:), allocatable :: message
       !> Whether the time steps are too long; shorter ones may succeed.
       logical :: has_coarse_steps = .false.
-      !> Whether the record is clearly shorter than the contact, at any resolution.
+      !> Whether the record is clearly shorter than the contact, which may have no end, at any resolution.
       logical :: has_short_record = .false.
    end type error_type
 

@@ -14,7 +14,10 @@ module thud_contact_source
    implicit none (type, external)
    private
 
-   public :: coarse_step_error, contact_source_type
+   public :: coarse_step_error, contact_source_type, many_events_error
+
+   !> Maximum number of touches, releases and turning points in one step; more than a few mean that steps are too long.
+   integer, parameter, public :: max_events = 100
 
    !> Equations of motion of the source.
    type, abstract, extends(ode_type) :: contact_source_type
@@ -164,5 +167,12 @@ contains
          //'; allowed: more substeps, a higher sample_rate, or a softer or heavier source')
       error%has_coarse_steps = .true.
    end function coarse_step_error
+
+   !> Error for a step with more than `max_events` events.
+   pure function many_events_error() result(error)
+      type(error_type) :: error
+
+      error = coarse_step_error(to_text(max_events)//' touches, releases and turning points fall into one step')
+   end function many_events_error
 
 end module thud_contact_source

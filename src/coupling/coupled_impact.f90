@@ -1,7 +1,7 @@
 !> Impact of a lumped source on a mobile floor: integrates every contact of the record in time and checks that the source has
 !> left for good. Gravity is left out, as on a rigid floor: a return by gravity is another impact.
 module thud_coupled_impact
-   use thud_contact_source, only: coarse_step_error, contact_source_type
+   use thud_contact_source, only: coarse_step_error, contact_source_type, many_events_error, max_events
    use thud_coupled_phases, only: begin_contact, get_event, get_event_function, impact_type, no_event, pass_event, &
       update_maxima
    use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
@@ -19,9 +19,6 @@ module thud_coupled_impact
    private
 
    public :: solve_coupled
-
-   !> Maximum number of touches, releases and turning points in one step; more than a few mean that steps are too long.
-   integer, parameter :: max_events = 100
 
 contains
 
@@ -110,7 +107,7 @@ contains
          if (allocated(error)) return
          if (.not. remaining > 0.0_wp) return
       end do
-      error = coarse_step_error(to_text(max_events)//' touches, releases and turning points fall into one step')
+      error = many_events_error()
    end subroutine advance
 
    !> Advances source and floor to an event.

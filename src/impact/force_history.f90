@@ -10,7 +10,7 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: add_model_quantity, check_samples, clear_flight, continue_to_zero, force_count, force_history_type
+   public :: add_model_quantity, add_to_means, check_samples, clear_flight, continue_to_zero, force_count, force_history_type
    public :: force_names, holds_impulse, max_residual, new_force_history, numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
@@ -41,9 +41,10 @@ module thud_force_history
 
    !> Force of one impact, and numbers that describe it.
    type :: force_history_type
-      !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate in the record.
+      !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate in the record: it is the value at this
+      !> instant, or the mean over the sampling interval around it.
       real(wp) :: sample_rate = 0.0_wp
-      !> Whether a sample of the force is the mean over a sampling interval, and not the force at an instant.
+      !> Whether a sample of the force is such a mean.
       logical :: has_means = .false.
       !> Deflection of the source, m: [n_sample].
       real(wp), allocatable :: deflection(:)
@@ -85,6 +86,8 @@ module thud_force_history
       real(wp) :: peak_force = 0.0_wp
       !> Maximum elastic force, N, likewise.
       real(wp) :: peak_elastic_force = 0.0_wp
+      !> Maximum force on the floor in the steps of a model whose samples are means over several, N; otherwise 0.
+      real(wp) :: step_peak_force = 0.0_wp
       !> Maximum deflection, m.
       real(wp) :: max_deflection = 0.0_wp
       !> Velocity at release divided by velocity at first touch.
@@ -136,8 +139,22 @@ contains
       if (allocated(history%model_history)) history%model_history(last + 1:, :) = 0.0_wp
    end subroutine clear_flight
 
-   !> Estimates the contact time between samples: a straight line through the last two samples of the first contact
-   !> continues the force to zero.
+   !> Adds the integral of a quantity over a part of a sampling interval to the means of the samples before and after it.
+   pure subroutine add_to_means(integral, interval, i, fraction, mean)
+      !> The integral, in the unit of the quantity times s; sampling interval, s.
+      real(wp), intent(in) :: integral, interval
+      !> Index of the sample before.
+      integer, intent(in) :: i
+      !> Fraction of the part that lies nearer to the sample after.
+      real(wp), intent(in) :: fraction
+      !> Means over the sampling intervals around the samples: [n_sample].
+      real(wp), intent(inout) :: mean(:)
+
+      mean(i) = mean(i) + (1 - fraction)*integral/interval
+      if (i < size(mean)) mean(i + 1) = mean(i + 1) + fraction*integral/interval
+   end subroutine add_to_means
+
+   !> Estimates the contact time between samples, which are means: a force that falls linearly to zero has the last two.
    pure subroutine continue_to_zero(history)
       !> The history, with its contact time; `exact_contact_time` is set.
       type(force_history_type), intent(inout) :: history
@@ -147,11 +164,10 @@ contains
       last = min(size(history%floor_force), ceiling((history%touch_time + history%contact_time)*history%sample_rate) + 2)
       last = findloc(abs(history%floor_force(:last)) > 0.0_wp, .true., dim=1, back=.true.)
       if (last < 2) return
-      associate (before => history%floor_force(last - 1), end => history%floor_force(last))
-         fraction = 1.0_wp
-         if (before > end) fraction = min(1.0_wp, end/(before - end))
-      end associate
-      history%exact_contact_time = (last - 1 + fraction)/history%sample_rate - history%touch_time
+      ! The force ends at the fraction x of the last interval: end/before = x**2/(2 x + 1).
+      fraction = max(0.0_wp, history%floor_force(last))/maxval(history%floor_force(last - 1:last))
+      fraction = min(1.0_wp, fraction + sqrt(fraction**2 + fraction))
+      history%exact_contact_time = (last - 1.5_wp + fraction)/history%sample_rate - history%touch_time
    end subroutine continue_to_zero
 
    !> Adds a scalar quantity of the model.

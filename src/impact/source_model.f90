@@ -13,7 +13,7 @@ module thud_source_model
    use thud_kinds, only: wp
    use thud_receiver, only: get_pole_count, receiver_type
    use thud_sampling, only: get_step_count, sampling_type
-   use thud_validity_limit, only: get_gravity_limit, validity_limit_type
+   use thud_validity_limit, only: get_gravity_limit, get_size_limit, validity_limit_type
    implicit none (type, external)
    private
 
@@ -132,7 +132,8 @@ contains
       modulus = 0.0_wp
    end function get_paper_modulus
 
-   !> Validity limits of the model for a result; by default only the limit for neglecting gravity during the contact.
+   !> Validity limits of the model for a result; by default those of a source without size and without gravity during the
+   !> contact.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -143,7 +144,7 @@ contains
       !> The limits: [n_limit].
       type(validity_limit_type), allocatable :: limits(:)
 
-      limits = [get_gravity_limit(drop, history)]
+      limits = [get_gravity_limit(drop, history), get_size_limit(ball, history)]
    end function get_validity_limits
 
    !> Loss factor of the material against frequency; models without a material return an error.

@@ -9,7 +9,8 @@ module thud_validity_limit
    implicit none (type, external)
    private
 
-   public :: get_gravity_limit, get_limit_message, get_wall_limits, get_wave_limit, is_outside, validity_limit_type
+   public :: get_gravity_limit, get_limit_message, get_size_limit, get_wall_limits, get_wave_limit, is_outside
+   public :: validity_limit_type
 
    !> Length of a message about a limit.
    integer, parameter :: message_length = 240
@@ -77,6 +78,16 @@ contains
          drop%gravity*history%contact_time/history%impact_velocity, highest=0.2_wp, &
          reason='gravity acts before first touch only')
    end function get_gravity_limit
+
+   !> Limit of models that do not know the size of the source.
+   pure function get_size_limit(ball, history) result(limit)
+      type(ball_type), intent(in) :: ball
+      type(force_history_type), intent(in) :: history
+      type(validity_limit_type) :: limit
+
+      limit = validity_limit_type('drop', 'deflection over twice outer_radius', &
+         history%max_deflection/(2*ball%outer_radius), highest=1.0_wp, reason='the source is no thicker')
+   end function get_size_limit
 
    !> Limit of the velocity at first touch, as a fraction of the velocity of waves in the wall.
    pure function get_wave_limit(ball, history, highest) result(limit)

@@ -1,7 +1,7 @@
 !> Impact of a source of a few masses: integrates in time from first touch until the source has left for good, samples the
 !> forces, and checks the balances of impulse and energy.
 module thud_lumped
-   use thud_contact_source, only: coarse_step_error, contact_source_type
+   use thud_contact_source, only: coarse_step_error, contact_source_type, many_events_error, max_events
    use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
@@ -123,14 +123,15 @@ contains
       real(wp), intent(inout) :: state(:)
       !> Gets maxima, and the time of each release.
       type(force_history_type), intent(inout) :: history
-      !> Set if the state leaves the domain of the equation.
+      !> Set if the state leaves the domain of the equation, or the step has too many events.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: new_state(size(state))
       real(wp) :: time, length
+      integer :: k
       logical :: valid
 
       time = start_time
-      do
+      do k = 1, max_events
          length = start_time + step - time
          if (.not. length > 0.0_wp) return
          call rk4_step(source, time, state, length, new_state, valid)
@@ -140,7 +141,12 @@ contains
             error = source%get_failure(drop, time + length, new_state)
             return
          end if
-         if (new_state(source%get_event_component()) > 0.0_wp) exit
+         if (new_state(source%get_event_component()) > 0.0_wp) then
+            state = new_state
+            ! The maxima of a single mass are taken at the turning point and at samples.
+            if (source%n_mass > 1) call source%record_peaks(state, history)
+            return
+         end if
          length = locate_zero(source, time, state, length, source%get_event_component())
          call rk4_step(source, time, state, length, new_state, valid)
          time = time + length
@@ -148,9 +154,7 @@ contains
          call source%begin_next_phase(time, state, history)
          if (source%has_separated(state)) return
       end do
-      state = new_state
-      ! The maxima of a single mass are taken at the turning point and at samples.
-      if (source%n_mass > 1) call source%record_peaks(state, history)
+      error = many_events_error()
    end subroutine advance
 
    !> Sets the scalars of the impact from the state after the last release, and checks the balances.

@@ -371,6 +371,20 @@ def test_levels_differ_from_single_drops_by_the_rounding_of_their_energy() -> No
     assert max(ratios) > 1e8
 
 
+def test_shells_that_need_shorter_steps_equal_single_drops() -> None:
+    columns = {"youngs_modulus": [99.5e6, 60e6, 150e6, 1.6e6], "height": [8.77, 8.77, 4.0, 1.0]}
+    many = thud.solve_many(columns, sample_rate=8000.0)
+    shortened = []
+    for i, (modulus, height) in enumerate(zip(*columns.values(), strict=True)):
+        single = thud.solve(thud.Ball(youngs_modulus=modulus), thud.Drop(height), sample_rate=8e3)
+        shortened.append("shortened_time_step" in single.model_quantities)
+        for force in ("elastic", "floor"):
+            levels = many.levels[force, "octave"][i]
+            np.testing.assert_allclose(levels, single.levels(force=force), rtol=0, atol=1e-6)
+        assert many.contact_time[i] == pytest.approx(single.contact_time, rel=1e-10)
+    assert shortened == [True, False, True, False]
+
+
 def test_levels_of_long_contacts_are_those_of_single_drops() -> None:
     # Contacts of 0.2 s, whose levels are taken record by record, beside one of 0.02 s.
     case = thud.Case(model=thud.HollowSphere("none"), sampling=thud.Sampling(duration=0.3))

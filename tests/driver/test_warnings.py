@@ -83,6 +83,9 @@ OUTSIDE = {
     " &model name = 'modal_ball' /",
     naming("&drop: deflection", "wall_thickness", 2.0, "buckles"): "&ball wall_thickness = 0.0272,"
     " youngs_modulus = 4e5 / &drop height = 1.6 / &sampling duration = 0.1 /",
+    naming("&drop: deflection", "twice outer_radius", 2.8, 1.0): "&drop height = 50 / &sampling"
+    " duration = 0.1 / &model name = 'measured_modes' / &measured_modes frequency = 10,"
+    " damping_ratio = 0, effective_mass = 2.5 /",
     naming("&drop: velocity", "youngs_modulus", "density", 0.25): "&drop height = 7 /",
     naming("&ball", "stress", "gauge_pressure", "youngs_modulus", 0.1): "&ball"
     " gauge_pressure = 3e5 /",

@@ -10,7 +10,7 @@ module thud_finite_element
    use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
-   use thud_force_history, only: add_model_quantity, force_history_type
+   use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
       new_impact_run, update_position, update_velocity
@@ -22,7 +22,7 @@ module thud_finite_element
    use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
-   use thud_receiver, only: get_pole_count, receiver_type
+   use thud_receiver, only: can_strike, get_pole_count, receiver_type
    use thud_sampling, only: get_step_count, sampling_type
    use thud_source_model, only: typical_contact
    use thud_text, only: fixed, significant, to_text
@@ -51,16 +51,18 @@ module thud_finite_element
    !> Factor with which a number of three digits is never rounded down.
    real(wp), parameter :: rounded_up = 1.005_wp
 
-   !> Time between two checks of the step, s: the ball deforms little meanwhile.
+   !> Time between two checks of the step, or of a mobile floor after a contact, s: the ball deforms little meanwhile.
    real(wp), parameter :: check_interval = 0.5e-3_wp
 
    !> The contacts of a run.
    type :: contacts_type
       !> Time without touch after which a contact is over, s: shear waves have crossed the ball.
       real(wp) :: settling_time = 0.0_wp
+      !> Instant from which on the contact is over if a mobile floor cannot strike again, s.
+      real(wp) :: next_check = 0.0_wp
       !> First and latest instant of the present contact, s.
       real(wp) :: first = 0.0_wp, latest = 0.0_wp
-      !> Whether there is a contact, or was one less than `settling_time` ago.
+      !> Whether there is a contact, or was one that is not over.
       logical :: active = .false.
       !> Number of contacts that are over.
       integer :: n_over = 0
@@ -290,7 +292,9 @@ contains
                   get_contact_stress(run, interval), run%state%gas_pressure, run%floor%displacement)
                run%node_impulse = 0.0_wp
             end if
-            call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
+            call add_to_means(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), &
+               history%floor_force)
+            history%impulse = history%impulse + run%impulse
             call follow_contact(run, contacts, time, interval/n_step, history)
             call update_position(run, interval/n_step)
          end do
@@ -301,13 +305,14 @@ contains
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the' &
             //' mobile floor; allowed: longer than the contact, which never ends on a floor too light for the ball')
       else if (contacts%n_over < options%bounces) then
-         error = get_duration_error(contacts, options%bounces, sampling%duration)
+         error = get_duration_error(run, contacts, options%bounces, sampling%duration)
       end if
       if (.not. allocated(error)) call continue_flight(run, latest, touch_height, history)
    end subroutine march
 
    !> The error of a record that ends before the last wanted contact is over.
-   function get_duration_error(contacts, bounces, duration) result(error)
+   function get_duration_error(run, contacts, bounces, duration) result(error)
+      type(impact_run_type), intent(in) :: run
       type(contacts_type), intent(in) :: contacts
       !> Number of wanted contacts.
       integer, intent(in) :: bounces
@@ -318,8 +323,15 @@ contains
 
       error = input_error('&sampling: duration = '//to_text(duration)//' s ends before contact '//to_text(bounces) &
          //' is over')
-      if (contacts%active .and. contacts%n_over + 1 == bounces) then
-         required = ceiling(1.0e3_wp*(contacts%latest + contacts%settling_time))/1.0e3_wp
+      if (run%floor%moves .and. run%time > contacts%latest + contacts%settling_time) then
+         error = input_error('&sampling: duration = '//to_text(duration) &
+            //' s ends while the floor may strike the ball again; allowed: longer')
+         error%has_short_record = .true.
+      else if (contacts%active .and. contacts%n_over + 1 == bounces) then
+         required = contacts%latest + contacts%settling_time
+         ! The end of a contact that lasts is not known.
+         if (run%impulse > 0.0_wp) required = required + contacts%latest - contacts%first
+         required = ceiling(1.0e3_wp*required)/1.0e3_wp
          error%message = error%message//'; set duration to at least '//fixed(required, 3)//' s'
          error%has_short_record = required > short_record*duration
       else
@@ -354,24 +366,6 @@ contains
       end associate
    end subroutine check_step
 
-   !> Distributes the impulse of the floor in one step between the mean forces of two samples.
-   pure subroutine add_impulse(impulse, interval, i, fraction, history)
-      !> The impulse, N s; sampling interval, s.
-      real(wp), intent(in) :: impulse, interval
-      !> Index of the sample before the step.
-      integer, intent(in) :: i
-      !> Fraction of the step that lies nearer to the next sample.
-      real(wp), intent(in) :: fraction
-      !> Gets the impulse.
-      type(force_history_type), intent(inout) :: history
-
-      associate (force => history%floor_force)
-         force(i) = force(i) + (1 - fraction)*impulse/interval
-         if (i < size(force)) force(i + 1) = force(i + 1) + fraction*impulse/interval
-      end associate
-      history%impulse = history%impulse + impulse
-   end subroutine add_impulse
-
    !> Whether a node may reach the floor in the next step.
    pure function will_touch(run, step) result(touches)
       type(impact_run_type), intent(in) :: run
@@ -385,6 +379,14 @@ contains
             - run%contact%edge_height) + run%floor%stop + step*run%floor%velocity < 0.0_wp
       end associate
    end function will_touch
+
+   !> Minimum gap between ball and floor, m.
+   pure function get_gap(run) result(gap)
+      type(impact_run_type), intent(in) :: run
+      real(wp) :: gap
+
+      gap = minval(run%position(:, ubound(run%position, 2), 2) - run%contact%edge_height) + run%floor%displacement
+   end function get_gap
 
    !> Mean stress of the floor on the deformed surface since the latest sample.
    pure function get_contact_stress(run, interval) result(stress)
@@ -421,7 +423,12 @@ contains
          if (.not. contacts%active) contacts%first = time - step/2
          contacts%active = .true.
          contacts%latest = time + step/2
-      else if (contacts%active .and. time > contacts%latest + contacts%settling_time) then
+         contacts%next_check = contacts%latest + contacts%settling_time
+      else if (contacts%active .and. time > contacts%next_check) then
+         if (run%floor%moves) then
+            contacts%next_check = time + check_interval
+            if (can_strike(run%floor%receiver, run%floor%motion, get_gap(run), get_mean_velocity(run))) return
+         end if
          contacts%active = .false.
          contacts%n_over = contacts%n_over + 1
          if (contacts%n_over > 1) return
@@ -456,6 +463,11 @@ contains
          error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
             //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to ' &
             //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
+      else if (run%dissipated + run%contact_loss + run%friction_loss &
+         > run%total_mass/2*history%impact_velocity**2) then
+         error = numerical_error(trim(event_prefix(time))//' the ball has lost the energy of the drop and stays on the ' &
+            //'floor; allowed: less viscosity, or a higher drop')
+         error%has_short_record = .true.
       else
          residual = abs(get_energy(run) - first_energy)/(run%total_mass/2*history%impact_velocity**2)
          history%energy_residual = max(history%energy_residual, residual)

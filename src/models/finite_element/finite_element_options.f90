@@ -1,6 +1,6 @@
 !> Options of the finite-element model, group by group; `thud_finite_element` adds the solution.
 module thud_finite_element_options
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, get_density
    use thud_band, only: octave_count
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
@@ -47,8 +47,9 @@ module thud_finite_element_options
    real(wp), parameter :: slip_friction(2) = [0.33_wp, 0.95_wp]
 
    !> Changes of the octave levels of the standard ball by it, from the default elements to the converged level, dB;
-   !> the change is taken as proportional to the element size.
+   !> the change is taken as proportional to the element size. Frequencies scale with the velocity of shear waves per radius.
    real(wp), parameter :: slip_error(octave_count) = [0.03_wp, 0.05_wp, 0.25_wp, 0.6_wp, 1.3_wp]
+   type(ball_type), parameter :: standard_ball = ball_type(youngs_modulus=2.08e6_wp)
 
    !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
    real(wp), parameter :: thin_wall = 0.25_wp, high_friction = 0.3_wp
@@ -218,6 +219,8 @@ contains
       class(finite_element_options_type), intent(in) :: options
       real(wp) :: error(octave_count)
       type(mesh_options_type) :: automatic, mesh
+      real(wp) :: octave, scale
+      integer :: i, below
       logical :: slips
 
       error = 0.0_wp
@@ -225,8 +228,23 @@ contains
       if (.not. slips .or. is_viscous(options%material)) return
       automatic = get_element_counts(ball, mesh_options_type())
       mesh = get_element_counts(ball, options%mesh)
-      error = slip_error*automatic%polar_elements/mesh%polar_elements
+      scale = get_shear_rate(ball)/get_shear_rate(standard_ball)
+      do i = 1, octave_count
+         ! The octave of the standard ball that corresponds to this one; octaves are 10**0.3 apart.
+         octave = min(real(octave_count, wp), max(1.0_wp, i - log10(scale)/0.3_wp))
+         below = min(int(octave), octave_count - 1)
+         error(i) = slip_error(below) + (octave - below)*(slip_error(below + 1) - slip_error(below))
+      end do
+      error = error*automatic%polar_elements/mesh%polar_elements
    end function get_min_error
+
+   !> Velocity of shear waves per outer radius, 1/s.
+   pure function get_shear_rate(ball) result(rate)
+      type(ball_type), intent(in) :: ball
+      real(wp) :: rate
+
+      rate = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))/ball%outer_radius
+   end function get_shear_rate
 
    !> Whether the viscosity of the material is that of Kelvin and Voigt.
    pure function is_viscous(material) result(yes)

@@ -135,7 +135,7 @@ contains
       history%peak_force = maxval(recorded)
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
-      history%max_deflection = maxval(history%deflection)
+      history%max_deflection = maxval(history%deflection, mask=history%floor_force > 0.0_wp)
       call add_model_quantity(history, 'shear_modulus', 'Pa', run%body%material%shear_modulus)
       call add_model_quantity(history, 'bulk_modulus', 'Pa', run%body%material%bulk_modulus)
       call add_model_quantity(history, 'simulated_time', 's', run%time)

@@ -17,6 +17,7 @@ module thud_shell_samples
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_new_field, only: in_group
+   use thud_numerical_error, only: has_quantity
    use thud_power, only: not_a_number
    use thud_sampling, only: get_sample_count, min_contact_samples, sampling_type
    use thud_shell_batch, only: batch_size
@@ -24,7 +25,7 @@ module thud_shell_samples
    implicit none (type, external)
    private
 
-   public :: block_size, get_blocks, get_numbers, get_sample_fields, sample_outcome_type, sample_type, solve_block
+   public :: block_size, get_blocks, get_sample_fields, sample_outcome_type, sample_type, solve_block
 
    !> Samples of one block.
    integer, parameter :: block_size = batch_size
@@ -65,19 +66,11 @@ contains
    function get_sample_fields(sample) result(fields)
       !> The sample that the fields read and set.
       type(sample_type), intent(in), target :: sample
-      !> One field per number, as in `get_numbers`: [n_key].
+      !> One field per number: [n_key].
       type(field_type), allocatable :: fields(:)
 
       fields = [in_group('ball', get_ball_fields(sample%ball)), in_group('drop', get_drop_fields(sample%drop))]
    end function get_sample_fields
-
-   !> The numbers of a sample, in the order of their keys: [n_key]. Ball and drop have no other components.
-   pure function get_numbers(sample) result(values)
-      type(sample_type), intent(in) :: sample
-      real(wp) :: values((storage_size(sample%ball) + storage_size(sample%drop))/storage_size(1.0_wp))
-
-      values = [transfer(sample%ball, values), transfer(sample%drop, values)]
-   end function get_numbers
 
    !> Blocks of the samples that can be computed: with one choice of the flux term, so that balls share their equation, and
    !> with similar contact times, because a block takes as long as its longest contact.
@@ -124,16 +117,19 @@ contains
       type(sample_type), intent(in) :: samples(:)
       !> Whether all values of the sample do: [n_sample].
       logical, intent(out) :: valid(:)
-      type(sample_type), target :: any_sample
+      type(sample_type), target :: sample
       type(field_type), allocatable :: fields(:)
       type(interval_type) :: range
       real(wp), allocatable :: values(:, :)
-      integer :: i
+      integer :: i, j
 
-      allocate (fields, source=get_sample_fields(any_sample))
+      allocate (fields, source=get_sample_fields(sample))
       allocate (values(size(samples), size(fields)))
       do i = 1, size(samples)
-         values(i, :) = get_numbers(samples(i))
+         sample = samples(i)
+         do j = 1, size(fields)
+            values(i, j) = fields(j)%real_value
+         end do
       end do
       valid = samples%flux >= 1 .and. samples%flux <= size(compression_weights)
       do i = 1, size(fields)
@@ -242,10 +238,11 @@ contains
          energy_residual = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
       end associate
       if (max(impulse_residual, energy_residual) <= max_batch_residual) return
-      ! The sums of the single solver, which include the stages of each step, decide.
+      ! The sums of the single solver, which include the stages of each step, decide. If it shortens the steps, the result is
+      ! its own.
       call solve_hollow_sphere(sample%ball, sample%drop, hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), &
          sampling, history, error)
-      computed = .not. allocated(error)
+      computed = .not. allocated(error) .and. .not. has_quantity(history, 'shortened_time_step')
    end function is_computed
 
 end module thud_shell_samples

@@ -11,7 +11,8 @@ module thud_modal_ball
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: add_model_quantity, continue_to_zero, force_history_type, max_residual, new_force_history
+   use thud_force_history, only: add_model_quantity, add_to_means, continue_to_zero, force_history_type, max_residual, &
+      new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
@@ -341,8 +342,8 @@ contains
       type(force_history_type), intent(inout) :: history
       !> Set if the contact outlasts the record, or if too much energy is lost in the contact.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: settling_time
-      integer :: i, j, n_step, last_contact
+      real(wp) :: settling_time, before, fraction
+      integer :: i, j, n_step, last_contact, nearest
       logical :: has_separated
 
       ! The surface may touch again while the slowest mode swings back, half a period later.
@@ -354,14 +355,18 @@ contains
          call record_motion(ball, modes, state, i, history)
          do j = 1, sampling%substeps
             n_step = (i - 1)*sampling%substeps + j
+            fraction = min(1.0_wp, max(0.0_wp, j - sampling%substeps/2.0_wp))
+            before = state%floor_motion%displacement
             call take_step(modes, static, interval, ball%mass, state, contact, error)
             call check_interrupt(error)
             if (allocated(error)) return
             if (contact%outermost > 0) then
                last_contact = n_step
                history%impulse = history%impulse + state%force*interval
-               history%component(i, 1) = history%component(i, 1) + state%force/sampling%substeps
-               history%model_history(i, 1) = max(history%model_history(i, 1), &
+               history%step_peak_force = max(history%step_peak_force, state%force)
+               call add_to_means(state%force*interval, 1/sampling%sample_rate, i, fraction, history%component(:, 1))
+               nearest = min(i + nint(fraction), size(history%floor_force))
+               history%model_history(nearest, 1) = max(history%model_history(nearest, 1), &
                   ball%outer_radius*rings%radius(contact%outermost))
             end if
             if (contact%outermost == size(rings%radius)) then
@@ -372,6 +377,8 @@ contains
                   //'lower height')
                return
             end if
+            if (state%floor_moves) call add_to_means(state%floor_motion%displacement - before, 1/sampling%sample_rate, i, &
+               fraction, history%floor_velocity)
             has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
             if (has_separated .and. .not. state%floor_moves) exit samples
          end do
@@ -380,13 +387,8 @@ contains
             has_separated = stays_clear(modes, contact%n_dof, state)
             if (has_separated) exit samples
          end if
-         if (state%floor_moves) then
-            ! The mean over the interval, as for the force.
-            history%floor_velocity(i) = (state%floor_motion%displacement - history%floor_displacement(i)) &
-               *sampling%sample_rate
-            history%velocity(i) = history%velocity(i) - history%floor_velocity(i)
-         end if
       end do samples
+      if (state%floor_moves) history%velocity = history%velocity - history%floor_velocity
       call check_end(sampling, settling_time, has_separated, contact, state, error)
       if (allocated(error)) return
       history%contact_time = last_contact*interval
@@ -443,6 +445,7 @@ contains
       history%floor_force = history%component(:, 1)
       history%peak_force = maxval(history%floor_force)
       history%peak_elastic_force = history%peak_force
+      history%max_deflection = maxval(history%deflection, mask=history%floor_force > 0.0_wp)
       call continue_to_zero(history)
       ! Extrapolated back to the end of the contact.
       history%restitution = (state%velocity + state%gravity*(time - history%contact_time))/history%impact_velocity
@@ -474,7 +477,6 @@ contains
       history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
       history%velocity(i) = -state%velocity
       if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
-      history%max_deflection = max(history%max_deflection, history%deflection(i))
       ! A level without an own result has no energies.
       if (size(history%model_history, 2) == 1) return
       energy = get_energies(modes, state%motion)
