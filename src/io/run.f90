@@ -171,7 +171,7 @@ contains
       call add_file(files, 'effective.nml', text)
       if (case%has_modes) then
          call extend(files, size(modes_file_names))
-         call get_modes_files(results%modes, files)
+         call get_modes_files(results%modes, files(2:))
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
       ! A case without an impact has free modes alone: neither floor nor room nor compression.

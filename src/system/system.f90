@@ -277,11 +277,11 @@ contains
    !> Names in a directory.
    subroutine list_directory(path, names)
       character(len=*), intent(in) :: path
-      !> The names; none if the directory cannot be read: [n_name].
+      !> The names in order; none if the directory cannot be read: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
       character(len=name_length + 1) :: name
       type(c_ptr) :: directory
-      integer :: n, length
+      integer :: n, length, first
 
       allocate (names(64))
       n = 0
@@ -299,6 +299,10 @@ contains
          if (c_closedir(directory) /= 0) n = 0
       end if
       names = names(:n)
+      do n = 1, size(names) - 1
+         first = n - 1 + minloc(names(n:), dim=1)
+         names([n, first]) = names([first, n])
+      end do
    end subroutine list_directory
 
    !> Resolves links in a path; creates missing parent directories.
