@@ -78,7 +78,8 @@ contains
          inquire (file=self%path, exist=exists)
          if (exists) error = input_error(self%path//' is not a directory that can be read; allowed: a directory')
          return
-      else if (is_same_file(self%path, '.')) then
+      end if
+      if (is_same_file(self%path, '.')) then
          error = input_error(self%path//' is the working directory, which cannot be replaced; allowed: ' &
             //'another directory')
          return
@@ -93,7 +94,7 @@ contains
             //trim(self%command//' '//self%subject)//', or --replace (replace=True)')
          return
       end if
-      if (command /= self%command) listed = [character(len=name_length) ::]
+      if (command /= self%command) listed = [character(len=name_length) :: ]
       do i = 1, size(present_names)
          path = self%path//'/'//trim(present_names(i))
          do j = 1, size(self%inputs)

@@ -51,7 +51,6 @@ def test_studies_of_the_repository(
     assert cli.main(["fit", str(STUDIES / f"{name}.toml")]) == 0
     folder = tmp_path / "outputs" / name
     assert names_in(folder) == [
-        ".thud",
         "confidence.svg",
         "fit.csv",
         "fit.json",
@@ -270,7 +269,7 @@ def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) ->
     np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
     assert cli.main([*fit, "--replace"]) == 0
     assert names_in(tmp_path / "found") == [
-        ".thud", "fit.csv", "fit.json", "fit.svg", "fitted.nml",
+        "fit.csv", "fit.json", "fit.svg", "fitted.nml",
     ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Directories of results: the old or the new ones as a whole; files of the user are never removed."""
+"""Directories of results: the old or the new ones as a whole; files of the user stay."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def test_runs_into_one_directory_do_not_mix(
 @pytest.mark.parametrize(
     "action", ["kill", *(pytest.param(a, marks=pytest.mark.slow) for a in ("int", errno.EIO))]
 )
-def test_old_or_new_results_are_whole_whichever_call_fails(  # noqa: PLR0913, PLR0917
+def test_old_or_new_results_are_whole_whichever_call_fails(  # noqa: PLR0913
     run: Run, two_inputs: TwoInputs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     action: str | int, *, exchange: bool,
 ) -> None:  # fmt: skip
@@ -189,9 +189,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(place)], check=True)  # noqa: S607
 
 
-def test_full_disk_keeps_the_old_results(
-    run: Run, two_inputs: TwoInputs, small_disk: Path
-) -> None:
+def test_full_disk_keeps_the_old_results(run: Run, two_inputs: TwoInputs, small_disk: Path) -> None:
     assert run("a/case.nml", "-o", small_disk / "out").returncode == 0
     result = run("b/case.nml", "-o", small_disk / "out")
     assert result.returncode == 1

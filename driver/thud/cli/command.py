@@ -50,9 +50,7 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(message) from error
 
 
-REPLACE = argument(
-    "--replace", action="store_true", help="also replace results of something else"
-)
+REPLACE = argument("--replace", action="store_true", help="also replace results of something else")
 
 
 def output(meaning: str) -> tuple[Argument, Argument]:

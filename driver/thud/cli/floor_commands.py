@@ -18,7 +18,6 @@ from thud.cli.command import (
     NO_FIGURES,
     PAGE,
     QUIET,
-    REPLACE,
     Command,
     argument,
     number,

@@ -85,9 +85,9 @@ class _Files(dict[str, str]):
                 # Opening a pipe could block.
                 return os.open(name, flags | os.O_NONBLOCK, dir_fd=directory)
 
-            for name in os.listdir(directory):
+            for name in os.listdir(directory):  # noqa: PTH208 - by its descriptor
                 if name.endswith(_ENDINGS):
-                    with open(name, encoding="utf-8", opener=opener) as file:  # noqa: PTH123
+                    with open(name, encoding="utf-8", opener=opener) as file:
                         self[name] = file.read()
         finally:
             os.close(directory)

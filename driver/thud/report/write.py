@@ -16,7 +16,7 @@ from thud.recordings.picture import read_picture
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from thud.recordings.recording import Recording
 

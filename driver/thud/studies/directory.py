@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
 from thud.base.files import (
-    is_directory, is_failure, is_one_of, refuse_foreign, replace_file
+    is_directory,
+    is_failure,
+    is_one_of,
+    refuse_foreign,
+    replace_file,
 )  # fmt: skip
 
 if TYPE_CHECKING:
@@ -115,13 +119,15 @@ def require_version(
             )
         if changes:
             outdated.append(path)
-    for path in outdated:
-        if is_directory(path):
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
-    for name in others if outdated else ():
-        (results.folder / name).unlink(missing_ok=True)
+    for path in [*outdated, *(results.folder / name for name in others if outdated)]:
+        _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if is_directory(path):
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:

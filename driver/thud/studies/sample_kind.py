@@ -13,7 +13,7 @@ from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
-from thud.studies.directory import StudyDirectory, FORMATS
+from thud.studies.directory import FORMATS, StudyDirectory
 from thud.studies.kind import Kind
 from thud.studies.parameter import read_varied
 from thud.studies.samples import SampleStudy

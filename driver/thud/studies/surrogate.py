@@ -12,12 +12,12 @@ from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
-    from thud.studies.directory import StudyDirectory
     import os
     from collections.abc import Mapping
     from pathlib import Path
 
     from thud.case.case import Case
+    from thud.studies.directory import StudyDirectory
     from thud.studies.kind import RunOptions
     from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
