@@ -13,7 +13,6 @@ from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.base.files import locked
 from thud.studies.fit import KIND
 
 if TYPE_CHECKING:
@@ -247,16 +246,6 @@ def test_results_of_another_record_or_case_are_not_touched(
         words = naming("&ball: mass", 2.5, 2.4) if mass == 2.4 else naming("numbers", "[target]")
         assert re.search(words, capsys.readouterr().err)
         assert (tmp_path / "found/fit.json").read_bytes() == before
-
-
-def test_fits_take_a_directory_one_at_a_time(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "found").mkdir()
-    with locked(tmp_path / "found"):
-        assert cli.main(FIT) == 1
-    assert "found/fit.json" in capsys.readouterr().err
-    assert cli.main(FIT) == 0
 
 
 def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) -> None:
