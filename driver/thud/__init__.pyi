@@ -2,7 +2,6 @@ from . import plot as plot
 from .base.errors import (
     FitWarning as FitWarning,
     InputError as InputError,
-    LockWarning as LockWarning,
     NumericalError as NumericalError,
     PlausibilityWarning as PlausibilityWarning,
     ThudError as ThudError,

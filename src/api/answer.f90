@@ -5,6 +5,7 @@ module thud_answer
    use thud_case_answers, only: answer_compression, answer_effective_case, answer_loss_factors, answer_modes, answer_run, &
       answer_samples, answer_solve, describe_library
    use thud_case_text, only: read_case
+   use thud_directory_answers, only: answer_check_results, answer_close_results, answer_open_results
    use thud_error, only: error_type, input_error
    use thud_floor_answers, only: answer_floor_energy, answer_floor_impact, answer_floor_modes, answer_mobility, &
       answer_mobility_fit, answer_modal_room, answer_point_velocity, answer_radiation, answer_radiator, answer_room_level
@@ -44,6 +45,12 @@ contains
          call answer_effective_case(request, bundle, error)
       case ('run')
          call answer_run(request, bundle, error)
+      case ('check_results')
+         call answer_check_results(request, error)
+      case ('open_results')
+         call answer_open_results(request, bundle, error)
+      case ('close_results')
+         call answer_close_results(request, error)
       case ('solve')
          call answer_solve(case, bundle, error)
       case ('modes')

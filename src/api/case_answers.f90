@@ -12,7 +12,7 @@ module thud_case_answers
    use thud_progress_line, only: begin_progress, end_progress
    use thud_request, only: request_type
    use thud_result_bundle, only: add_compression, add_results
-   use thud_run, only: load_case, outcome_type, run_case
+   use thud_run, only: load_case, outcome_type, run_case, run_options_type
    use thud_sampling, only: get_sample_count
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
    use thud_text, only: newline, split, to_text
@@ -49,30 +49,32 @@ contains
       call bundle%add_text('case', text)
    end subroutine answer_effective_case
 
-   !> Runs the namelist file `path` like the executable, with results in the directory `output`. Numbers other than 0 ask to
-   !> replace files that thud has not written (`replace`), to write additional quantities of the model (`all`), to show
-   !> numbers of the solver in the table (`verbose`), and to show progress on a terminal (`progress`).
+   !> Runs the namelist file `path` like the executable, and writes the results into the directory `folder`. Numbers other
+   !> than 0 ask to write additional quantities of the model (`all`), to show numbers of the solver in the table (`verbose`),
+   !> and to show progress on a terminal (`progress`).
    subroutine answer_run(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> Set if the run fails; nothing has been written then.
+      !> Set if the run fails.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       type(results_type) :: results
       type(outcome_type) :: outcome
-      character(len=:), allocatable :: path, output, text
+      type(run_options_type) :: options
+      character(len=:), allocatable :: path, text
       integer :: i
 
       call request%get_text('path', path)
-      call request%get_text('output', output)
+      options%write_all = request%get_number('all') > 0.0_wp
+      options%verbose = request%get_number('verbose') > 0.0_wp
+      call request%get_text('folder', options%folder)
+      options%output = options%folder
       if (request%get_number('progress') > 0.0_wp) call begin_progress()
-      call run_case(path, output, request%get_number('replace') > 0.0_wp, request%get_number('all') > 0.0_wp, &
-         request%get_number('verbose') > 0.0_wp, case, results, outcome, error)
+      call run_case(path, options, case, results, outcome, error)
       call end_progress()
       if (allocated(error)) return
       call get_case_text(case, text)
       call bundle%add_text('case', text)
-      call bundle%add_text('directory', outcome%directory)
       call bundle%add_text('table', outcome%table)
       do i = 1, outcome%n_message
          call bundle%add_text('messages.'//to_text(i), outcome%messages(i)%text)

@@ -8,7 +8,7 @@ module thud_command_line
    use thud_kinds, only: wp
    use thud_memory, only: require_memory
    use thud_progress_line, only: begin_progress, end_progress
-   use thud_run, only: outcome_type, run_case
+   use thud_run, only: outcome_type, run_case, run_options_type
    use thud_samples_run, only: run_samples
    use thud_schema, only: get_schema
    use thud_screen, only: print_message, print_results, red, write_screen, yellow
@@ -44,7 +44,7 @@ module thud_command_line
       character(len=:), allocatable :: case_file
       !> Output directory; empty if not given.
       character(len=:), allocatable :: output
-      !> Also replace files that thud has not written.
+      !> Also replace results of another case or command.
       logical :: replace = .false.
       !> Also write additional quantities of the model against time.
       logical :: all = .false.
@@ -69,6 +69,7 @@ contains
       !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted, 143 terminated.
       integer, intent(out) :: exit_code
       type(request_type) :: request
+      type(run_options_type) :: options
       type(case_type), target :: case
       type(results_type) :: results
       type(outcome_type) :: outcome
@@ -90,8 +91,12 @@ contains
          if (allocated(error)) then
             continue
          else if (request%samples == '') then
-            call run_case(request%case_file, request%output, request%replace, request%all, request%verbose, case, results, &
-               outcome, error)
+            options%output = request%output
+            options%folder = ''
+            options%replace = request%replace
+            options%write_all = request%all
+            options%verbose = request%verbose
+            call run_case(request%case_file, options, case, results, outcome, error)
          else
             call run_samples(request%case_file, request%samples, request%threads, request%output, request%replace, &
                outcome, error)
@@ -244,7 +249,7 @@ contains
          //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
          //'                       --samples outputs/<case>_samples)'//newline &
-         //'  --replace            replace also files that thud has not written'//newline &
+         //'  --replace            replace also results of another case or command'//newline &
          //'  --all                write also model_histories.csv: energies and other'//newline &
          //'                       quantities of the model against time'//newline &
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &

@@ -13,7 +13,8 @@ module thud_run
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_file_names, &
       motion_file_names
    use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
-   use thud_result_directory, only: check_owner, write_results
+   use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, &
+      result_directory_type, write_file
    use thud_room_report, only: get_room_files, get_room_summary, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
    use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
@@ -21,10 +22,19 @@ module thud_run
    implicit none (type, external)
    private
 
-   public :: load_case, outcome_type, replacement_note, run_case
+   public :: load_case, outcome_type, run_case, run_options_type
 
-   !> Beginning of a note; the path of the directory follows.
-   character(len=*), parameter :: replacement_note = 'replaces the results of another input of the same name in '
+   !> What is written where.
+   type :: run_options_type
+      !> Directory for the results; empty for `outputs/<name of the case>`.
+      character(len=:), allocatable :: output
+      !> New directory that the caller puts in the place of `output`; empty if the run does.
+      character(len=:), allocatable :: folder
+      !> Also replace results of another case or command.
+      logical :: replace = .false.
+      !> Also write additional quantities of the model; also show numbers of the solver.
+      logical :: write_all = .false., verbose = .false.
+   end type run_options_type
 
    !> A warning or a note.
    type :: message_type
@@ -67,62 +77,55 @@ contains
    end subroutine add_message
 
    !> Runs a namelist file and writes its results.
-   subroutine run_case(path, output, replace, write_all, verbose, case, results, outcome, error)
+   subroutine run_case(path, options, case, results, outcome, error)
       character(len=*), intent(in) :: path
-      !> Directory for the results; empty for `outputs/<name of the case>`.
-      character(len=*), intent(in) :: output
-      !> Also replace files that thud has not written.
-      logical, intent(in) :: replace
-      !> Also write additional quantities of the model; also show numbers of the solver.
-      logical, intent(in) :: write_all, verbose
+      type(run_options_type), intent(in) :: options
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
-      !> Set if the run fails; nothing has been written then.
+      !> Set if the run fails; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call compute_and_write(path, case, output, replace, write_all, verbose, results, outcome, error)
+      call compute_and_write(path, case, options, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine compute_and_write(path, case, output, replace, write_all, verbose, results, outcome, error)
+   subroutine compute_and_write(path, case, options, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
-      !> Directory for the results; empty for `outputs/<name of the case>`.
-      character(len=*), intent(in) :: output
-      !> Also replace files that thud has not written.
-      logical, intent(in) :: replace
-      !> Also write additional quantities of the model; also show numbers of the solver.
-      logical, intent(in) :: write_all, verbose
+      type(run_options_type), intent(in) :: options
       type(results_type), intent(out) :: results
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
-      !> Set if the run fails; nothing has been written then.
+      !> Set if the run fails; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
       type(text_file_type), allocatable :: files(:)
-      type(text_file_type) :: input
-      logical :: has_other_input
+      type(result_directory_type) :: directory
+      logical :: opens
       integer :: i
 
-      ! The input with all defaults filled in identifies the case of the results.
-      input%name = 'effective.nml'
-      call get_case_text(case, input%content)
-      outcome%directory = output
-      if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      call check_owner(outcome%directory, input, replace, has_other_input, error)
+      outcome%directory = options%output
+      if (options%output == '') outcome%directory = 'outputs/'//trim(case%name)
+      directory = new_result_directory(outcome%directory, 'run', trim(case%name), [path], options%replace)
+      opens = options%folder == ''
+      if (.not. opens) directory%folder = options%folder
+      if (opens) call check_target(directory, [character(len=1) :: ], error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (allocated(error)) return
-      call format_results(case, results, write_all, verbose, files, outcome)
-      call write_results(outcome%directory, input, files, [path], replace, has_other_input, error)
+      call format_results(case, results, options%write_all, options%verbose, files, outcome)
+      if (opens) call open_results(directory, error)
+      do i = 1, size(files)
+         call write_file(directory, files(i)%name, files(i)%content, error)
+      end do
+      if (opens) call close_results(directory, error)
       if (allocated(error)) return
-      if (has_other_input) call outcome%add_message(path, replacement_note//outcome%directory)
       do i = 1, size(results%warning)
          call outcome%add_message(path, trim(results%warning(i)))
       end do
@@ -163,9 +166,12 @@ contains
       if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
       outcome%table = outcome%table//newline
       allocate (files(0))
+      ! The input with all defaults filled in.
+      call get_case_text(case, text)
+      call add_file(files, 'effective.nml', text)
       if (case%has_modes) then
          call extend(files, size(modes_file_names))
-         call get_modes_files(results%modes, files)
+         call get_modes_files(results%modes, files(2:))
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
       ! A case without an impact has free modes alone: neither floor nor room nor compression.

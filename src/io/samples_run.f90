@@ -10,8 +10,9 @@ module thud_samples_run
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
    use thud_progress, only: report_progress
-   use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
-   use thud_run, only: load_case, outcome_type, replacement_note
+   use thud_result_directory, only: add_text, begin_file, check_target, close_results, new_result_directory, &
+      open_results, result_directory_type, write_file
+   use thud_run, only: load_case, outcome_type
    use thud_sample_report, only: get_sample_header, get_sample_rows
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
    use thud_sweep, only: new_sweep, solve_sweep, sweep_type
@@ -46,19 +47,18 @@ contains
       integer, intent(in) :: threads
       !> Directory for the results; empty for `outputs/<name of the case>_samples`.
       character(len=*), intent(in) :: output
-      !> Also replace files that thud has not written.
+      !> Also replace results of another case or command.
       logical, intent(in) :: replace
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
-      !> Set if the run fails; nothing has been written then.
+      !> Set if the run fails; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
       type(sample_table_type) :: table
       type(tally_type) :: tally
-      type(text_file_type) :: marker
       type(result_directory_type) :: results
+      character(len=:), allocatable :: text
       character(len=path_length) :: inputs(2)
-      logical :: has_other_input
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
@@ -70,17 +70,16 @@ contains
       if (allocated(error)) return
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
-      marker%name = input_file
-      call get_case_text(case, marker%content)
-      call check_owner(outcome%directory, marker, replace, has_other_input, error)
-      if (allocated(error)) return
       inputs(1) = path
       inputs(2) = table_path
-      call open_results(outcome%directory, marker, [result_file], inputs, replace, results, error)
+      results = new_result_directory(outcome%directory, 'samples', trim(case%name), inputs, replace)
+      call check_target(results, [result_file, input_file], error)
+      if (.not. allocated(error)) call open_results(results, error)
+      call get_case_text(case, text)
+      call write_file(results, input_file, text, error)
       call write_samples(case, table, threads, results, tally, error)
-      call close_results(results, has_other_input, error)
+      call close_results(results, error)
       if (allocated(error)) return
-      if (has_other_input) call outcome%add_message(path, replacement_note//outcome%directory)
       if (tally%computed < tally%samples) call outcome%add_message(path, to_text(tally%samples - tally%computed)//' of ' &
          //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure))
       outcome%conforms = tally%conforming == tally%samples

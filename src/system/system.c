@@ -11,7 +11,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
@@ -59,7 +58,6 @@ void thud_prepare_process(void)
    sigaction(SIGPIPE, &action, NULL);
    sigaction(SIGXFSZ, &action, NULL);
    action.sa_handler = interrupt;
-   // Without SA_RESTART, so that a deferred signal ends the wait for a lock.
    for (int i = 0; i < 2; i++)
       if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
          sigaction(ending_signals[i], &action, NULL);
@@ -227,61 +225,12 @@ ssize_t thud_read(int descriptor, char *bytes, size_t length)
    return count;
 }
 
-// A descriptor of a regular file, or minus the number of the error. Opening a pipe could block, and a link may lead to
-// a file of another user.
-static int open_regular(const char *path, int flags)
-{
-   struct stat info;
-   int descriptor = open(path, flags | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
-
-   if (descriptor < 0) return -errno;
-   if (fstat(descriptor, &info) == 0 && S_ISREG(info.st_mode)) return descriptor;
-   close(descriptor);
-   return -EEXIST;
-}
-
-// A descriptor to write to a new or emptied file, or minus the number of the error.
+// A descriptor to write to a new file, or minus the number of the error.
 int thud_create(const char *path)
 {
-   return open_regular(path, O_WRONLY | O_CREAT | O_TRUNC);
-}
+   int descriptor = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
 
-// The same for writing at the end of a file, which is created if missing.
-int thud_open_end(const char *path)
-{
-   return open_regular(path, O_WRONLY | O_CREAT | O_APPEND);
-}
-
-// CRC-32 as in zlib, continued over further bytes from the checksum `before`.
-uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t length)
-{
-   // Remainders for four bits.
-   static const uint32_t remainder[16] = {
-      0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
-      0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
-   uint32_t rest = ~before;
-
-   for (size_t i = 0; i < length; i++) {
-      rest ^= bytes[i];
-      rest = remainder[rest & 15] ^ (rest >> 4);
-      rest = remainder[rest & 15] ^ (rest >> 4);
-   }
-   return ~rest;
-}
-
-// The checksum of a regular file; negative for anything else or if it cannot be read.
-int64_t thud_get_file_checksum(const char *path)
-{
-   unsigned char bytes[1 << 16];
-   uint32_t checksum = 0;
-   ssize_t count;
-   int descriptor = open_regular(path, O_RDONLY);
-
-   if (descriptor < 0) return -1;
-   while ((count = thud_read(descriptor, (char *)bytes, sizeof bytes)) > 0)
-      checksum = thud_checksum(checksum, bytes, (size_t)count);
-   close(descriptor);
-   return count < 0 ? -1 : (int64_t)checksum;
+   return descriptor < 0 ? -errno : descriptor;
 }
 
 // Writes a whole text; returns -1 after a deferred interrupt.
@@ -311,53 +260,6 @@ int thud_close(int descriptor)
    return close(descriptor) == 0 ? 0 : errno;
 }
 
-// Flushes all files of a directory to the disk, together if the system can: one by one takes ten times as long.
-int thud_flush(const char *path)
-{
-   int descriptor = open(path, O_RDONLY | O_CLOEXEC), error = 0;
-
-   if (descriptor < 0) return errno;
-#if defined __linux__
-   if (syncfs(descriptor) != 0) error = errno;
-#else
-   sync();
-#endif
-   close(descriptor);
-   return error;
-}
-
-// Waits for the lock on a directory and returns the descriptor that holds it; `make` creates a missing directory.
-// Minus the number of the error if this user cannot write there, -EINTR after a signal that ends the work.
-// File systems without locks are used without a lock.
-int thud_lock_directory(const char *path, int make)
-{
-   for (;;) {
-      struct stat locked, named;
-      int descriptor;
-
-      if (make && mkdir(path, 0777) != 0 && errno != EEXIST) return -errno;
-      descriptor = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-      if (descriptor < 0 && make && errno == ENOENT) continue;
-      if (descriptor < 0) return -errno;
-      if (faccessat(descriptor, ".", W_OK | X_OK, AT_EACCESS) != 0) {
-         int error = errno;
-
-         close(descriptor);
-         return -error;
-      }
-      while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) {
-         if (!thud_latest_signal) continue;
-         close(descriptor);
-         return -EINTR;
-      }
-      // The previous owner of the lock may have renamed or removed the directory.
-      if (fstat(descriptor, &locked) == 0 && lstat(path, &named) == 0 && locked.st_dev == named.st_dev
-          && locked.st_ino == named.st_ino)
-         return descriptor;
-      close(descriptor);
-   }
-}
-
 // Absolute path without links, at most `length` bytes; creates missing parent directories.
 int thud_resolve(const char *path, char *resolved, size_t length)
 {
@@ -383,34 +285,44 @@ int thud_resolve(const char *path, char *resolved, size_t length)
    return used < length ? 0 : ENAMETOOLONG;
 }
 
-// 1 if `thud_exchange` may succeed: the target is missing, or on the same mount and not the working directory.
-int thud_can_exchange(const char *path, const char *target)
+// Makes a new directory beside a target, whose absolute path is given: `.NAME.<process>-<number>.new`.
+int thud_make_beside(const char *target, char *path, size_t length)
 {
-   struct stat here, there;
-   char from[PATH_MAX + 16], to[PATH_MAX + 16];
+   const char *name = strrchr(target, '/') + 1;
 
-   if (stat(target, &there) != 0) return 1;
-   if (stat(".", &here) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino) return 0;
-   snprintf(from, sizeof from, "%s/..missing", path);
-   snprintf(to, sizeof to, "%s/..missing", target);
-   // The file does not exist: rename always fails, on different mounts with EXDEV.
-   return rename(from, to) != 0 && errno != EXDEV;
+   for (int i = 1; i <= 1000; i++) {
+      int used = snprintf(path, length, "%.*s.%s.%ld-%d.new", (int)(name - target), target, name, (long)getpid(), i);
+
+      if ((size_t)used >= length) return ENAMETOOLONG;
+      if (mkdir(path, 0777) == 0) return 0;
+      if (errno != EEXIST) return errno;
+   }
+   return EEXIST;
 }
 
-// Gives a directory the owner and permissions of another one, and exchanges the two in one step.
-int thud_exchange(const char *path, const char *target)
+// Puts a directory in the place of a target, which then has the path of the first, in one step if the file system can
+// exchange names; else the target is `NAME.old` for a moment.
+int thud_swap(const char *path, const char *target)
 {
+   char old[PATH_MAX];
    struct stat there;
+   int error;
 
-   if (stat(target, &there) != 0 || chown(path, there.st_uid, there.st_gid) != 0) return errno;
-   if (chmod(path, there.st_mode & 07777) != 0) return errno;
+   // The target is missing or empty.
+   if (rename(path, target) == 0) return 0;
+   if (stat(target, &there) == 0 && chmod(path, there.st_mode & 07777) != 0) return errno;
 #if defined RENAME_EXCHANGE
-   return renameat2(AT_FDCWD, path, AT_FDCWD, target, RENAME_EXCHANGE) == 0 ? 0 : errno;
+   if (renameat2(AT_FDCWD, path, AT_FDCWD, target, RENAME_EXCHANGE) == 0) return 0;
+   if (errno != EINVAL && errno != ENOSYS && errno != ENOTSUP) return errno;
 #elif defined RENAME_SWAP
-   return renamex_np(path, target, RENAME_SWAP) == 0 ? 0 : errno;
-#else
-   return ENOTSUP;
+   if (renamex_np(path, target, RENAME_SWAP) == 0) return 0;
+   if (errno != ENOTSUP) return errno;
 #endif
+   if ((size_t)snprintf(old, sizeof old, "%s.old", target) >= sizeof old) return ENAMETOOLONG;
+   if (rename(target, old) != 0) return errno;
+   if (rename(path, target) == 0) return rename(old, path) == 0 ? 0 : errno;
+   error = errno;
+   return rename(old, target) == 0 ? error : errno;
 }
 
 // 1 if two paths lead to the same file.
@@ -419,15 +331,6 @@ int thud_is_same_file(const char *path, const char *other)
    struct stat here, there;
 
    return stat(path, &here) == 0 && stat(other, &there) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino;
-}
-
-// 1 for a regular file that is not a link, 0 if nothing exists at the path, -1 for anything else.
-int thud_look_up(const char *path)
-{
-   struct stat info;
-
-   if (lstat(path, &info) != 0) return errno == ENOENT || errno == ENOTDIR ? 0 : -1;
-   return S_ISREG(info.st_mode) ? 1 : -1;
 }
 
 // Length of the next name in an open directory, except `.` and `..`; 0 at the end.

@@ -1,18 +1,17 @@
 !> Operating system calls that Fortran lacks; implemented in `system.c`.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_int64_t, c_intptr_t, &
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int64_t, c_intptr_t, &
       c_null_char, c_ptr, c_size_t
-   use, intrinsic :: iso_fortran_env, only: int32, int64
+   use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
    public :: standard_error, standard_output
-   public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, defer_interrupts, directory_exists
-   public :: end_call, end_process, exchange_directories, flush_directory, get_file_checksum, get_file_size, get_free_bytes
-   public :: get_system_message, interrupt_calls, is_closed, is_forked, is_missing, is_regular_file, is_same_file
-   public :: is_terminal, link_file, list_directory, lock_directory, open_descriptor, open_end
-   public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
+   public :: begin_call, close_descriptor, create_file, defer_interrupts, directory_exists, end_call, end_process
+   public :: get_file_size, get_free_bytes, get_system_message, interrupt_calls, is_closed, is_forked, is_same_file
+   public :: is_terminal, list_directory, make_beside, open_descriptor, pass_interrupts, prepare_process, read_bytes
+   public :: remove_file, rename_file, resolve_path, swap_directories, write_text
 
    !> Standard descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
@@ -59,17 +58,11 @@ module thud_system
 
    procedure(path_call), bind(c, name='thud_open') :: c_open
    procedure(path_call), bind(c, name='thud_create') :: c_create
-   procedure(path_call), bind(c, name='thud_open_end') :: c_open_end
    procedure(path_call), bind(c, name='remove') :: c_remove
    procedure(path_number_call), bind(c, name='thud_get_file_size') :: c_get_file_size
-   procedure(path_number_call), bind(c, name='thud_get_file_checksum') :: c_get_file_checksum
    procedure(two_path_call), bind(c, name='rename') :: c_rename
-   procedure(two_path_call), bind(c, name='link') :: c_link
-   procedure(two_path_call), bind(c, name='thud_can_exchange') :: c_can_exchange
    procedure(two_path_call), bind(c, name='thud_is_same_file') :: c_is_same_file
-   procedure(two_path_call), bind(c, name='thud_exchange') :: c_exchange
-   procedure(path_call), bind(c, name='thud_flush') :: c_flush
-   procedure(path_call), bind(c, name='thud_look_up') :: c_look_up
+   procedure(two_path_call), bind(c, name='thud_swap') :: c_swap
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
    procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
@@ -129,23 +122,6 @@ module thud_system
          integer(c_int) :: status
       end function c_write
 
-      function c_checksum(before, bytes, length) bind(c, name='thud_checksum') result(checksum)
-         import :: c_char, c_int32_t, c_size_t
-         implicit none (type, external)
-         integer(c_int32_t), value :: before
-         character(kind=c_char), intent(in) :: bytes(*)
-         integer(c_size_t), value :: length
-         integer(c_int32_t) :: checksum
-      end function c_checksum
-
-      function c_lock_directory(path, make) bind(c, name='thud_lock_directory') result(descriptor)
-         import :: c_char, c_int
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: make
-         integer(c_int) :: descriptor
-      end function c_lock_directory
-
       function c_resolve(path, resolved, length) bind(c, name='thud_resolve') result(status)
          import :: c_char, c_int, c_size_t
          implicit none (type, external)
@@ -154,6 +130,15 @@ module thud_system
          integer(c_size_t), value :: length
          integer(c_int) :: status
       end function c_resolve
+
+      function c_make_beside(path, made, length) bind(c, name='thud_make_beside') result(status)
+         import :: c_char, c_int, c_size_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         character(kind=c_char), intent(out) :: made(*)
+         integer(c_size_t), value :: length
+         integer(c_int) :: status
+      end function c_make_beside
 
       function c_opendir(path) bind(c, name='opendir') result(directory)
          import :: c_char, c_ptr
@@ -233,7 +218,7 @@ contains
       count = int(c_read(int(descriptor, c_int), buffer, len(buffer, c_size_t)))
    end subroutine read_bytes
 
-   !> Closes a descriptor and releases its lock.
+   !> Closes a descriptor.
    subroutine close_descriptor(descriptor, status)
       !> The descriptor; negative if closed, as it is afterwards.
       integer, intent(inout) :: descriptor
@@ -247,7 +232,7 @@ contains
       if (present(status)) status = result_status
    end subroutine close_descriptor
 
-   !> Creates a file, or empties it.
+   !> Creates a file.
    subroutine create_file(path, descriptor, status)
       character(len=*), intent(in) :: path
       integer, intent(out) :: descriptor
@@ -257,26 +242,6 @@ contains
       descriptor = int(c_create(path//c_null_char))
       status = max(-descriptor, 0)
    end subroutine create_file
-
-   !> Opens a file to write at its end, or creates it.
-   subroutine open_end(path, descriptor, status)
-      character(len=*), intent(in) :: path
-      integer, intent(out) :: descriptor
-      !> 0, or the number of the error.
-      integer, intent(out) :: status
-
-      descriptor = int(c_open_end(path//c_null_char))
-      status = max(-descriptor, 0)
-   end subroutine open_end
-
-   !> Adds a text to a checksum, CRC-32 as in zlib.
-   subroutine add_to_checksum(text, checksum)
-      character(len=*), intent(in) :: text
-      !> Checksum of the preceding text, 0 at the beginning; afterwards with the text.
-      integer(int32), intent(inout) :: checksum
-
-      checksum = int(c_checksum(int(checksum, c_int32_t), text, len(text, c_size_t)), int32)
-   end subroutine add_to_checksum
 
    !> Writes a whole text to a file or to the screen.
    subroutine write_text(descriptor, text, status)
@@ -297,15 +262,6 @@ contains
       closed = c_is_closed(int(status, c_int)) /= 0
    end function is_closed
 
-   !> Flushes all files of a directory to the disk.
-   subroutine flush_directory(path, status)
-      character(len=*), intent(in) :: path
-      !> 0, or the number of the error.
-      integer, intent(out) :: status
-
-      status = int(c_flush(path//c_null_char))
-   end subroutine flush_directory
-
    !> Whether a directory exists.
    function directory_exists(path) result(exists)
       character(len=*), intent(in) :: path
@@ -321,11 +277,11 @@ contains
    !> Names in a directory.
    subroutine list_directory(path, names)
       character(len=*), intent(in) :: path
-      !> The names; none if the directory cannot be read: [n_name].
+      !> The names in order; none if the directory cannot be read: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
       character(len=name_length + 1) :: name
       type(c_ptr) :: directory
-      integer :: n, length
+      integer :: n, length, first
 
       allocate (names(64))
       n = 0
@@ -343,56 +299,52 @@ contains
          if (c_closedir(directory) /= 0) n = 0
       end if
       names = names(:n)
+      do n = 1, size(names) - 1
+         first = n - 1 + minloc(names(n:), dim=1)
+         names([n, first]) = names([first, n])
+      end do
    end subroutine list_directory
 
    !> Resolves links in a path; creates missing parent directories.
-   subroutine resolve_path(path, resolved, done)
+   subroutine resolve_path(path, resolved, status)
       !> Path of a directory, which may be missing.
       character(len=*), intent(in) :: path
       !> Absolute path without links.
       character(len=:), allocatable, intent(out) :: resolved
-      !> The path could be resolved.
-      logical, intent(out) :: done
+      !> 0, or the number of the error.
+      integer, intent(out) :: status
       character(len=path_length) :: buffer
       integer :: stop
 
       stop = max(verify(path, '/', back=.true.), 1)
-      done = c_resolve(path(:stop)//c_null_char, buffer, len(buffer, c_size_t)) == 0
-      if (done) resolved = buffer(:index(buffer, c_null_char) - 1)
+      status = int(c_resolve(path(:stop)//c_null_char, buffer, len(buffer, c_size_t)))
+      if (status == 0) resolved = buffer(:index(buffer, c_null_char) - 1)
    end subroutine resolve_path
 
-   !> Waits for the lock on a directory and holds it until the descriptor is closed.
-   subroutine lock_directory(path, make, descriptor)
+   !> Makes a new directory beside another one.
+   subroutine make_beside(path, made, status)
+      !> Absolute path of the other directory, which may be missing.
       character(len=*), intent(in) :: path
-      !> Create a missing directory.
-      logical, intent(in) :: make
-      !> The descriptor; negative if the directory is missing or this user cannot write to it.
-      integer, intent(out) :: descriptor
+      !> Path of the new directory.
+      character(len=:), allocatable, intent(out) :: made
+      !> 0, or the number of the error.
+      integer, intent(out) :: status
+      character(len=path_length) :: buffer
 
-      descriptor = int(c_lock_directory(path//c_null_char, merge(1_c_int, 0_c_int, make)))
-   end subroutine lock_directory
+      status = int(c_make_beside(path//c_null_char, buffer, len(buffer, c_size_t)))
+      if (status == 0) made = buffer(:index(buffer, c_null_char) - 1)
+   end subroutine make_beside
 
-   !> Whether `exchange_directories` may succeed.
-   function can_exchange(path, other) result(yes)
+   !> Puts a directory in the place of another one, which then has the path of the first.
+   subroutine swap_directories(path, target, status)
       character(len=*), intent(in) :: path
-      !> Path of the other directory.
-      character(len=*), intent(in) :: other
-      !> True if the other directory is missing, or on the same mount and not the working directory.
-      logical :: yes
+      !> Path of the other directory; if it is missing or empty, nothing has the first path afterwards.
+      character(len=*), intent(in) :: target
+      !> 0, or the number of the error.
+      integer, intent(out) :: status
 
-      yes = c_can_exchange(path//c_null_char, other//c_null_char) == 1
-   end function can_exchange
-
-   !> Gives a directory the owner and permissions of another one, and exchanges the two in one step.
-   subroutine exchange_directories(path, other, done)
-      character(len=*), intent(in) :: path
-      !> Path of the other directory.
-      character(len=*), intent(in) :: other
-      !> The directories have been exchanged.
-      logical, intent(out) :: done
-
-      done = c_exchange(path//c_null_char, other//c_null_char) == 0
-   end subroutine exchange_directories
+      status = int(c_swap(path//c_null_char, target//c_null_char))
+   end subroutine swap_directories
 
    !> Renames a file; an existing file of the new name is replaced in the same step.
    subroutine rename_file(old_path, new_path, done)
@@ -404,17 +356,6 @@ contains
 
       done = c_rename(old_path//c_null_char, new_path//c_null_char) == 0
    end subroutine rename_file
-
-   !> Gives a file a second name, unless that name exists.
-   subroutine link_file(path, new_path, done)
-      character(len=*), intent(in) :: path
-      !> New path in the same file system.
-      character(len=*), intent(in) :: new_path
-      !> The file has both names.
-      logical, intent(out) :: done
-
-      done = c_link(path//c_null_char, new_path//c_null_char) == 0
-   end subroutine link_file
 
    !> Removes a file or an empty directory, if it exists.
    subroutine remove_file(path, done)
@@ -435,31 +376,6 @@ contains
 
       bytes = int(c_get_file_size(path//c_null_char), int64)
    end subroutine get_file_size
-
-   !> Checksum of a file, CRC-32 as in zlib.
-   subroutine get_file_checksum(path, checksum)
-      character(len=*), intent(in) :: path
-      !> The checksum; negative if the file is not regular or cannot be read.
-      integer(int64), intent(out) :: checksum
-
-      checksum = int(c_get_file_checksum(path//c_null_char), int64)
-   end subroutine get_file_checksum
-
-   !> Whether nothing exists at a path.
-   function is_missing(path) result(yes)
-      character(len=*), intent(in) :: path
-      logical :: yes
-
-      yes = c_look_up(path//c_null_char) == 0
-   end function is_missing
-
-   !> Whether a path leads to a regular file that is not a link; opening anything else could block.
-   function is_regular_file(path) result(yes)
-      character(len=*), intent(in) :: path
-      logical :: yes
-
-      yes = c_look_up(path//c_null_char) == 1
-   end function is_regular_file
 
    !> Whether two paths lead to the same file, perhaps by links.
    function is_same_file(path, other) result(yes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import signal
@@ -41,7 +40,7 @@ settings.load_profile("thud")
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
 MINIMAL = "&ball /\n&drop /\n&model /\n"
-RESULT_FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
+RESULT_FILES = ["effective.nml", "force.csv", "levels.csv", "summary.nml", "thud.txt"]
 # How patterns of `naming` begin: at the begin of a message, in any case, over all its lines.
 NAMING = r"(?is)\A"
 
@@ -168,13 +167,3 @@ def errors_of(capsys: pytest.CaptureFixture[str]) -> ErrorsOf:
 def working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make the directory of the test the working directory."""
     monkeypatch.chdir(tmp_path)
-
-
-@pytest.fixture
-def no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let calls for a lock fail as on a file system that has none."""
-
-    def refuse(*_: object) -> None:
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr("fcntl.flock", refuse)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import re
 import resource
@@ -19,19 +18,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming, python
+from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.base.files import unique_path
 from thud.studies import blocks, fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
-from thud.studies.directory import open_results
 from thud.studies.sweep import KIND
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
-from injection import can_inject, injecting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -220,7 +216,7 @@ def test_full_disk_is_reported_and_loses_nothing(
         assert "File too large" in errors
         assert errors.count("\n") == 1
         assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
-        assert not list(tmp_path.rglob(".*part"))
+        assert not list(tmp_path.rglob(".*new"))
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path).dataset).identical(values(whole))
 
 
@@ -284,97 +280,10 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     assert len(list((tmp_path / "d.partial").iterdir())) == 2
     (tmp_path / "e.partial").mkdir()
     # Kills leave half a file.
-    (tmp_path / "e.partial/.study.part").write_text("")
-    (tmp_path / ".e.nc.part").write_text("")
+    (tmp_path / "e.partial/.study.1.new").write_text("")
     with pytest.raises(thud.InputError, match=naming("e.partial", "samples")):
         thud.read_sweep(tmp_path / "e.partial")
     assert thud.sweep({**other, "name": "e"}, tmp_path).dataset.sizes["height"] == 1
-    assert not list(tmp_path.glob(".e.*"))
-
-
-def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
-    study = thud.read_study(HEIGHTS)
-    with (
-        open_results(tmp_path, KIND, study),
-        pytest.raises(thud.InputError, match=naming("python")),
-    ):
-        thud.sweep(study, tmp_path)
-    assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2
-
-
-def test_study_without_locks_is_computed_with_a_warning(
-    tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    expected = values(thud.sweep(HEIGHTS).dataset)
-    request.getfixturevalue("no_locks")
-    for form in ("netcdf", "zarr"):
-        with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))) as caught:
-            found = thud.sweep({"name": form, **HEIGHTS, "format": form}, tmp_path).dataset
-        assert len(caught) == 1
-        assert values(found).identical(expected)
-    assert set(names_in(tmp_path)) == {"netcdf.nc", "zarr.zarr"}
-
-
-@pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
-def test_command_without_locks_ends_with_results_and_one_warning(tmp_path: Path) -> None:
-    """The calls of all libraries fail, of HDF5 too."""
-    (tmp_path / "two.toml").write_text("parameters.height.values = [0.5, 1]")
-    faults = injecting(calls="flock", action=errno.ENOLCK, log="calls", at=1, **{"from": 1})
-    command = ["-m", "thud", "sweep", "two.toml", "-q", "-o", "new"]
-    done = python(*command, cwd=tmp_path, env=faults)
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "calls").read_text().count("flock") > 1
-    assert thud.read_sweep(tmp_path / "new/two.nc").dataset.sizes["height"] == 2
-    assert done.stderr.count("\n") == 1
-    assert "new" in done.stderr
-
-
-def test_lock_is_that_of_the_directory_that_has_the_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    study = thud.read_study(HEIGHTS)
-    folder = tmp_path / "out"
-    flock = fcntl.flock
-
-    def switch(descriptor: int, kind: int) -> None:
-        flock(descriptor, kind)
-        if not (tmp_path / "before").exists():
-            folder.rename(tmp_path / "before")
-            folder.mkdir()
-
-    monkeypatch.setattr("fcntl.flock", switch)
-    with (
-        open_results(folder, KIND, study),
-        pytest.raises(thud.InputError, match=naming("out/python")),
-    ):
-        thud.sweep(study, folder)
-
-
-def test_killed_study_goes_on_where_there_are_no_locks(
-    tmp_path: Path, request: pytest.FixtureRequest
-) -> None:
-    study = thud.read_study(HEIGHTS)
-    keep_one_block(study, tmp_path)
-    unique_path(tmp_path / "python.partial/.block_000000000001.nc.part").write_bytes(b"half")
-    request.getfixturevalue("no_locks")
-    with pytest.warns(thud.LockWarning):
-        assert thud.sweep(study, tmp_path).dataset.sizes["height"] == 2
-
-
-def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
-    other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
-    study = thud.read_study(HEIGHTS)
-    with (
-        open_results(tmp_path, KIND, study),
-        pytest.raises(thud.InputError, match=naming("python")),
-    ):
-        thud.sweep(other, tmp_path, replace=True)
-    # Nothing was finished, so that the directory may change hands, but with nothing in it.
-    with open_results(tmp_path, KIND, study):
-        keep_one_block(study, tmp_path)
-    with pytest.raises(thud.InputError, match=naming("python", "--replace")):
-        thud.sweep(other, tmp_path)
-    assert thud.sweep(other, tmp_path, replace=True).dataset["height"].values.tolist() == [0.7, 0.8]
 
 
 def keep_one_block(study: SampleStudy, folder: Path) -> None:
@@ -402,27 +311,6 @@ def test_replace_keeps_what_is_of_this_version(tmp_path: Path) -> None:
     before = (tmp_path / "python.nc").read_bytes()
     thud.sweep(study, tmp_path, replace=True)
     assert (tmp_path / "python.nc").read_bytes() == before
-
-
-def test_interrupt_of_a_removal_leaves_no_half_directory(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    study = {**HEIGHTS, "format": "zarr", "name": "heights"}
-    thud.sweep(study, tmp_path)
-    changed = {**study, "parameters": {"height": {"values": [0.7]}}}
-
-    def interrupt(path: Path, *, ignore_errors: bool = False) -> None:
-        if not ignore_errors:
-            next(path.rglob("zarr.json")).unlink()
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr("shutil.rmtree", interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            thud.sweep(changed, tmp_path, replace=True)
-    found = thud.sweep(changed, tmp_path).dataset
-    assert found["height"].values.tolist() == [0.7]
-    assert names_in(tmp_path) == ["heights.zarr"]
 
 
 def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) -> None:

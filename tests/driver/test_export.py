@@ -207,7 +207,7 @@ def test_command_writes_what_is_asked_for(
     case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
     assert export(case, "--csv", "--wav", "-o", str(tmp_path / "a")) == 0
     names = ["rubber_ball_100cm.csv", "rubber_ball_100cm.wav", "rubber_ball_100cm.wav.txt"]
-    assert names_in(tmp_path / "a") == [".thud", *names]
+    assert names_in(tmp_path / "a") == [*names, "thud.txt"]
     assert capsys.readouterr().out.count("rubber_ball_100cm") == 3
     assert export(str(recording), "--spectrum", "--drop", "2", "-q", "-o", str(tmp_path / "b")) == 0
     assert (tmp_path / "b/two_drop_2_spectrum.csv").exists()

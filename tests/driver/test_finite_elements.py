@@ -114,7 +114,7 @@ def test_modes_alone_need_no_drop(
 ) -> None:
     assert cli.main(["run", str(case_file(MODES)), "--check"]) == 0
     assert names_in(tmp_path / "outputs/case") == [
-        ".thud", "effective.nml", "modes.csv", "modes.svg", "modes.vtu",
+        "effective.nml", "modes.csv", "modes.svg", "modes.vtu", "thud.txt",
     ]  # fmt: skip
     rows = capsys.readouterr().out.partition("free modes")[2].splitlines()[2:6]
     modes = thud.free_modes(count=3, **COARSE)

@@ -13,7 +13,6 @@ from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.base.files import locked
 from thud.studies.fit import KIND
 
 if TYPE_CHECKING:
@@ -51,7 +50,6 @@ def test_studies_of_the_repository(
     assert cli.main(["fit", str(STUDIES / f"{name}.toml")]) == 0
     folder = tmp_path / "outputs" / name
     assert names_in(folder) == [
-        ".thud",
         "confidence.svg",
         "fit.csv",
         "fit.json",
@@ -250,16 +248,6 @@ def test_results_of_another_record_or_case_are_not_touched(
         assert (tmp_path / "found/fit.json").read_bytes() == before
 
 
-def test_fits_take_a_directory_one_at_a_time(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "found").mkdir()
-    with locked(tmp_path / "found"):
-        assert cli.main(FIT) == 1
-    assert "found/fit.json" in capsys.readouterr().err
-    assert cli.main(FIT) == 0
-
-
 def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) -> None:
     both = STUDY + "height = {}\n"
     (tmp_path / "study.toml").write_text(both)
@@ -270,7 +258,7 @@ def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) ->
     np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
     assert cli.main([*fit, "--replace"]) == 0
     assert names_in(tmp_path / "found") == [
-        ".thud", "fit.csv", "fit.json", "fit.svg", "fitted.nml",
+        "fit.csv", "fit.json", "fit.svg", "fitted.nml",
     ]  # fmt: skip
 
 

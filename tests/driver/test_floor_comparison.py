@@ -240,7 +240,7 @@ def test_command_compares_cases(
         thud.write_case(case, path)
     output = tmp_path / "page"
     assert main(["floor", *map(str, paths), "--output", str(output)]) == 0
-    names = {".thud", "floors.svg", "floors.html"}
+    names = {"thud.txt", "floors.svg", "floors.html"}
     assert set(names_in(output)) == names
     assert "thick" in capsys.readouterr().out
     assert str(paths[0]) in errors_of("floor", paths[0], paths[0], "-o", output)

@@ -44,7 +44,7 @@ def test_command_writes_files_and_prints_a_table(
     (tmp_path / "study.toml").write_text(design + text)
     assert cli.main([name, str(tmp_path / "study.toml"), "-o", str(tmp_path / "out")]) == 0
     written = names_in(tmp_path / "out")
-    assert written == sorted([".thud", "study.nc", "study.svg", *more])
+    assert written == sorted(["study.nc", "study.svg", *more])
     shown = capsys.readouterr().out
     assert words in shown
     assert "The samples state no numerical errors" in shown
@@ -75,4 +75,4 @@ def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         assert "peak force, N" in done.stdout
     names = names_in(tmp_path / "outputs/mass")
-    assert names == [".thud", "mass.nc", "mass.svg"]
+    assert names == ["mass.nc", "mass.svg"]

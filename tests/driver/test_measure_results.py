@@ -53,11 +53,11 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 def names(folder: Path) -> set[str]:
     """Return the names of the files, with or without the PDF that an extra makes."""
-    return set(names_in(folder)) - {PDF, ".thud"}
+    return set(names_in(folder)) - {PDF, "thud.txt"}
 
 
 def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Path) -> None:
-    recording_files.save(noisy, Results(tmp_path))
+    recording_files.save(noisy, Results(tmp_path, "measure"))
     head, *screen = recording_files.table(noisy)
     table = rows_of(tmp_path / "criteria.csv")
     data = json.loads((tmp_path / "report.json").read_text())
@@ -95,7 +95,7 @@ def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Pat
 
 
 def test_levels_and_criteria_agree_on_uncertainty(noisy: thud.Recording, tmp_path: Path) -> None:
-    recording_files.save(noisy, Results(tmp_path), figures=False)
+    recording_files.save(noisy, Results(tmp_path, "measure"), figures=False)
     rows = rows_of(tmp_path / "levels.csv")
     data = json.loads((tmp_path / "report.json").read_text())
     criteria = rows_of(tmp_path / "criteria.csv")[:5]
@@ -111,7 +111,7 @@ def test_levels_and_criteria_agree_on_uncertainty(noisy: thud.Recording, tmp_pat
 def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
-    recording_files.save(noisy, Results(tmp_path), figures=False)
+    recording_files.save(noisy, Results(tmp_path, "measure"), figures=False)
     decisions = noisy.assess().criteria
     for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
         assert bool(row["uncertainty"]) == bool(one.estimate.contributions), one.name
@@ -134,22 +134,15 @@ def test_report_of_another_recording_does_not_stay_beside_new_numbers(
         (tmp_path / name / "drop.csv").write_bytes(content)
     warning = "outputs/drop"
     out = tmp_path / "outputs/drop"
-    # thud has not written this page.
-    out.mkdir(parents=True)
-    (out / "report.html").write_text("mine")
-    assert cli.main(["measure", "a/drop.csv", "-q", "--no-figures"]) == 0
-    assert names(out) == FILES | {"report.html"}
-    assert "outputs/drop/report.html" in errors_of("measure", "a/drop.csv", "-q")
-    (out / "report.html").unlink()
     for _ in range(2):
         assert cli.main(["measure", "a/drop.csv", "-q"]) == 0
         assert names(out) == FILES | FIGURES
         assert warning not in capsys.readouterr().err
-    (out / PDF).write_bytes(b"signed by hand")
-    assert cli.main(["measure", "b/drop.csv", "-q", "--no-figures"]) == 0
+    # The report is removed only by a new one.
+    assert "report.html" in errors_of("measure", "b/drop.csv", "-q", "--no-figures")
+    assert names(out) == FILES | FIGURES
+    assert cli.main(["measure", "b/drop.csv", "-q"]) == 0
     assert warning in capsys.readouterr().err
-    assert names(out) == FILES
-    assert (out / PDF).read_bytes() == b"signed by hand"
     (origin,) = thud.read_recording("b/drop.csv").origins
     (file,) = json.loads((out / "report.json").read_text())["files"]
     assert file["sha256"] == origin.checksum
@@ -161,12 +154,12 @@ def test_page_that_fails_leaves_the_earlier_results(
     def fail(*_: object) -> Any:  # noqa: ANN401
         raise MemoryError
 
-    (tmp_path / "levels.csv").write_text("earlier")
+    results = Results(tmp_path / "out", "measure")
+    results.write({"levels.csv": b"earlier"})
     monkeypatch.setattr(recording_files, "page_contents", fail)
     with pytest.raises(MemoryError):
-        recording_files.save(noisy, Results(tmp_path))
-    assert names(tmp_path) == {"levels.csv"}
-    assert (tmp_path / "levels.csv").read_text() == "earlier"
+        recording_files.save(noisy, results)
+    assert names(results.folder) == {"levels.csv"}
 
 
 def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
@@ -176,8 +169,8 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     instruments = ("plate", Instrument("amplifier", certificate="K-1"))
     config = replace(recording.config, laboratory="Ωmega\udcff\0", instruments=instruments)
     recording = replace(recording, drops=drops, config=config)
-    recording_files.save(recording, Results(tmp_path), figures=False)
-    with xr.open_dataset(tmp_path / "recording.nc") as found:
+    recording_files.save(recording, Results(tmp_path / "out", "measure"), figures=False)
+    with xr.open_dataset(tmp_path / "out/recording.nc") as found:
         assert found.sizes == {"drop": 3, "octave": 5, "third": 15, "file": 3}
         units = {"contact_time": "s", "restitution": "1", "peak_force": "N", "impulse": "N s"}
         for name, unit in units.items():
@@ -213,17 +206,18 @@ def test_screen_lists_what_the_report_misses(
     assert "procedure" in line
     assert "client" not in line
     assert "number of the report" not in line
-    assert cli.main([*command, "--no-figures"]) == 0
+    assert cli.main([*command, "--no-figures", "-o", "without"]) == 0
     assert "Missing in the report" not in capsys.readouterr().out
 
 
 def test_without_h5netcdf_a_warning_tells_what_is_left_out(
     noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recording_files.save(noisy, Results(tmp_path), figures=False)
-    assert names(tmp_path) == FILES
+    results = Results(tmp_path / "out", "measure")
+    recording_files.save(noisy, results, figures=False)
+    assert names(results.folder) == FILES
     monkeypatch.setitem(sys.modules, "h5netcdf", None)
     monkeypatch.delitem(sys.modules, "thud.report.netcdf")
     with pytest.warns(ReportWarning, match=naming("recording.nc", "h5netcdf", "pip install")):
-        recording_files.save(noisy, Results(tmp_path), figures=False)
-    assert names(tmp_path) == FILES - {"recording.nc"}
+        recording_files.save(noisy, results, figures=False)
+    assert names(results.folder) == FILES - {"recording.nc"}

@@ -383,9 +383,11 @@ def test_command_prints_and_writes(
     assert str(prediction.requirement) in " ".join(printed.split())
     pages = ["my_floor.html", "concrete_140.html"]
     assert {*TABLES, "changes.csv", *pages} <= {*names_in(out)}
-    # What belongs to a report is removed with it.
-    assert cli.main([*words, "-q"]) == 0
-    assert {*names_in(out)} - {".thud", "predictions.xlsx"} == {*TABLES}
+    # A report is removed only by a new one.
+    before = names_in(out)
+    assert cli.main([*words, "-q"]) == 1
+    assert names_in(out) == before
+    assert "is in the way" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["../evil", "a/b", ".hidden"])
@@ -449,21 +451,6 @@ def test_numbers_of_the_report_have_no_exponent_and_few_digits() -> None:
     assert not re.search(r"\de[-+−]\d", str(band_rows(floor)))
     for value, row in zip(prediction.energy, band_rows(floor)[1:], strict=True):
         assert float(row[2]) == pytest.approx(1e6 * value, rel=5e-3)
-
-
-def test_reports_of_other_floors_are_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(
-        "thud.report.floor_files.page_contents", lambda floor, _: {f"{floor.file}.html": b"page"}
-    )
-    words = ["-q", "-o", str(tmp_path / "out"), "--construction"]
-    assert cli.main(["predict", "--report", *words, "concrete 140"]) == 0
-    (tmp_path / "out/mine.pdf").write_bytes(b"of the user")
-    assert cli.main(["predict", *words, "concrete 160"]) == 0
-    assert {*names_in(tmp_path / "out")} == {
-        ".thud", "mine.pdf", "predictions.xlsx", *TABLES
-    }  # fmt: skip
 
 
 def test_report_with_all_assumptions_has_two_pages(tmp_path: Path) -> None:

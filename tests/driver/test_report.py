@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, names_in, naming
 from matplotlib import font_manager
 from scipy.special import stdtrit
 from synthetic import make_recording
@@ -24,7 +24,6 @@ from test_figure_look import assert_clean
 
 import thud
 from thud.base.errors import ReportWarning
-from thud.base.files import Results
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
@@ -447,7 +446,6 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     folder = tmp_path / "report"
-    Results(folder, "measure").write({"report.pdf": b"of an earlier report"})
     if library is None:
         monkeypatch.setitem(sys.modules, "weasyprint", None)
     else:
@@ -459,7 +457,6 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     with pytest.warns(ReportWarning, match=naming("report.pdf", "pip install")):
         paths = write_report(one, folder)
     assert [path.name for path in paths] == ["report.json", "report.html"]
-    assert sorted(path.name for path in folder.glob("report.*")) == ["report.html", "report.json"]
     assert not capsys.readouterr().out
 
 
@@ -484,10 +481,11 @@ def test_characters_of_any_installed_font_are_not_missing(
 
 @pytest.mark.filterwarnings("ignore::thud.base.errors.ReportWarning")
 def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_text("mine")
-    with pytest.raises(thud.InputError, match=naming("report.html")):
-        thud.write_report(one, tmp_path)
-    assert (tmp_path / "report.html").read_text() == "mine"
+    (tmp_path / "notes.txt").write_text("mine")
+    for also in (False, True):
+        with pytest.raises(thud.InputError, match=naming(tmp_path)):
+            thud.write_report(one, tmp_path, replace=also)
+    assert names_in(tmp_path) == ["notes.txt"]
 
 
 @pytest.mark.usefixtures("weasyprint")

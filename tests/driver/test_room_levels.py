@@ -227,7 +227,7 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "46 (46.24)" in shown.out
     assert "background" in shown.err
     assert set(names_in(folder)) == {
-        ".thud", "room_levels.csv", "room_levels.svg",
+        "room_levels.csv", "room_levels.svg", "thud.txt",
     }  # fmt: skip
     lines = (folder / "room_levels.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 13

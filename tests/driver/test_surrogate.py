@@ -315,7 +315,7 @@ def test_training_resumes_and_results_are_kept(
     folder = tmp_path / "results"
     names = set(names_in(folder))
     assert names == {
-        ".thud", "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.svg"
+        "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.svg"
     }  # fmt: skip
     first = thud.read_surrogate(folder / "lumped_surrogate.npz")
     drops = thud.read_sweep(folder / "lumped_training_64.nc").dataset

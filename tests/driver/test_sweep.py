@@ -624,7 +624,7 @@ def test_command_writes_figure_and_table(
 ) -> None:
     assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
     folder = tmp_path / "outputs/sweep"
-    names = [".thud", "sweep.nc", "sweep.svg"]
+    names = ["sweep.nc", "sweep.svg"]
     assert names_in(folder) == names
     printed = capsys.readouterr()
     assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)

@@ -120,7 +120,6 @@ problems: list[type[thud.ThudError]] = [thud.InputError, thud.NumericalError]
 with warnings.catch_warnings(action="ignore", category=thud.FitWarning):
     found: list[thud.Fit] = [thud.fit(target, ["youngs_modulus"]) for target in targets]
 warnings.simplefilter("ignore", thud.PlausibilityWarning)
-warnings.simplefilter("ignore", thud.LockWarning)
 results = [
     thud.compare(impacts),
     *again,

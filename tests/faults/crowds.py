@@ -1,11 +1,9 @@
-"""Many at once: processes in one directory, calls in threads, and every way to start processes."""
+"""Many at once: calls in threads, and every way to start processes."""
 
 from __future__ import annotations
 
 import json
 import random
-import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -17,8 +15,7 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 from campaign import Finding
-from directories import INPUTS, files_of, owner_of
-from injection import PATIENCE, executable
+from injection import PATIENCE
 from public_calls import fast_calls, quiet, same
 
 if TYPE_CHECKING:
@@ -31,43 +28,6 @@ if TYPE_CHECKING:
 CROWD = 8
 # Ways to start what works at the same time; the last forks while threads compute.
 STARTS = ("threads", "fork", "spawn", "forkserver", "fork beside threads")
-
-
-def check_crowds(tries: Tries, folder: Path) -> Iterable[Finding]:
-    """Let eight runs write into one directory at once, in half of the rounds one is killed."""
-    place = folder / "crowd"
-    for number, chance in tries:
-        shutil.rmtree(place, ignore_errors=True)
-        place.mkdir()
-        for name, text in INPUTS.items():
-            (place / f"{name}.nml").write_text(text)
-        names = [chance.choice("ab") for _ in range(CROWD)]
-        running = [
-            subprocess.Popen(
-                [executable(), f"{name}.nml", "-q", "-o", "o"],
-                cwd=place,
-                stderr=subprocess.DEVNULL,
-            )
-            for name in names
-        ]
-        if number % 2:
-            running[chance.randrange(CROWD)].send_signal(signal.SIGKILL)
-        codes = [process.wait(PATIENCE) for process in running]
-        yield Finding(_left(place, codes), f"{names}: {codes}, {sorted(place.rglob('*'))}")
-
-
-def _left(place: Path, codes: list[int]) -> str:
-    """Return what a crowd has left."""
-    if set(codes) - {0, -signal.SIGKILL}:
-        return "crashed"
-    # The next one takes up what a killed one left.
-    last = subprocess.run([executable(), "a.nml", "-q", "-o", "o"], cwd=place, check=False,
-                          capture_output=True, timeout=PATIENCE)  # fmt: skip
-    before = owner_of(files_of(place / "o"))
-    rest = [path.name for path in place.iterdir() if path.name not in ("a.nml", "b.nml", "o")]
-    if last.returncode or rest or before != "a":
-        return "mixed"
-    return "killed" if min(codes) else "whole"
 
 
 @cache

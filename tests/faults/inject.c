@@ -5,6 +5,7 @@
 //   FAULT_UNDER=/path             only calls on files, by relative paths or by those that begin like this
 //   FAULT_FROM=1                  all calls from that one on go wrong
 //   FAULT_CLOCK=-3600             the clock of the day is off by so many seconds
+//   FAULT_NO_EXCHANGE=1           the file system cannot exchange names
 //   FAULT_LOG=path                each counted call, one line
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -164,6 +165,10 @@ int mkdir(const char *path, mode_t mode)
 
 int renameat2(int old, const char *path, int new, const char *other, unsigned flags)
 {
+   if (getenv("FAULT_NO_EXCHANGE")) {
+      errno = EINVAL;
+      return -1;
+   }
    if (fault("renameat2", other)) return -1;
    return NEXT(int, renameat2, int, const char *, int, const char *, unsigned)(old, path, new, other, flags);
 }

@@ -20,14 +20,9 @@ from aliasing import check_aliasing
 from attempts import find
 from campaign import Part, Report, each
 from checkouts import NAMES, check_checkouts
-from clusters import check_clusters
-from crowds import check_crowds, check_starts, check_threads
-from directories import check_calls, check_damage, check_races, plan as plan_calls
+from crowds import check_starts, check_threads
 from edge_cases import LUMPED, WEIGHTS
 from edges import check_many, check_models
-from foreign_files import check_foreign
-from kills import check_kills, check_slow_kills
-from places import check_places, check_steps, plan as plan_steps
 from servers import check_explorer
 from soak import check_soak
 
@@ -35,20 +30,10 @@ from soak import check_soak
 def parts() -> dict[str, Part]:
     """Return the parts of the campaign by name."""
     return {
-        "calls": Part(lambda: len(plan_calls()), 60, check_calls),
-        "races": Part(80, 8, check_races),
-        "damage": Part(10_000, 60, check_damage),
-        "kills": Part(10_000, 15, check_kills),
-        "slow kills": Part(500, 1, check_slow_kills),
-        "steps": Part(lambda: len(plan_steps()), 4, check_steps),
-        "places": Part(3000, 12, check_places),
-        "foreign": Part(3000, 16, check_foreign),
-        "crowds": Part(1000, 4, check_crowds),
         "threads": Part(3000, 100, check_threads, share=100),
         "aliasing": Part(2000, 40, check_aliasing, share=100),
         "starts": Part(100, 1, check_starts),
         "explorer": Part(2000, 8, check_explorer),
-        "clusters": Part(400, 2, check_clusters),
         "soak": Part(100_000, 100, check_soak, share=100),
         "namelists": Part(1_000_000, 400, each(namelists.attempt), limit=10, may_stop=True),
         "recordings": Part(100_000, 1000, each(mutate_recordings.attempt), limit=20),

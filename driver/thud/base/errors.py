@@ -25,10 +25,6 @@ class ReportWarning(UserWarning):
     """A report lacks a figure, a file or characters, or replaces another report."""
 
 
-class LockWarning(RuntimeWarning):
-    """A file system has no locks: concurrent runs may write to one directory."""
-
-
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 

@@ -82,20 +82,26 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[key] = path
-    answer = ask(
-        "run", path=os.fsencode(path), output=os.fsencode(output), replace=options.replace,
-        all=options.all, verbose=options.verbose, progress=not options.quiet,
-    )  # fmt: skip
-    print_notes(map(text, answer.get("messages", {}).values()))
-    folder = Path(output or os.fsdecode(answer["directory"]))
-    contents = _figures(answer, options)
-    sentence, files = _model_verdict(answer)
-    if contents | files:
-        results = Results(folder, inputs=(path,), replace=options.replace)
-        results.write(contents | files, marker=answer["case"])
+    results = Results(
+        Path(output or Path("outputs", case.name)),
+        "run",
+        case.name,
+        (path,),
+        replace=options.replace,
+    )
+    results.require()
+    with results.new_folder() as folder:
+        answer = ask(
+            "run", path=os.fsencode(path), folder=os.fsencode(folder), all=options.all,
+            verbose=options.verbose, progress=not options.quiet,
+        )  # fmt: skip
+        print_notes(map(text, answer.get("messages", {}).values()))
+        contents = _figures(answer, options)
+        sentence, files = _model_verdict(answer)
+        results.write_into(folder, contents | files)
     if not options.quiet:
         print_results(f"{text(answer['table'])}{sentence}".removesuffix("\n"))
-        print_path("  Results", f"{folder}\n")
+        print_path("  Results", f"{results.folder}\n")
     return bool(answer["conforms"])
 
 
@@ -119,23 +125,23 @@ def _model_verdict(answer: Bundle) -> tuple[str, dict[str, bytes]]:
 
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
+    from thud.studies.directory import StudyDirectory
     from thud.studies.model_assessment import assess
     from thud.studies.model_verdict import FILE, OUTCOMES
 
     case = read_case(options.case)
-    results = results_of(options, f"{case.name}_unknowns", [options.case])
-    results.require([FILE])
+    folder = Path(options.output or Path("outputs", f"{case.name}_unknowns"))
     verdict = assess(
         case,
-        results.folder,
+        folder,
         progress=shows_progress(quiet=options.quiet),
         replace_files=options.replace,
     )
-    results.write({FILE: verdict.to_csv().encode()})
+    StudyDirectory(folder, (options.case,)).write({FILE: verdict.to_csv().encode()})
     print_notes(verdict.warnings)
     print_results(verdict.message if options.quiet else str(verdict))
     if not options.quiet:
-        print_path("Results", results.folder)
+        print_path("Results", folder)
     return NOT_CONFORMING if options.check and verdict.result != OUTCOMES[0] else 0
 
 
@@ -215,6 +221,8 @@ def draw_figures(options: argparse.Namespace) -> int:
     from thud.plot import documentation, figure_files
 
     results = results_of(options, "figures")
+    results.require()
+    contents: dict[str, bytes] = {}
     hidden = not shows_progress(quiet=options.quiet)
     for name, draw in tqdm(
         documentation.FIGURES.items(), unit="figure", disable=hidden, leave=False
@@ -222,7 +230,8 @@ def draw_figures(options: argparse.Namespace) -> int:
         with warnings.catch_warnings(record=True) as caught:
             drawn = draw_all({name: draw})
         print_notes(f"{name}: {warning.message}" for warning in caught)
-        results.write(figure_files(drawn, options.format))
+        contents |= figure_files(drawn, options.format)
+    results.write(contents)
     if not options.quiet:
         print_path("Figures", results.folder)
     return 0
@@ -252,7 +261,9 @@ def run_export(options: argparse.Namespace) -> int:
     for kind in chosen:
         ending, make = force_files.EXPORTS[kind]
         contents |= make(force, f"{force.name}{ending}")
-    paths = results_of(options, "export", [options.source, options.config]).write(contents)
+    inputs = options.source, options.config
+    results = results_of(options, f"{force.name}_export", inputs, force.name)
+    paths = results.write(contents)
     if not options.quiet:
         print(*paths, sep="\n")
     return 0
@@ -279,7 +290,7 @@ EXPORT = Command(
             argument(f"--{kind}", action="store_true", help=meaning)
             for kind, meaning in KINDS.items()
         ),
-        *output("the files (default: outputs/export)"),
+        *output("the files (default: outputs/<name>_export)"),
         argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
         argument(
             "--drop", type=int, default=1, help="index of the drop in a recording (default: 1)"
@@ -298,7 +309,7 @@ def copy_examples(options: argparse.Namespace) -> int:
         refuse(f"{target} exists", "a new directory")
     source = inputs_folder()
     target.parent.mkdir(parents=True, exist_ok=True)
-    partial = unique_path(target.with_name(f".{target.name}.part"))
+    partial = unique_path(target)
     try:
         # Installers compile Python scripts.
         shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base.display import draw_all, warn_if_not_drawn
-from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError
+from thud.base.errors import InputError, ReportWarning, ThudError
 from thud.base.files import Results
 from thud.cli.screen import print_notes, print_path, print_results
 
@@ -50,9 +50,7 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(message) from error
 
 
-REPLACE = argument(
-    "--replace", action="store_true", help="also replace files that were not written by thud"
-)
+REPLACE = argument("--replace", action="store_true", help="also replace results of something else")
 
 
 def output(meaning: str) -> tuple[Argument, Argument]:
@@ -61,7 +59,10 @@ def output(meaning: str) -> tuple[Argument, Argument]:
 
 
 def results_of(
-    options: argparse.Namespace, default: str, inputs: Iterable[str | None] = ()
+    options: argparse.Namespace,
+    default: str,
+    inputs: Iterable[str | None] = (),
+    subject: str = "",
 ) -> Results:
     """Return the results directory of a command, by default in ``outputs``.
 
@@ -70,6 +71,7 @@ def results_of(
     return Results(
         Path(options.output or Path("outputs", default)),
         options.name,
+        subject,
         tuple(path for path in inputs if path is not None),
         replace=options.replace,
     )
@@ -89,19 +91,17 @@ FORMAT = argument(
 
 @contextmanager
 def print_immediately() -> Iterator[None]:
-    """Print warnings of reports and locks as soon as they arise."""
+    """Print warnings of reports as soon as they arise."""
     usual = warnings.showwarning
-    kinds = ReportWarning, LockWarning
 
     def show(warning: Any, kind: type[Warning], *origin: Any) -> None:  # noqa: ANN401 - of any warning
-        if issubclass(kind, kinds):
+        if issubclass(kind, ReportWarning):
             print_notes([warning])
         else:
             usual(warning, kind, *origin)
 
     with warnings.catch_warnings():
-        for kind in kinds:
-            warnings.simplefilter("always", kind)
+        warnings.simplefilter("always", ReportWarning)
         warnings.showwarning = show  # type: ignore[assignment]
         yield
 

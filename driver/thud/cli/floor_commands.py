@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.base.errors import PlausibilityWarning
-from thud.base.files import Results
+from thud.base.files import is_one_of, replace_file
 from thud.base.tables import format_rows
 from thud.case.case import read_case
 from thud.cli.command import (
     NO_FIGURES,
     PAGE,
     QUIET,
-    REPLACE,
     Command,
     argument,
     number,
@@ -94,8 +93,7 @@ def predict(options: argparse.Namespace) -> int:
         for name, prediction in comparison.predictions.items()
     ]
     written = contents(floors, results.folder, report=options.report)
-    # The results of other floors belong to an earlier call.
-    results.write(written, stale=results.written())
+    results.write(written)
     if not options.quiet:
         print_results("\n\n".join(map(screen_text, floors)))
     print_notes(comparison.warnings)
@@ -181,8 +179,8 @@ def listen_to_cases(options: argparse.Namespace) -> int:
         refuse(f"--output {path} is not a sound file", "a name that ends with .wav")
     files = [name for name in options.construction if name.endswith(".toml")]
     inputs = (*options.cases, *files)
-    results = Results(path.parent, options.name, inputs, replace=options.replace)
-    results.require([path.name])
+    if is_one_of(path, inputs):
+        refuse(f"{path} is an input, which is never replaced", "another file")
     cases, _ = _floor_cases(options.cases, options.construction)
     sound = listen(
         _compare(cases, options).predictions,
@@ -192,7 +190,8 @@ def listen_to_cases(options: argparse.Namespace) -> int:
         seed=options.seed,
     )
     print_notes(sound.warnings)
-    results.write({path.name: sound.wav()})
+    path.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(path, sound.wav())
     if not options.quiet:
         print_results(format_rows(sound.rows()))
         print_results(f"Full scale: {sound.full_scale:g} Pa\nThe sound is {NOTE}.")
@@ -210,7 +209,6 @@ LISTEN = Command(
             metavar="FILE.wav",
             help="the sound (default: outputs/listen/listen.wav)",
         ),
-        REPLACE,
         argument(
             "--position",
             nargs=2,

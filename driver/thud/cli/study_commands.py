@@ -9,7 +9,7 @@ from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
 from thud.cli.screen import print_notes, print_path, print_results, print_status, shows_progress
-from thud.studies.directory import open_results
+from thud.studies.directory import open_directory
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -79,22 +79,22 @@ def run_study(options: argparse.Namespace) -> int:
     if not options.quiet:
         print_status(kind.describe(study))
     figures = not options.no_figures
-    with open_results(folder, kind, study, replace=options.replace, figures=figures) as directory:
-        try:
-            result = kind.compute(study, directory, **run_options)
-        except ThudError as error:
-            message = f"{options.study}: {error}"
-            raise type(error)(message) from error
-        if not options.quiet:
-            print_results(result.table())
-        print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
-        contents = kind.files(result, study)
-        if figures:
-            with warn_if_not_drawn("the figure of the study"):
-                from thud.plot import figure_files
+    directory = open_directory(folder, kind, study, replace=options.replace, figures=figures)
+    try:
+        result = kind.compute(study, directory, **run_options)
+    except ThudError as error:
+        message = f"{options.study}: {error}"
+        raise type(error)(message) from error
+    if not options.quiet:
+        print_results(result.table())
+    print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
+    contents = kind.files(result, study)
+    if figures:
+        with warn_if_not_drawn("the figure of the study"):
+            from thud.plot import figure_files
 
-                contents |= figure_files(result.figures(study.name))
-        directory.write(contents)
+            contents |= figure_files(result.figures(study.name))
+    directory.write(contents)
     if not options.quiet:
         print_path("Results", folder)
     return 0 if result.succeeded else NumericalError.exit_code

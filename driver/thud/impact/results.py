@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import fcntl
+import errno
 import math
-import warnings
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
@@ -13,16 +13,14 @@ import f90nml.scanner
 import numpy as np
 
 from thud.base._schema import IMPACT_QUANTITIES
-from thud.base.checks import refuse, shown
-from thud.base.errors import PlausibilityWarning, ThudError
-from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
+from thud.base.checks import refuse
+from thud.base.errors import ThudError
 from thud.case.case import Case
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.impact import Impact
 from thud.impact.motion import Motion
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
@@ -30,6 +28,8 @@ if TYPE_CHECKING:
 # The scanner of f90nml prints its tables on the screen before it raises an error.
 f90nml.scanner.print = lambda *_: None
 
+# Endings of the files that are read.
+_ENDINGS = (".nml", ".csv", ".xmf")
 # Columns of ``force.csv`` for fields of `Impact`; columns of components follow the first three.
 _COLUMNS = {
     "time": "time_s",
@@ -57,18 +57,10 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Raises
     ------
     InputError
-        If the directory does not hold the results of an impact, or a file has changed since the run
-        wrote it.
-
-    Warns
-    -----
-    PlausibilityWarning
-        If the file with the checksums, ``.thud``, is missing; also in `Impact.warnings`.
+        If the directory does not hold the results of an impact.
     """
     try:
-        folder = Path(directory)
-        with locked(folder, fcntl.LOCK_SH):
-            return _new_impact(_Files(folder))
+        return _new_impact(_Files(Path(directory)))
     except ThudError:
         raise
     except FileNotFoundError as error:
@@ -78,44 +70,38 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         refuse(f"{directory}: cannot be read ({reason})", "the results of an impact", error)
 
 
-class _Files:
-    """Files of a result directory; the checksum of each file is checked when it is read."""
+class _Files(dict[str, str]):
+    """Texts of the files of a result directory by name.
+
+    The directory is opened once: a run that replaces it meanwhile adds no file of its own.
+    """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.listed = read_manifest(folder)
+        directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
 
-    def __contains__(self, name: str) -> bool:
-        """Return whether a file is part of the results."""
-        return name in self.listed if self.listed else (self.folder / name).exists()
+            def opener(name: str, flags: int) -> int:
+                # Opening a pipe could block.
+                return os.open(name, flags | os.O_NONBLOCK, dir_fd=directory)
 
-    def read(self, name: str) -> str:
-        """Return the text of a file; raise InputError if its checksum is not that of the run."""
-        if Path(name).name != name:
-            refuse(
-                f"{self.folder}: {shown(name)} is not the name of a file in this directory",
-                "names without directories",
-            )
-        content = read_input(self.folder / name)
-        allowed = self.listed[name].checksums if name in self.listed else ("",)
-        if self.listed and checksum(content) != allowed[-1]:
-            refuse(
-                f"{self.folder / name} has changed since the run wrote it",
-                "results of one run; run the case again",
-            )
-        return content.decode()
+            for name in os.listdir(directory):  # noqa: PTH208 - by its descriptor
+                if name.endswith(_ENDINGS):
+                    with open(name, encoding="utf-8", opener=opener) as file:
+                        self[name] = file.read()
+        finally:
+            os.close(directory)
+
+    def __missing__(self, name: str) -> str:
+        raise FileNotFoundError(errno.ENOENT, "missing", str(self.folder / name))
 
 
 def _new_impact(files: _Files) -> Impact:
     """Return the impact of a result directory."""
-    case = Case.from_text(files.read("effective.nml"))
-    numbers = f90nml.reads(files.read("summary.nml"))
+    case = Case.from_text(files["effective.nml"])
+    numbers = f90nml.reads(files["summary.nml"])
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("model_quantities", {}))
     messages = _texts(numbers.get("warnings", {}).get("warning", []))
-    if not files.listed:
-        warning = f"{MANIFEST} is missing: nothing shows that the files belong together"
-        warnings.warn(f"{files.folder}: {warning}", PlausibilityWarning, stacklevel=3)
-        messages += (warning,)
     on_floor = None
     if "floor_summary" in numbers:
         scalars, others = numbers["floor_summary"], numbers.get("floor_model_quantities", {})
@@ -137,9 +123,9 @@ def _read_history(
     files: _Files, prefix: str, scalars: Mapping[str, float], model_quantities: Mapping[str, float]
 ) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
     """Return fields of `Impact` from the files with a prefix, and the columns of a floor."""
-    force = _table(files.read(f"{prefix}force.csv"))
+    force = _table(files[f"{prefix}force.csv"])
     file_name = f"{prefix}model_histories.csv"
-    histories = _table(files.read(file_name)) if file_name in files else {}
+    histories = _table(files[file_name]) if file_name in files else {}
     # Columns: motion, components of the force, total forces, motion of the floor.
     columns = list(force)
     last = columns.index("floor_force_N")
@@ -179,7 +165,7 @@ def _table(text: str) -> dict[str, NDArray[np.float64]]:
 
 def _read_motion(files: _Files, prefix: str) -> Motion:
     """Return the snapshots of ``snapshots.xmf``."""
-    text = files.read(f"{prefix}snapshots.xmf")
+    text = files[f"{prefix}snapshots.xmf"]
     _, *grids = ET.fromstring(text).iter("Grid")  # noqa: S314 - expat limits entities
     snapshots = [_read_grid(grid) for grid in grids]
     # Node 0 is on the first ring; the second node of the first element starts the next ring.

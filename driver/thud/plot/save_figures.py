@@ -96,16 +96,16 @@ def save_all(
     figures
         Figures by name.
     directory
-        Directory of the files; created if missing.
+        Directory of the files; replaced as a whole if it holds earlier figures.
     kind
         Format: ``"svg"``, ``"png"`` or ``"pdf"``.
     replace
-        Also replace files not written by thud.
+        Also replace results of something else.
 
     Raises
     ------
     InputError
-        If a file is in the way.
+        If the directory holds a file that is not replaced.
     OSError
         If a file cannot be written.
 

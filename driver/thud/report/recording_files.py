@@ -176,13 +176,12 @@ def file_names(*, figures: bool = True) -> list[str]:
 def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
     """Write levels, criteria and data; with `figures` also the figures and the page.
 
-    All contents are created before the first file is written. Files of an earlier recording that
-    have no new content are removed.
+    The directory of the results is replaced as a whole.
 
     Raises
     ------
     InputError
-        If a file or directory that thud did not write is in the way.
+        If the directory holds a file that is not replaced.
     OSError
         If a file cannot be written.
 
@@ -201,7 +200,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     if figures and _has_matplotlib():
         drawings = write.figures(recording)
         contents |= page_contents(recording, data, drawings, results.folder) | drawings
-    write_files(results, data, contents, file_names())
+    write_files(results, data, contents)
 
 
 def _has_matplotlib() -> bool:

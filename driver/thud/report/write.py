@@ -16,7 +16,7 @@ from thud.recordings.picture import read_picture
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from thud.recordings.recording import Recording
 
@@ -35,14 +35,14 @@ def write_report(
     recording
         Measured recording.
     directory
-        Directory for the files; it is created if missing.
+        Directory for the files; replaced as a whole if it holds an earlier report.
     replace
-        Whether to replace files that thud did not write.
+        Whether to replace results of something else.
 
     Raises
     ------
     InputError
-        If a file or directory that thud did not write is in the way.
+        If the directory holds a file that is not replaced.
     OSError
         If a file cannot be written.
 
@@ -99,14 +99,11 @@ def page_contents(
 
 
 def write_files(
-    results: Results, data: dict[str, Any], contents: Mapping[str, bytes], names: Iterable[str] = ()
+    results: Results, data: dict[str, Any], contents: Mapping[str, bytes]
 ) -> list[Path]:
-    """Write the files of a recording; warn if they replace those of another one.
-
-    Earlier files of `names` that have no new content are removed, as is an earlier PDF.
-    """
+    """Write the files of a recording; warn if they replace those of another one."""
     earlier = _earlier(results.folder)
-    paths = results.write(contents, stale=[*names, *([PDF] if HTML in contents else [])])
+    paths = results.write(contents)
     if earlier is not None and earlier != _checksums(data):
         message = f"{results.folder}: replaces the results of another recording"
         warnings.warn(message, ReportWarning, stacklevel=3)

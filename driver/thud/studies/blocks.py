@@ -19,9 +19,7 @@ from thud.base.checks import refuse
 from thud.base.files import (
     is_failure,
     is_regular,
-    is_temporary,
     read_input,
-    remove,
     replace_file,
     uninterrupted,
     unique_path,
@@ -41,8 +39,8 @@ if TYPE_CHECKING:
 MAX_NETCDF_SIZE = 24 * 2**20
 # Name of the file with the identity of the blocks.
 IDENTITY = "study"
-# Names of all complete files.
-_FILES = re.compile(rf"{IDENTITY}|block_\d+\.nc")
+# Names of all files: complete ones, and those that a killed process was writing.
+_FILES = re.compile(rf"{IDENTITY}|block_\d+\.nc|\..*\.new")
 # Separates a NetCDF file from its checksum; HDF5 ignores both.
 _SEAL = b"thud sha256 "
 
@@ -65,7 +63,7 @@ class Blocks:
                 before = json.loads(read_input(self._partial / IDENTITY))
                 if before != self._identity:
                     # Blocks of another size would overlap or leave gaps.
-                    remove(self._partial)
+                    shutil.rmtree(self._partial)
                     self._partial.mkdir()
             replace_file(self._partial / IDENTITY, json.dumps(self._identity).encode())
 
@@ -110,10 +108,7 @@ class Blocks:
 
     def _write_zarr(self, paths: list[Path]) -> None:
         """Write a Zarr group in parts, so that the results need not fit in memory."""
-        part = self.path.with_name(f".{self.path.name}.part")
-        # An interrupted removal may have left this directory.
-        shutil.rmtree(part, ignore_errors=True)
-        part = unique_path(part)
+        part = unique_path(self.path)
         write = self._write_grid if self._study.design == "grid" else _write_samples
         try:
             with _named(self.path):
@@ -161,7 +156,7 @@ def read_identity(path: Path) -> dict[str, str] | None:
     """Return the identity of results; None if they have no finished block."""
     if path.suffix == ".partial":
         for file in path.iterdir():
-            if not is_regular(file) or not (_FILES.fullmatch(file.name) or is_temporary(file.name)):
+            if not is_regular(file) or not _FILES.fullmatch(file.name):
                 refuse(f"{file} does not belong to a study", "finished blocks of a study")
         if not block_paths(path) and not (path / IDENTITY).exists():
             return None

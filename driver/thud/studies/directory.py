@@ -1,19 +1,24 @@
-"""Results directories, each for one run at a time and one version of a study."""
+"""Directories of studies, which grow: every file is written aside and renamed."""
 
 from __future__ import annotations
 
 import os
-from contextlib import ExitStack, contextmanager
-from fcntl import LOCK_EX, LOCK_NB
+import shutil
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
-from thud.base.files import Results, is_directory, is_failure, locked, refuse_foreign, remove
+from thud.base.files import (
+    is_directory,
+    is_failure,
+    is_one_of,
+    refuse_foreign,
+    replace_file,
+)  # fmt: skip
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from thud.studies.kind import Kind
     from thud.studies.study import Study
@@ -24,43 +29,68 @@ FORMATS = (".svg",)
 _MAX_SHOWN = 3
 
 
-@contextmanager
-def open_results(
+@dataclass(frozen=True)
+class StudyDirectory:
+    """The directory of a study.
+
+    Attributes
+    ----------
+    folder : Path
+        The directory.
+    inputs : tuple of path-like
+        Files that the study depends on, never replaced.
+    replace : bool
+        Replace results of another version of the study, and files that belong to no study.
+    """
+
+    folder: Path
+    inputs: tuple[str | os.PathLike[str], ...] = ()
+    replace: bool = False
+
+    def write(self, contents: Mapping[str, bytes]) -> list[Path]:
+        """Write files and return their paths; raise InputError for the path of an input."""
+        for name, content in contents.items():
+            self.require_no_input(self.folder / name)
+            replace_file(self.folder / name, content)
+        return [self.folder / name for name in contents]
+
+    def require_no_input(self, path: Path) -> None:
+        """Raise InputError if a path is an input."""
+        if is_one_of(path, self.inputs):
+            refuse(f"{path} is an input, which is never replaced", "another directory")
+
+
+def open_directory(
     folder: str | os.PathLike[str],
     kind: Kind[Any, Any],
     study: Study,
     *,
     replace: bool = False,
     figures: bool = True,
-) -> Iterator[Results]:
-    """Yield a results directory, locked for one run.
+) -> StudyDirectory:
+    """Return the directory of a study, created if it is missing.
 
-    Raises InputError if another run uses it or, without `replace`, if it holds results of another
-    version of the study or a file is in the way; OSError if nothing can be written.
+    Raises InputError, without `replace`, if it holds results of another version of the study or a
+    file of another origin is in the way; OSError if the directory cannot be made.
     """
-    directory = Path(folder)
+    directory = StudyDirectory(Path(folder), study.inputs, replace)
+    directory.folder.mkdir(parents=True, exist_ok=True)
     names = kind.identity_files(study)
-    directory.mkdir(parents=True, exist_ok=True)
-    with ExitStack() as stack:
-        try:
-            stack.enter_context(locked(directory, LOCK_EX | LOCK_NB))
-        except BlockingIOError as error:
-            refuse(f"{directory / names[0]} is being computed", "wait, or another directory", error)
-        results = Results(directory, kind.name, study.inputs, replace=replace, is_locked=True)
-        listed = kind.listed_files(study)
-        results.require(n for n in listed if figures or not n.endswith(FORMATS))
-        readers = dict.fromkeys((directory / name for name in names), kind.identity_in)
-        require_version(readers, study, results, listed)
-        if not (directory / names[0]).exists():
-            with TemporaryFile(dir=directory):
-                pass
-        yield results
+    listed = kind.listed_files(study)
+    readers = dict.fromkeys((directory.folder / name for name in names), kind.identity_in)
+    begun = any(map(os.path.lexists, readers))
+    for path in (directory.folder / n for n in listed if figures or not n.endswith(FORMATS)):
+        directory.require_no_input(path)
+        if is_directory(path) or (path.exists() and not (begun or replace)):
+            refuse_foreign(path)
+    require_version(readers, study, directory, listed)
+    return directory
 
 
 def require_version(
     readers: Mapping[Path, Callable[[Path], dict[str, str] | None]],
     study: Study,
-    results: Results,
+    results: StudyDirectory,
     others: Iterable[str] = (),
 ) -> None:
     """Raise InputError if results belong to another version of a study, or remove them to replace.
@@ -89,10 +119,15 @@ def require_version(
             )
         if changes:
             outdated.append(path)
-    for path in outdated:
-        remove(path)
-    if outdated:
-        results.write({}, stale=others)
+    for path in [*outdated, *(results.folder / name for name in others if outdated)]:
+        _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if is_directory(path):
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:

@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
-    from thud.base.files import Results
     from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
+    from thud.studies.directory import StudyDirectory
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
     from thud.studies.kind import RunOptions
@@ -305,7 +305,7 @@ class FitKind(Kind[FitStudy, Fit]):
     def compute(
         self,
         study: FitStudy,
-        results: Results | None,  # noqa: ARG002
+        results: StudyDirectory | None,  # noqa: ARG002
         **options: Unpack[RunOptions],
     ) -> Fit:
         """Return the fit."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
 
 from thud.base.checks import refuse, refuse_unknown
-from thud.studies.directory import open_results
+from thud.studies.directory import StudyDirectory, open_directory
 from thud.studies.study import Study, named_files, read_common, read_tables
 from thud.studies.study_result import StudyResult
 from thud.studies.trained_surrogate import get_surrogate
@@ -17,7 +17,6 @@ from thud.studies.trained_surrogate import get_surrogate
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from thud.base.files import Results
     from thud.case.case import Case
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
@@ -94,10 +93,10 @@ class Kind(ABC, Generic[S, R]):
         if output is None:
             return self.compute(study, None, **options)
         replace = options.get("replace", False)
-        with open_results(output, self, study, replace=replace, figures=False) as results:
-            result = self.compute(study, results, **options)
-            results.write(self.files(result, study))
-            return result
+        directory = open_directory(output, self, study, replace=replace, figures=False)
+        result = self.compute(study, directory, **options)
+        directory.write(self.files(result, study))
+        return result
 
     @abstractmethod
     def new_parameter(
@@ -121,7 +120,7 @@ class Kind(ABC, Generic[S, R]):
         return f"{study.name}: {', '.join(p.name for p in study.parameters)} of {study.model}"
 
     @abstractmethod
-    def compute(self, study: S, results: Results | None, **options: Unpack[RunOptions]) -> R:
+    def compute(self, study: S, results: StudyDirectory | None, **options: Unpack[RunOptions]) -> R:
         """Return the result; finished samples are kept in a directory, if any."""
 
     @abstractmethod
@@ -134,7 +133,7 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def listed_files(self, study: S) -> list[str]:
-        """Return the names of files that a study may write and list in the manifest."""
+        """Return the names of files that a study may write beside its results."""
 
     def files(self, result: R, study: S) -> dict[str, bytes]:  # noqa: ARG002 - most have none
         """Return the contents of additional files by name."""

@@ -13,7 +13,7 @@ from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
-from thud.studies.directory import FORMATS
+from thud.studies.directory import FORMATS, StudyDirectory
 from thud.studies.kind import Kind
 from thud.studies.parameter import read_varied
 from thud.studies.samples import SampleStudy
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from thud.base.files import Results
     from thud.case.case import Case
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
@@ -126,7 +125,7 @@ class SampleKind(DropsKind[R]):
         return f"{study.name}: {study.count} samples of {study.model}{by}, about {amount} on disk"
 
     def compute(
-        self, study: SampleStudy, results: Results | None, **options: Unpack[RunOptions]
+        self, study: SampleStudy, results: StudyDirectory | None, **options: Unpack[RunOptions]
     ) -> R:
         """Compute missing samples; return the result of all samples."""
         try:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from thud.base.files import Results
     from thud.case.case import Case
+    from thud.studies.directory import StudyDirectory
     from thud.studies.kind import RunOptions
     from thud.studies.samples import SampleStudy
     from thud.studies.study import Source, Study
@@ -50,7 +50,7 @@ class SurrogateKind(DropsKind[Surrogate]):
         return result
 
     def compute(
-        self, study: SampleStudy, results: Results | None, **options: Unpack[RunOptions]
+        self, study: SampleStudy, results: StudyDirectory | None, **options: Unpack[RunOptions]
     ) -> Surrogate:
         """Return the surrogate, trained or read."""
         return train(study, results, options)

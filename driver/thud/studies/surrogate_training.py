@@ -19,7 +19,7 @@ from thud.case.keys import find_key, with_values
 from thud.impact.compute import compute
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import compute_samples, read_identity, result_names
-from thud.studies.directory import require_version
+from thud.studies.directory import StudyDirectory, require_version
 from thud.studies.parameter import Parameter
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import unit_samples
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from thud.base.files import Results
     from thud.studies.kind import RunOptions
     from thud.studies.samples import Columns
     from thud.studies.trained_surrogate import Plan
@@ -65,7 +64,7 @@ class TrainingStudy(SampleStudy):
         return super().parameter_columns(self.first + start, self.first + stop)
 
 
-def train(study: SampleStudy, results: Results | None, options: RunOptions) -> Surrogate:
+def train(study: SampleStudy, results: StudyDirectory | None, options: RunOptions) -> Surrogate:
     """Return the surrogate of all samples of a study, trained or read from its directory.
 
     Its drops are saved there as samples of a separate study. Raises InputError if a key cannot
@@ -77,7 +76,7 @@ def train(study: SampleStudy, results: Results | None, options: RunOptions) -> S
     name = surrogate_name(study)
     folder = results.folder if results else None
     if folder:
-        # Any other file of this name is replaced, see `open_results`.
+        # Any other file of this name is replaced, see `open_directory`.
         with suppress(InputError):
             saved = read_surrogate(folder / name)
             if saved.identity == study.identity:

@@ -295,8 +295,8 @@ class Fit(Estimates):
     ) -> list[Path]:
         """Write the files of `files`, and the figures; return their paths.
 
-        `replace` also replaces files that thud has not written. Raises InputError if a file is in
-        the way, OSError if one cannot be written.
+        The directory is replaced as a whole; with `replace` also one with results of something
+        else. Raises InputError if it holds any other file, OSError if a file cannot be written.
         """
         contents = self.files()
         if figures:

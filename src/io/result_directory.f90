@@ -1,0 +1,296 @@
+!> Directories of results, replaced as a whole.
+!>
+!> A command writes its files into a new directory `.NAME.<process>-<number>.new` beside the target NAME, which then takes
+!> its place by one exchange of names: a killed process leaves the old or the new results, never a mixture. Where the file
+!> system cannot exchange names, two renames take the place of the exchange, and the old results stand in `NAME.old` for
+!> that moment. The file `thud.txt` identifies results: the command and its subject in the first line, then the names of all
+!> files. A directory is replaced only if thud has made it and the command may remove every file in it, see `check_target`.
+module thud_result_directory
+   use thud_error, only: error_type, input_error
+   use thud_file, only: read_text_file
+   use thud_interrupt, only: check_interrupt
+   use thud_system, only: close_descriptor, create_file, defer_interrupts, directory_exists, get_system_message, &
+      is_same_file, list_directory, make_beside, name_length, pass_interrupts, path_length, remove_file, rename_file, &
+      resolve_path, swap_directories, write_text
+   use thud_text, only: newline
+   implicit none (type, external)
+   private
+
+   public :: add_text, begin_file, check_target, close_results, new_result_directory, open_results, result_directory_type
+   public :: write_file
+
+   !> Name of the file that identifies results, and the beginning of its first line.
+   character(len=*), parameter :: identity = 'thud.txt', signature = 'written by thud '
+
+   !> A directory while its results are written.
+   type :: result_directory_type
+      !> Path as the user gives it.
+      character(len=:), allocatable :: path
+      !> Command and subject: `run` and the name of a case, for example.
+      character(len=:), allocatable :: command, subject
+      !> Paths of the files that the results depend on, which are never replaced: [n_input].
+      character(len=path_length), allocatable :: inputs(:)
+      !> Whether to replace results of another subject or command.
+      logical :: replace = .false.
+      !> Path of the new directory.
+      character(len=:), allocatable :: folder
+      !> Name and descriptor of the file that is being written; negative if there is none.
+      character(len=:), allocatable :: name
+      integer :: file = -1
+   end type result_directory_type
+
+contains
+
+   !> A directory of results.
+   function new_result_directory(path, command, subject, inputs, replace) result(self)
+      !> Path of the directory; command and subject.
+      character(len=*), intent(in) :: path, command, subject
+      !> Paths of the files that the results depend on: [n_input].
+      character(len=*), intent(in) :: inputs(:)
+      !> Whether to replace results of another subject or command.
+      logical, intent(in) :: replace
+      type(result_directory_type) :: self
+
+      self%path = path
+      self%command = command
+      self%subject = subject
+      allocate (self%inputs(size(inputs)))
+      self%inputs = inputs
+      self%replace = replace
+   end function new_result_directory
+
+   !> Returns an error if a directory may not be replaced.
+   !>
+   !> It may be replaced if it is missing or empty, or if thud has made it for the same command and subject, or for others
+   !> with `replace`. Every file in it must be one that this command writes: one of `names`, or one that an earlier run of
+   !> the same command has listed and that is no page (.html, .pdf), such as a signed report.
+   subroutine check_target(self, names, error)
+      type(result_directory_type), intent(in) :: self
+      !> Names of the new files; none if they are not known yet, and files are then checked later: [n_file].
+      character(len=*), intent(in) :: names(:)
+      type(error_type), allocatable, intent(out) :: error
+      character(len=name_length), allocatable :: present_names(:), listed(:)
+      character(len=:), allocatable :: command, subject, path, holds
+      logical :: exists
+      integer :: i, j
+
+      if (.not. directory_exists(self%path)) then
+         inquire (file=self%path, exist=exists)
+         if (exists) error = input_error(self%path//' is not a directory that can be read; allowed: a directory')
+         return
+      end if
+      if (is_same_file(self%path, '.')) then
+         error = input_error(self%path//' is the working directory, which cannot be replaced; allowed: ' &
+            //'another directory')
+         return
+      end if
+      call list_directory(self%path, present_names)
+      if (size(present_names) == 0) return
+      call read_identity(self%path, command, subject, listed)
+      if (.not. self%replace .and. (command /= self%command .or. subject /= self%subject)) then
+         holds = 'files of something else'
+         if (command /= '') holds = 'results of '//trim(command//' '//subject)
+         error = input_error(self%path//' holds '//holds//'; allowed: a new or empty directory, results of ' &
+            //trim(self%command//' '//self%subject)//', or --replace (replace=True)')
+         return
+      end if
+      if (command /= self%command) listed = [character(len=name_length) :: ]
+      do i = 1, size(present_names)
+         path = self%path//'/'//trim(present_names(i))
+         do j = 1, size(self%inputs)
+            if (is_same_file(path, trim(self%inputs(j)))) error = input_error(path//' is an input, which is never ' &
+               //'replaced; allowed: another directory')
+         end do
+         if (allocated(error)) return
+         if (present_names(i) == identity .and. command /= '') cycle
+         if (.not. directory_exists(path)) then
+            if (any(names == present_names(i))) cycle
+            if (is_page(present_names(i))) then
+               if (size(names) == 0) cycle
+            else if (any(listed == present_names(i)) .or. (size(names) == 0 .and. self%replace)) then
+               cycle
+            end if
+         end if
+         error = input_error(path//' is in the way: this command does not write it; allowed: another directory, or ' &
+            //'remove it first')
+         return
+      end do
+   end subroutine check_target
+
+   !> Whether a file is a page: only a command that writes it anew removes it.
+   pure function is_page(name) result(yes)
+      character(len=*), intent(in) :: name
+      logical :: yes
+
+      yes = index(trim(name)//'|', '.html|') > 0 .or. index(trim(name)//'|', '.pdf|') > 0
+   end function is_page
+
+   !> Reads whose results a directory holds.
+   subroutine read_identity(path, command, subject, names)
+      character(len=*), intent(in) :: path
+      !> Command and subject; empty if thud has not made the directory.
+      character(len=:), allocatable, intent(out) :: command, subject
+      !> Names of the files: [n_file].
+      character(len=name_length), allocatable, intent(out) :: names(:)
+      type(error_type), allocatable :: error
+      character(len=:), allocatable :: text
+      integer :: stop, blank
+
+      command = ''
+      subject = ''
+      allocate (names(0))
+      call read_text_file(path//'/'//identity, text, error)
+      if (allocated(error)) return
+      if (index(text, signature) /= 1) return
+      text = text(len(signature) + 1:)
+      do while (text /= '')
+         stop = index(text//newline, newline)
+         if (command == '') then
+            blank = index(text(:stop - 1)//' ', ' ')
+            command = text(:blank - 1)
+            subject = text(min(blank + 1, stop):stop - 1)
+         else
+            names = [character(len=name_length) :: names, text(:stop - 1)]
+         end if
+         text = text(min(stop + 1, len(text) + 1):)
+      end do
+   end subroutine read_identity
+
+   !> Makes the new directory beside the target. Until the results are closed, interrupts do not end the process.
+   subroutine open_results(self, error)
+      type(result_directory_type), intent(inout) :: self
+      !> Set if the directory cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: target
+      integer :: status
+
+      call resolve_path(self%path, target, status)
+      call defer_interrupts()
+      if (status == 0) call make_beside(target, self%folder, status)
+      if (status /= 0) error = unusable_error(self%path, status)
+   end subroutine open_results
+
+   !> Puts the new directory in the place of the target, or removes it after an error.
+   subroutine close_results(self, error)
+      type(result_directory_type), intent(inout) :: self
+      !> Set if an earlier step failed, or the target may not be replaced; the target is unchanged then.
+      type(error_type), allocatable, intent(inout) :: error
+      character(len=name_length), allocatable :: names(:), listed(:)
+      character(len=:), allocatable :: command, subject, target
+      type(error_type), allocatable :: refusal
+      integer :: status, i
+      logical :: done
+
+      if (.not. allocated(self%folder)) return
+      call end_file(self, error)
+      call list_directory(self%folder, names)
+      call begin_file(self, identity, error)
+      call add_text(self, signature//trim(self%command//' '//self%subject)//newline, error)
+      do i = 1, size(names)
+         call add_text(self, trim(names(i))//newline, error)
+      end do
+      call end_file(self, error)
+      if (.not. allocated(error)) then
+         call check_target(self, names, refusal)
+         if (allocated(refusal)) call move_alloc(refusal, error)
+      end if
+      if (.not. allocated(error)) then
+         call resolve_path(self%path, target, status)
+         if (status == 0) call swap_directories(self%folder, target, status)
+         if (status /= 0) error = unusable_error(self%path, status)
+      end if
+      ! The folder now holds the old results, or after an error the new ones.
+      if (directory_exists(self%folder)) then
+         call read_identity(self%folder, command, subject, listed)
+         names = [character(len=name_length) :: names, listed, identity]
+         do i = 1, size(names)
+            call remove_file(self%folder//'/'//trim(names(i)))
+         end do
+         call remove_file(self%folder, done)
+         ! Another program has written into the old directory meanwhile.
+         if (.not. done .and. .not. allocated(error)) call rename_file(self%folder, target//'.old', done)
+      end if
+      call pass_interrupts(merge(0, 1, allocated(error)))
+   end subroutine close_results
+
+   !> Begins a file.
+   subroutine begin_file(self, name, error)
+      type(result_directory_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      !> Set if an earlier step or this one fails.
+      type(error_type), allocatable, intent(inout) :: error
+      integer :: status
+
+      call end_file(self, error)
+      if (allocated(error)) return
+      self%name = name
+      call create_file(self%folder//'/'//trim(name), self%file, status)
+      call require_written(self, status, error)
+   end subroutine begin_file
+
+   !> Adds text to the current file.
+   subroutine add_text(self, text, error)
+      type(result_directory_type), intent(inout) :: self
+      character(len=*), intent(in) :: text
+      !> Set if an earlier step or this one fails.
+      type(error_type), allocatable, intent(inout) :: error
+      integer :: status
+
+      if (allocated(error)) return
+      call write_text(self%file, text, status)
+      call require_written(self, status, error)
+   end subroutine add_text
+
+   !> Ends the current file.
+   subroutine end_file(self, error)
+      type(result_directory_type), intent(inout) :: self
+      !> Set if an earlier step or this one fails.
+      type(error_type), allocatable, intent(inout) :: error
+      integer :: status
+
+      if (self%file < 0) return
+      call close_descriptor(self%file, status)
+      call require_written(self, status, error)
+   end subroutine end_file
+
+   !> Writes a whole file.
+   subroutine write_file(self, name, content, error)
+      type(result_directory_type), intent(inout) :: self
+      character(len=*), intent(in) :: name, content
+      !> Set if an earlier step or this one fails.
+      type(error_type), allocatable, intent(inout) :: error
+
+      call begin_file(self, name, error)
+      call add_text(self, content, error)
+      call end_file(self, error)
+   end subroutine write_file
+
+   !> Returns an error if a file was not written.
+   subroutine require_written(self, status, error)
+      type(result_directory_type), intent(in) :: self
+      !> 0, the number of the system's error, or negative after an interrupt.
+      integer, intent(in) :: status
+      !> Set if an earlier step or this one fails.
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (status == 0 .or. allocated(error)) return
+      if (status < 0) then
+         call check_interrupt(error)
+      else
+         error = input_error(self%path//': '//trim(self%name)//' cannot be written (' &
+            //get_system_message(status)//'); allowed: a directory that you may write to, with space on its disk')
+      end if
+   end subroutine require_written
+
+   !> Error for a directory that cannot be made or replaced.
+   function unusable_error(path, status) result(error)
+      character(len=*), intent(in) :: path
+      !> Number of the system's error.
+      integer, intent(in) :: status
+      type(error_type) :: error
+
+      error = input_error(path//' cannot be used ('//get_system_message(status)//'); allowed: a directory ' &
+         //'in a folder that you may write to')
+   end function unusable_error
+
+end module thud_result_directory
