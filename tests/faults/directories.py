@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 INPUTS = {
     "a": "&case name = 'case' / &ball / &drop / &model /",
-    "b": "&case name = 'case' / &ball mass = 2.4 / &drop / &model / &mesh polar_elements = 8 / "
-    "&modes count = 1 /",
+    "b": "&case name = 'case' / &ball mass = 2.4 / &drop / &model / &modes count = 1 /",
 }
 MINE = {"notes.txt": b"mine"}
 FIGURE = "force.png"
