@@ -20,10 +20,9 @@ module thud_sphere_modes
    public :: basis_type, family_type, get_displacements, get_families, get_family, get_modes, get_static_family
    public :: limit_family, new_basis
 
-   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. Closer to 1/2, rounding of the
-   !> energy of compression would exceed the other energies. The modes differ from those of incompressible material by about
-   !> this distance.
-   real(wp), parameter :: incompressible_distance = 1.0e-7_wp
+   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. The modes differ from those of
+   !> incompressible material by about this distance.
+   real(wp), parameter :: incompressible_distance = 1.0e-12_wp
 
    !> Minimum degree of the polynomials, and the part of the degree that resolves the ends of waves across the wall.
    integer, parameter :: min_degree = 10, end_degree = 4
@@ -295,25 +294,13 @@ contains
       type(family_type), intent(out) :: family
       !> Whether the eigenproblem could not be solved.
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), square(:), shape(:, :), work(:)
-      integer, allocatable :: iwork(:), unconverged(:)
-      integer :: n, n_mode, info, k
-      logical :: rigid
+      real(wp), allocatable :: coefficient(:, :)
+      integer :: k
 
       call get_static_family(basis, harmonic, family, failed)
+      if (.not. failed) call get_modes(basis, harmonic, highest_omega, family%omega, coefficient, failed)
       if (failed) return
-      call assemble(basis, harmonic, stiffness, mass, surface)
-      n = size(stiffness, 1)
-      allocate (square(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
-      call dsygvx(1, 'V', 'V', 'L', n, stiffness, n, mass, n, -highest_omega**2, highest_omega**2, 0, 0, 0.0_wp, n_mode, &
-         square, shape, n, work, size(work), iwork, unconverged, info)
-      failed = info /= 0
-      if (failed) return
-      ! The lowest mode of n = 1 is the rigid one.
-      rigid = harmonic == 1
-      k = merge(2, 1, rigid)
-      family%omega = sqrt(square(k:n_mode))
-      family%surface = matmul(surface, shape(:, k:n_mode))
+      family%surface = matmul(get_surface(basis, harmonic), coefficient)
       do k = 1, size(family%omega)
          family%flexibility = family%flexibility - outer(family%surface(:, k))/family%omega(k)**2
       end do
@@ -333,11 +320,11 @@ contains
       real(wp), allocatable, intent(out) :: coefficient(:, :)
       !> Whether the eigenproblem could not be solved.
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), momentum(:), inverse(:), shape(:, :), work(:)
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), momentum(:), inverse(:), shape(:, :), work(:)
       integer, allocatable :: iwork(:), unconverged(:)
       integer :: n, n_mode, info
 
-      call assemble(basis, harmonic, stiffness, mass, surface)
+      call assemble(basis, harmonic, stiffness, mass)
       if (harmonic == 1) then
          ! The rigid mode, U = 1 and W = 0, is the first function; the others keep their elastic part, without momentum.
          momentum = mass(2:, 1)/mass(1, 1)
@@ -352,9 +339,13 @@ contains
       if (failed) return
       omega = 1/sqrt(inverse(n_mode:1:-1))
       shape(:, :n_mode) = shape(:, n_mode:1:-1)*spread(omega, 1, n)
-      allocate (coefficient(size(surface, 2), n_mode))
-      if (harmonic == 1) coefficient(1, :) = -matmul(momentum, shape(:, :n_mode))
-      coefficient(size(coefficient, 1) - n + 1:, :) = shape(:, :n_mode)
+      if (harmonic == 1) then
+         allocate (coefficient(0:n, n_mode))
+         coefficient(0, :) = -matmul(momentum, shape(:, :n_mode))
+         coefficient(1:, :) = shape(:, :n_mode)
+      else
+         coefficient = shape(:, :n_mode)
+      end if
    end subroutine get_modes
 
    !> Flexibility of a harmonic, without its modes; for n = 1 without the rigid mode.
@@ -434,7 +425,7 @@ contains
       real(wp) :: raised
       integer :: n, info
 
-      call assemble(basis, harmonic, stiffness, mass, surface)
+      call assemble(basis, harmonic, stiffness, mass)
       n = size(stiffness, 1)
       raised = 0.0_wp
       if (harmonic == 1) then
@@ -443,6 +434,7 @@ contains
          raised = basis%shear_modulus/(basis%density*basis%outer_radius**2)
          stiffness = stiffness + raised*outer(momentum)
       end if
+      surface = get_surface(basis, harmonic)
       solution = transpose(surface)
       call dposv('L', n, 2, stiffness, n, solution, n, info)
       failed = info /= 0
@@ -450,16 +442,14 @@ contains
       if (harmonic == 1) flexibility = flexibility - outer(surface(:, 1))/(mass(1, 1)*raised)
    end subroutine get_low_flexibility
 
-   !> Stiffness, mass and surface displacements of one harmonic in the basis.
-   subroutine assemble(basis, harmonic, stiffness, mass, surface)
+   !> Stiffness and mass of one harmonic in the basis.
+   subroutine assemble(basis, harmonic, stiffness, mass)
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
       !> Stiffness matrix, N/m: [n, n].
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       !> Mass matrix, kg: [n, n].
       real(wp), allocatable, intent(out) :: mass(:, :)
-      !> U and V at the outer surface: [2, n].
-      real(wp), allocatable, intent(out) :: surface(:, :)
       real(wp) :: l, area
       integer, allocatable :: used(:)
       integer :: counts(2)
@@ -468,7 +458,7 @@ contains
       ! Integral of P_n^2 over the unit sphere.
       area = 4*pi/(2*harmonic + 1)
       if (harmonic == 0) then
-         call assemble_breathing(basis, stiffness, mass, surface)
+         call assemble_breathing(basis, stiffness, mass)
          return
       end if
       l = real(harmonic*(harmonic + 1), wp)
@@ -476,7 +466,6 @@ contains
       used = [(i, i=1, counts(1)), (size(basis%polynomial, 2) + i, i=1, counts(2))]
       stiffness = area*(basis%gram(used, used, 1) + l*basis%gram(used, used, 2) + basis%gram(used, used, 3)/l)
       mass = area*(basis%gram(used, used, 4) + basis%gram(used, used, 5)/l)
-      surface = reshape(get_displacements(basis, harmonic, [1.0_wp]), [2, size(used)])
    end subroutine assemble
 
    !> Numbers of polynomials of U and of W; W belongs to compression waves, which are longer. For n = 0 that of S alone.
@@ -492,6 +481,17 @@ contains
          counts(2) = get_degree(basis, harmonic, basis%compression_wavenumber) + 1
       end if
    end function get_counts
+
+   !> U and V of the functions of one harmonic at the outer surface: [2, n].
+   pure function get_surface(basis, harmonic) result(surface)
+      type(basis_type), intent(in) :: basis
+      integer, intent(in) :: harmonic
+      real(wp), allocatable :: surface(:, :)
+
+      associate (displacement => get_displacements(basis, harmonic, [1.0_wp]))
+         surface = displacement(:, 1, :)
+      end associate
+   end function get_surface
 
    !> U and V of the functions of one harmonic at positions in the wall.
    pure function get_displacements(basis, harmonic, position) result(displacement)
@@ -525,13 +525,11 @@ contains
       end associate
    end function get_displacements
 
-   !> Stiffness, mass and surface displacement of n = 0: U = S/r^2 with a polynomial S, which is constant if incompressible.
-   subroutine assemble_breathing(basis, stiffness, mass, surface)
+   !> Stiffness and mass of n = 0: U = S/r^2 with a polynomial S, which is constant if incompressible.
+   subroutine assemble_breathing(basis, stiffness, mass)
       type(basis_type), intent(in) :: basis
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       real(wp), allocatable, intent(out) :: mass(:, :)
-      !> U at the outer surface, V = 0: [2, n].
-      real(wp), allocatable, intent(out) :: surface(:, :)
       real(wp), allocatable :: u(:, :), u_slope(:, :), divergence(:, :), volume_change(:)
       real(wp) :: scale
       integer :: n, m, i
@@ -551,7 +549,6 @@ contains
       ! At the inner surface the polynomials are 1 or -1.
       volume_change = scale*[((-1.0_wp)**i, i=0, n - 1)]/basis%inner_radius**2*4*pi*basis%inner_radius**2
       stiffness = stiffness + basis%gas_stiffness*outer(volume_change)
-      surface = reshape(get_displacements(basis, 0, [1.0_wp]), [2, n])
    end subroutine assemble_breathing
 
    !> Vector times its transpose: [n, n].
