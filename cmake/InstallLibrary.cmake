@@ -18,7 +18,7 @@ configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/thudConfig.cmake.in" 
   INSTALL_DESTINATION "${package_directory}")
 write_basic_package_version_file(thudConfigVersion.cmake COMPATIBILITY SameMajorVersion)
 install(FILES "${CMAKE_CURRENT_BINARY_DIR}/thudConfig.cmake" "${CMAKE_CURRENT_BINARY_DIR}/thudConfigVersion.cmake"
-  "${PROJECT_SOURCE_DIR}/cmake/FindFFTW.cmake" "${PROJECT_SOURCE_DIR}/cmake/FindARPACK.cmake"
+  "${PROJECT_SOURCE_DIR}/cmake/FindFFTW.cmake"
   DESTINATION "${package_directory}")
 
 list(JOIN LAPACK_LIBRARIES " " lapack_libraries)

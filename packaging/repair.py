@@ -15,7 +15,6 @@ from pathlib import Path
 
 # Licences of the libraries that may be bundled, by the beginnings of their names.
 LICENCES = {
-    "libarpack": "BSD-3-Clause",
     "libblas": "BSD-3-Clause",
     "liblapack": "BSD-3-Clause",
     "libopenblas": "BSD-3-Clause",

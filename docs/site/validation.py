@@ -76,7 +76,7 @@ def table(oracles: list[dict[str, Any]]) -> str:
 
 @own_style()
 def draw_orders(curves: dict[str, Any]) -> Figure:
-    """Draw errors against steps and element sizes, with the fourth power."""
+    """Draw errors against steps, with the fourth power."""
     figure, axes = empty_axes(2.4)
     for i, (name, curve) in enumerate(curves.items()):
         x, y = np.array(curve["x"]), np.array(curve["y"])
@@ -88,7 +88,7 @@ def draw_orders(curves: dict[str, Any]) -> Figure:
     axes.set_xticks([1 / part for part in parts], ["1", *(f"1/{part}" for part in parts[1:])])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel("Step or element size over the first")
+    axes.set_xlabel("Step over the first")
     axes.set_ylabel("Relative error")
     legend_above(axes)
     return figure

@@ -42,8 +42,8 @@ contains
       call end_call()
    end subroutine ask
 
-   !> Answers a question while no other Python thread runs. For procedures with state in static memory, such as ARPACK and
-   !> functions that return texts of deferred length.
+   !> Answers a question while no other Python thread runs. For procedures with state in static memory, such as functions
+   !> that return texts of deferred length.
    subroutine ask_alone(question, header, text, values, n, status, handle, n_byte, n_value)
       !f2py integer, intent(hide), depend(values) :: n = len(values)
       !> All arguments are those of `ask`.

@@ -37,7 +37,7 @@ module thud_case
       logical :: has_floor = .false.
       !> The case asks for the level in the room below: it has the group `&room`.
       logical :: has_room = .false.
-      !> Number of free modes, and the mesh.
+      !> Number of free modes.
       type(modes_options_type) :: modes
       !> The case asks for a quasi-static compression: it has the group `&compression`.
       logical :: has_compression = .false.
@@ -134,7 +134,7 @@ contains
       number = findloc(floor_names == case%floor, .true., dim=1)
    end function get_floor_number
 
-   !> All keys of the input, in the order of the written file; keys with two owners occur twice.
+   !> All keys of the input, in the order of the written file.
    function get_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
@@ -226,7 +226,7 @@ contains
       if (.not. allocated(error)) call check_sampling(case%sampling, error)
       if (.not. allocated(error)) call check_name(case%name, error)
       if (allocated(error)) return
-      if (case%has_modes) call check_modes(case%ball, case%modes, error)
+      if (case%has_modes) call check_modes(case%ball, error)
       if (allocated(error) .or. .not. case%has_impact) return
       if (case%has_compression) call check_compression(case%compression, case%ball, error)
       if (case%has_unknowns .and. .not. allocated(error)) call check_unknowns(case%unknowns, get_source_fields(case), error)

@@ -65,7 +65,7 @@ module thud_warnings
    !> Rounding error of a coefficient of restitution.
    real(wp), parameter :: restitution_error = 1.0e-6_wp
 
-   !> Source model whose finite elements also give the free modes.
+   !> Source model whose modulus is that of the free modes that the paper published.
    character(len=*), parameter :: modes_model = 'finite_element'
 
 contains

@@ -1,5 +1,6 @@
 !> One run from end to end: case, source model, force history, levels, verdict, files.
 module thud_run
+   use thud_ball_files, only: estimate_snapshot_bytes, get_modes_csv, get_snapshots_csv
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
    use thud_compute, only: compute, is_conforming, results_type, scope_type
@@ -10,8 +11,6 @@ module thud_run
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_file_names, &
-      motion_file_names
    use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, &
       result_directory_type, write_file
@@ -140,7 +139,7 @@ contains
 
       if (.not. case%has_impact) return
       associate (model => case%models(get_model_number(case))%model)
-         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%ball, case%sampling))
+         wanted = estimate_snapshot_bytes(model%get_snapshot_shape(case%ball, case%sampling))
       end associate
       ! The drop on a mobile floor has snapshots, too.
       if (case%has_floor) wanted = 2*wanted
@@ -170,8 +169,8 @@ contains
       call get_case_text(case, text)
       call add_file(files, 'effective.nml', text)
       if (case%has_modes) then
-         call extend(files, size(modes_file_names))
-         call get_modes_files(results%modes, files(2:))
+         call get_modes_csv(results%modes, text)
+         call add_file(files, 'modes.csv', text)
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
       ! A case without an impact has free modes alone: neither floor nor room nor compression.
@@ -222,12 +221,13 @@ contains
       logical, intent(in) :: write_all
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(inout) :: files(:)
+      character(len=:), allocatable :: text
 
       if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//'model_histories.csv', &
          get_model_histories_csv(history))
       if (history%motion%n_frame == 0) return
-      call extend(files, size(motion_file_names))
-      call get_motion_files(history%motion, prefix, files(size(files) - size(motion_file_names) + 1:))
+      call get_snapshots_csv(history%motion, text)
+      call add_file(files, prefix//'snapshots.csv', text)
    end subroutine add_history_files
 
    !> Adds a file.

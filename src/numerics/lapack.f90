@@ -4,8 +4,8 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgbsv, dgeev, dgels, dgemm, dgemv, dgetf2, dgetrs, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr
-   public :: dsygv, dsygvd, dsygvx, dsyrk, dtrsm, dtrsv
+   public :: dgbsv, dgeev, dgels, dgemm, dgetf2, dgetrs, dposv, dpotrf, dstevr
+   public :: dsygv, dsygvd, dsygvx, dtrsm
 
    interface
       !> Eigenvalues of a general matrix.
@@ -76,16 +76,6 @@ module thud_lapack
          integer, intent(out) :: info
       end subroutine dpotrf
 
-      !> Solution with a triangular matrix.
-      pure subroutine dtrsv(uplo, trans, diag, n, a, lda, x, incx)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: uplo, trans, diag
-         integer, intent(in) :: n, lda, incx
-         real(wp), intent(in) :: a(lda, *)
-         real(wp), intent(inout) :: x(*)
-      end subroutine dtrsv
-
       !> Matrix times matrix.
       pure subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
          import :: wp
@@ -112,17 +102,6 @@ module thud_lapack
          real(wp), intent(inout) :: z(ldz, *)
       end subroutine dstevr
 
-      !> Matrix times vector.
-      pure subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: trans
-         integer, intent(in) :: m, n, lda, incx, incy
-         real(wp), intent(in) :: alpha, beta
-         real(wp), intent(in) :: a(lda, *), x(*)
-         real(wp), intent(inout) :: y(*)
-      end subroutine dgemv
-
       !> Least squares.
       pure subroutine dgels(trans, m, n, nrhs, a, lda, b, ldb, work, lwork, info)
          import :: wp
@@ -133,16 +112,6 @@ module thud_lapack
          real(wp), intent(out) :: work(*)
          integer, intent(out) :: info
       end subroutine dgels
-
-      !> Cholesky factor of a banded matrix.
-      pure subroutine dpbtrf(uplo, n, kd, ab, ldab, info)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: uplo
-         integer, intent(in) :: n, kd, ldab
-         real(wp), intent(inout) :: ab(ldab, *)
-         integer, intent(out) :: info
-      end subroutine dpbtrf
 
       !> Solution with a general banded matrix.
       pure subroutine dgbsv(n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
@@ -175,49 +144,6 @@ module thud_lapack
          real(wp), intent(inout) :: b(ldb, *)
          integer, intent(out) :: info
       end subroutine dgetrs
-
-      !> Cholesky factor of a small matrix.
-      pure subroutine dpotf2(uplo, n, a, lda, info)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: uplo
-         integer, intent(in) :: n, lda
-         real(wp), intent(inout) :: a(lda, *)
-         integer, intent(out) :: info
-      end subroutine dpotf2
-
-      !> Solution with the Cholesky factor of a banded matrix.
-      pure subroutine dpbtrs(uplo, n, kd, nrhs, ab, ldab, b, ldb, info)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: uplo
-         integer, intent(in) :: n, kd, nrhs, ldab, ldb
-         real(wp), intent(in) :: ab(ldab, *)
-         real(wp), intent(inout) :: b(ldb, *)
-         integer, intent(out) :: info
-      end subroutine dpbtrs
-
-      !> Symmetric banded matrix times vector.
-      pure subroutine dsbmv(uplo, n, k, alpha, a, lda, x, incx, beta, y, incy)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: uplo
-         integer, intent(in) :: n, k, lda, incx, incy
-         real(wp), intent(in) :: alpha, beta
-         real(wp), intent(in) :: a(lda, *), x(*)
-         real(wp), intent(inout) :: y(*)
-      end subroutine dsbmv
-
-      !> Matrix times its transpose.
-      pure subroutine dsyrk(uplo, trans, n, k, alpha, a, lda, beta, c, ldc)
-         import :: wp
-         implicit none (type, external)
-         character(len=1), intent(in) :: uplo, trans
-         integer, intent(in) :: n, k, lda, ldc
-         real(wp), intent(in) :: alpha, beta
-         real(wp), intent(in) :: a(lda, *)
-         real(wp), intent(inout) :: c(ldc, *)
-      end subroutine dsyrk
 
       !> Solutions with a triangular matrix.
       pure subroutine dtrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)

@@ -163,7 +163,7 @@ def main() -> int:
     print()
     bench_ensemble(scipy_drop)
     print()
-    bench_modes(row, medians)
+    bench_modes()
     print()
     bench_impact(row)
     print()

@@ -26,7 +26,7 @@ def results(impact: thud.Impact) -> list[Displayed]:
     many = thud.solve_many({"mass": [2.5, -1.0]})
     judged = impact.assess()
     record = recorded(impact)
-    modes = thud.free_modes(count=2, radial_elements=2, polar_elements=16)
+    modes = thud.free_modes(count=2)
     grid = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
     studies = [
         thud.design({"parameters": grid}),

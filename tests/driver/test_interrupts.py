@@ -48,7 +48,6 @@ WORK: dict[str, Callable[[], object]] = {
         thud.Case(model=thud.FiniteElement(**FINE)),
         threads=2,
     ),
-    "free modes": lambda: thud.free_modes(radial_elements=64, polar_elements=1024),
 }
 LONG = "&ball /\n&drop /\n&model name = 'finite_element' /\n&mesh {} /\n".format(
     " ".join(f"{key} = {value}" for key, value in FINE.items())
@@ -121,7 +120,7 @@ for work in (
     lambda: thud.solve(drop=thud.Drop(height=1000.0), model="modal_ball"),
     lambda: thud.solve_many({"height": [0.9, 1.0]}, thud.Case(model=thud.ModalBall()), threads=2),
     lambda: thud.solve_many({"height": np.linspace(0.9, 1.0, 40)}, threads=2),
-    lambda: thud.free_modes(radial_elements=2, polar_elements=32),
+    lambda: thud.free_modes(),
 ):
     try:
         work()

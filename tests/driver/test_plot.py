@@ -145,7 +145,7 @@ def test_floor_is_drawn_where_it_moves() -> None:
 
 
 def test_mode_shapes_are_named() -> None:
-    modes = thud.free_modes(count=4, **COARSE)
+    modes = thud.free_modes(count=4)
     figure = thud.plot.mode_shapes(modes)
     assert [axes.get_title() for axes in figure.axes][:4] == [
         f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
@@ -187,7 +187,7 @@ def test_number_of_panels_has_a_range(deformed: thud.Impact, count: int, allowed
 
 
 def test_case_has_the_figures_of_its_results(deformed: thud.Impact) -> None:
-    modes = thud.free_modes(count=2, **COARSE)
+    modes = thud.free_modes(count=2)
     assert set(thud.plot.case_figures(thud.solve())) == {"force", "levels"}
     figures = thud.plot.case_figures(deformed)
     assert set(figures) == {"force", "levels", "motion", "loss_factor"}

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     TwoInputs = dict[str, dict[str, bytes]]
 
-OTHER = "&ball mass = 2.4 / &drop / &model / &mesh polar_elements = 8 / &modes count = 1 /"
+OTHER = "&ball mass = 2.4 / &drop / &model / &modes count = 1 /"
 
 
 @pytest.fixture

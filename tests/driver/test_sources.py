@@ -35,7 +35,6 @@ def test_threads_share_no_lengths_of_texts() -> None:
         "screen.f90",
         "system.f90",
         "table.f90",
-        "xdmf.f90",
     }
 
 

@@ -139,11 +139,11 @@ def test_answer_outside_the_theory_raises_a_warning(words: str, case_file: CaseF
 
 def test_free_modes_with_the_modulus_of_the_shell_raise_a_warning() -> None:
     with pytest.warns(thud.PlausibilityWarning, match=naming("'finite_element'", "2.08 MPa")):
-        found = thud.free_modes(radial_elements=4, polar_elements=16)
+        found = thud.free_modes()
     assert len(found.warnings) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        thud.free_modes(thud.Ball.standard(), radial_elements=4, polar_elements=16)
+        thud.free_modes(thud.Ball.standard())
 
 
 @pytest.mark.usefixtures("working_directory")

@@ -36,7 +36,7 @@ unknown = thud.Unknowns(key=["friction"], low=[0.0], high=[0.5], reason=["not me
 standard = thud.Case(ball=thud.Ball.standard(), model=thud.FiniteElement(), unknowns=unknown)
 likely: thud.ModelVerdict = thud.assess(standard)
 ranges: list[thud.ModelCriterion] = [one for one in likely.criteria if one.range]
-modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_elements=16)
+modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count)
 press = thud.Compression(gas="isothermal")
 pressed: thud.CompressionCurve = thud.compress(ball, "modal_ball", points=5, gas=press.gas)
 modulus_fit: thud.CompressionFit = thud.fit_compression(

@@ -26,27 +26,6 @@ def test_shell_is_of_fourth_order(oracle: Callable[..., None], curve: Callable[.
     curve("order of accuracy", "shell, contact time", step / step[0], error)
 
 
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
-def test_free_modes_are_of_fourth_order(
-    oracle: Callable[..., None], curve: Callable[..., None]
-) -> None:
-    # The mode n = 5 of the paper's ball by the radial solution (docs/modal_ball.md), to which the
-    # first meshes come with less than the fourth order.
-    exact = 193.6955
-    size = 1 / np.array([4.0, 6.0, 8.0, 12.0])
-    error = np.array(
-        [
-            thud.free_modes(
-                thud.Ball(), 6, radial_elements=round(1 / s), polar_elements=round(8 / s)
-            ).frequency[5]
-            for s in size
-        ]
-    )
-    error = error / exact - 1
-    oracle("free modes: order of accuracy, less 4", "convergence", order(size, error) - 4, 0.5)
-    curve("order of accuracy", "free mode n = 5, frequency", size / size[0], error)
-
-
 def test_linear_source_on_a_resistance(oracle: Callable[..., None]) -> None:
     # F = k v0/w exp(-b t) sin w t with b = k/(2 Z), w**2 = k/M - b**2.
     stiffness, mass, resistance = 6e4, 2.5, 1600.0

@@ -215,17 +215,9 @@ class Modes(Group):
     ----------
     count : int
         Number of elastic free modes; 1 <= count <= 100.
-    radial_elements : int
-        Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
-        ``&mesh``.
-    polar_elements : int
-        Number of elements from pole to pole, from 8; 0: automatic; 0 <= polar_elements <= 1024;
-        group ``&mesh``.
     """
 
     count: int = 6
-    radial_elements: int = field(default=0, metadata={"group": "mesh"})
-    polar_elements: int = field(default=0, metadata={"group": "mesh"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -1272,8 +1264,6 @@ KEYS = (
     Key("", "ball", "ambient_pressure", "real", "Pa", "pressure of the air around the ball", (), 0.0, 100000000.0),
     Key("", "ball", "heat_capacity_ratio", "real", "", "ratio of specific heats of the enclosed gas", (), 1.0, 2.0),
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
-    Key("modes", "mesh", "radial_elements", "whole", "", "number of elements through the wall; 0: automatic", (), 0.0, 64.0, True),
-    Key("modes", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole, from 8; 0: automatic", (), 0.0, 1024.0, True),
     Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 1e-15, 10.0),
     Key("compression", "compression", "points", "whole", "", "number of points of the curve, including the undeformed ball", (), 2.0, 10000.0, True),
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),

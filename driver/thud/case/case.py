@@ -59,8 +59,6 @@ IMPACT_GROUPS: dict[str, type[Group]] = {
     "room": Room,
 }
 OPTIONAL_GROUPS: dict[str, type[Group]] = {"modes": Modes, **IMPACT_GROUPS}
-# Keys of the mesh, which is the same for free modes and finite elements.
-_MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
 
 def group_of(model: str, option: Field[Any]) -> str:
@@ -181,21 +179,13 @@ class Case(Group, Displayed):
             "ball": vars(self.ball),
         }
         if self.modes:
-            groups["modes"] = {"count": self.modes.count}
-            groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
+            groups["modes"] = vars(self.modes)
         if self.model:
             groups["model"] = {"name": self.model.name}
             groups |= {group: vars(getattr(self, group)) for group in GROUPS}
             for option in fields(self.model):
                 values = groups.setdefault(group_of(self.model.name, option), {})
-                value = getattr(self.model, option.name)
-                if self.modes and option.name in _MESH and values[option.name] != value:
-                    refuse(
-                        f"&mesh: {option.name} is {value} for the model and "
-                        f"{values[option.name]} for the modes",
-                        "the same mesh for both",
-                    )
-                values[option.name] = value
+                values[option.name] = getattr(self.model, option.name)
         if self.floor:
             groups["floor"] = {"name": self.floor.name}
             groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
@@ -229,7 +219,7 @@ class Case(Group, Displayed):
         room = optional.get("room")
         model = modes = None
         if "modes" in content:
-            modes = Modes(**content["modes"], **content.get("mesh", {}))
+            modes = Modes(**content["modes"])
         if "model" in content or not modes:
             name = content.get("model", {}).get("name")
             kind = type(default_model(room)) if name is None else MODELS[name]

@@ -30,9 +30,8 @@ MAX_INSTANTS = 30
 MAX_LINES, MAX_RINGS = 33, 5
 # Decimals of positions, mm.
 DECIMALS = 1
-# Free modes of the section of a modal ball, and elements of their mesh.
+# Free modes of the section of a modal ball.
 MODES = 12
-MESH = Modes(MODES, radial_elements=2, polar_elements=24)
 # Minimum amplitude of the lowest point of an excited mode, relative to its maximum.
 MIN_AMPLITUDE = 1e-6
 # Number of contact radii for which the forces on the modes are tabulated.
@@ -159,7 +158,7 @@ def _centers(position: Array) -> Array:
 @lru_cache(maxsize=8)
 def _modes(radius: float, wall: float, mass: float, modulus: float, ratio: float) -> FreeModes:
     # Without the warnings on free modes, which the page does not show.
-    case = Case(ball=Ball(radius, wall, mass, modulus, ratio), model=None, modes=MESH)
+    case = Case(ball=Ball(radius, wall, mass, modulus, ratio), model=None, modes=Modes(MODES))
     return new_modes(case.ball, ask("modes", case=case_text(case)))
 
 

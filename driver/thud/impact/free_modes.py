@@ -1,4 +1,4 @@
-"""Free modes of the ball by finite elements (paper, figure 4)."""
+"""Free modes of the ball (paper, figure 4)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,14 @@ from thud.base.bridge import ask, text
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
+from thud.base.files import replace_file
 from thud.base.key import check_keywords
 from thud.case.case import Case, case_text
+from thud.impact.mesh_files import require_ending, vtu_file
 
 if TYPE_CHECKING:
+    import os
+
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.bridge import Bundle
@@ -36,14 +40,12 @@ class FreeModes(Displayed):
     frequency : ndarray, shape (n_mode,)
         Natural frequencies of the elastic modes, Hz.
     harmonic : ndarray, shape (n_mode,)
-        Order of the Legendre polynomial that dominates at the outer surface.
+        Order of the Legendre polynomial.
     participation : ndarray, shape (n_mode,)
         Mass of the ball times the squared amplitude of the lowest point at unit modal mass, which
         states how strongly a force there excites the mode; 1 for the rigid motion.
-    rigid_frequency : float
-        Computed frequency of the rigid motion, Hz; the exact frequency is 0.
     start : ndarray, shape (n_line, n_ring, 2)
-        Positions of the nodes, nine per element, relative to the center of the ball, m.
+        Positions of the nodes relative to the center of the ball, m.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of the nodes; the maximum length is 1, and the lowest point moves upwards.
     warnings : tuple of str
@@ -54,7 +56,6 @@ class FreeModes(Displayed):
     frequency: NDArray[np.float64]
     harmonic: NDArray[np.int32]
     participation: NDArray[np.float64]
-    rigid_frequency: float
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
     warnings: tuple[str, ...] = ()
@@ -62,6 +63,25 @@ class FreeModes(Displayed):
     def __repr__(self) -> str:
         """Return the frequencies, without the shapes."""
         return f"<FreeModes: {', '.join(f'{f:.2f}' for f in self.frequency)} Hz>"
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the shapes for ParaView.
+
+        Parameters
+        ----------
+        path
+            Path of the file, which ends with ``.vtu``. An existing file is replaced.
+
+        Raises
+        ------
+        InputError
+            If the path does not end with ``.vtu``, or meshio is not installed.
+        OSError
+            If the file cannot be written.
+        """
+        names = (f"mode {i}, {f:.3f} Hz" for i, f in enumerate(self.frequency, 1))
+        shapes = dict(zip(names, self.shape, strict=True))
+        replace_file(require_ending(path, ".vtu"), vtu_file(self.start, shapes))
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -74,11 +94,8 @@ class FreeModes(Displayed):
 def free_modes(
     ball: Ball | None = None,
     count: int = Modes.count,
-    *,
-    radial_elements: int = Modes.radial_elements,
-    polar_elements: int = Modes.polar_elements,
 ) -> FreeModes:
-    """Compute the lowest free modes of a ball.
+    """Compute the lowest free modes of a ball: those of the hollow sphere, to ten digits.
 
     Parameters
     ----------
@@ -86,8 +103,6 @@ def free_modes(
         Ball, by default the rubber ball of the paper. Poisson's ratio may be 1/2.
     count
         Number of elastic modes.
-    radial_elements, polar_elements
-        Elements through the wall and from pole to pole.
 
     Returns
     -------
@@ -109,7 +124,7 @@ def free_modes(
     case = Case(
         ball=Ball() if ball is None else ball,
         model=None,
-        modes=Modes(count, radial_elements, polar_elements),
+        modes=Modes(count),
     )
     modes = new_modes(case.ball, ask("modes", case=case_text(case)))
     for warning in modes.warnings:
@@ -125,7 +140,6 @@ def new_modes(ball: Ball, answer: Bundle) -> FreeModes:
         modes["frequency"],
         modes["harmonic"].astype(np.int32),
         modes["participation"],
-        modes["rigid_frequency"],
         np.stack((modes["r"], modes["z"]), axis=-1),
         np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
         tuple(map(text, answer.get("warnings", {}).values())),

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from thud.base.files import replace_file
 from thud.base.immutable import Immutable
+from thud.impact.mesh_files import require_ending, vtu_file
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    import os
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +58,47 @@ class Motion(Immutable):
     def __repr__(self) -> str:
         """Return the size of the snapshots, without their arrays."""
         return f"<Motion: {len(self.time)} snapshots of {self.start[..., 0].size} nodes>"
+
+    def save(self, path: str | os.PathLike[str]) -> list[Path]:
+        """Write the snapshots for ParaView: a VTU file each, and their index; return the paths.
+
+        Parameters
+        ----------
+        path
+            Path of the index, which ends with ``.pvd``. The files of the snapshots are beside it:
+            those of ``ball.pvd`` are ``ball_0001.vtu`` and so on. Existing files are replaced.
+
+        Raises
+        ------
+        InputError
+            If the path does not end with ``.pvd``, or meshio is not installed.
+        OSError
+            If a file cannot be written.
+        """
+        index = require_ending(path, ".pvd")
+        files = [index.with_name(f"{index.stem}_{i:04d}.vtu") for i in range(1, len(self.time) + 1)]
+        for i, file in enumerate(files):
+            values = {
+                "displacement": self.position[i] - self.start,
+                "velocity": self.velocity[i],
+                "contact_pressure": self._on_ring(self.contact_pressure[i], -1),
+                "contact_shear": self._on_ring(self.contact_shear[i], -1),
+                "cavity_pressure": self._on_ring(self.cavity_pressure[i], 0),
+                "floor_displacement": np.full(self.start.shape[:2], self.floor_displacement[i]),
+            }
+            replace_file(file, vtu_file(self.position[i], values))
+        collection = ET.Element("VTKFile", type="Collection", version="0.1")
+        times = ET.SubElement(collection, "Collection")
+        for time, file in zip(self.time, files, strict=True):
+            ET.SubElement(times, "DataSet", timestep=repr(float(time)), file=file.name)
+        replace_file(index, ET.tostring(collection))
+        return [index, *files]
+
+    def _on_ring(self, values: ArrayLike, ring: int) -> NDArray[np.float64]:
+        """Return values at the nodes of one ring, and 0 at the others, shape (n_line, n_ring)."""
+        field = np.zeros(self.start.shape[:2])
+        field[:, ring] = values
+        return field
 
 
 def new_motion(**fields: NDArray[np.float64]) -> Motion:

@@ -7,7 +7,6 @@ import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from xml.etree import ElementTree as ET
 
 import f90nml.scanner
 import numpy as np
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 f90nml.scanner.print = lambda *_: None
 
 # Endings of the files that are read.
-_ENDINGS = (".nml", ".csv", ".xmf")
+_ENDINGS = (".nml", ".csv")
 # Columns of ``force.csv`` for fields of `Impact`; columns of components follow the first three.
 _COLUMNS = {
     "time": "time_s",
@@ -136,7 +135,7 @@ def _read_history(
         },
         "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
         "model_quantities": dict(model_quantities),
-        "motion": _read_motion(files, prefix) if f"{prefix}snapshots.xmf" in files else None,
+        "motion": _read_motion(files, prefix) if f"{prefix}snapshots.csv" in files else None,
         **{name: scalars[name] for name in IMPACT_QUANTITIES if not name.endswith("_error")},
         # The file has no unknown errors.
         **{
@@ -164,43 +163,21 @@ def _table(text: str) -> dict[str, NDArray[np.float64]]:
 
 
 def _read_motion(files: _Files, prefix: str) -> Motion:
-    """Return the snapshots of ``snapshots.xmf``."""
-    text = files[f"{prefix}snapshots.xmf"]
-    _, *grids = ET.fromstring(text).iter("Grid")  # noqa: S314 - expat limits entities
-    snapshots = [_read_grid(grid) for grid in grids]
-    # Node 0 is on the first ring; the second node of the first element starts the next ring.
-    stride = int(snapshots[0]["Topology"][0, 1])
-    size = (len(snapshots[0]["Geometry"]) // stride, stride)
-    plane = {
-        name: np.stack([grid[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for grid in snapshots])
-        for name in ("Geometry", "displacement", "velocity")
-    }
-    outer = {
-        name: np.stack([grid[name].reshape(size)[-1] for grid in snapshots])
-        for name in ("contact_pressure", "contact_shear")
-    }
-    first = {
-        name: np.array([grid[name].flat[0] for grid in snapshots])
-        for name in ("Time", "cavity_pressure", "floor_displacement")
-    }
+    """Return the snapshots of ``snapshots.csv``."""
+    columns = _table(files[f"{prefix}snapshots.csv"])
+    size = (-1, int(columns["ring"][-1]), int(columns["line"][-1]))
+    grids = {name: values.reshape(size).swapaxes(1, 2) for name, values in columns.items()}
+
+    def vectors(radial: str, upward: str) -> NDArray[np.float64]:
+        return np.stack((grids[radial], grids[upward]), axis=-1)
+
     return Motion(
-        first["Time"],
-        plane["Geometry"][0] - plane["displacement"][0],
-        plane["Geometry"],
-        plane["velocity"],
-        outer["contact_pressure"],
-        outer["contact_shear"],
-        first["cavity_pressure"],
-        first["floor_displacement"],
+        grids["time_s"][:, 0, 0],
+        vectors("start_radius_m", "start_height_m")[0],
+        vectors("radius_m", "height_m"),
+        vectors("radial_velocity_m_per_s", "upward_velocity_m_per_s"),
+        grids["contact_pressure_Pa"][..., -1],
+        grids["contact_shear_Pa"][..., -1],
+        grids["cavity_pressure_Pa"][:, 0, 0],
+        grids["floor_displacement_m"][:, 0, 0],
     )
-
-
-def _read_grid(grid: ET.Element) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of a grid by name."""
-    time, *elements = grid
-    arrays = {"Time": np.array(float(time.attrib["Value"]))}
-    for element in elements:
-        extents = [int(extent) for extent in element[0].attrib["Dimensions"].split()]
-        values = np.array((element[0].text or "").split(), dtype=np.float64)
-        arrays[element.attrib.get("Name", element.tag)] = values.reshape(extents)
-    return arrays

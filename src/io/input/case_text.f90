@@ -196,10 +196,7 @@ contains
                error = input_error('&'//group%name//': '//assignment%key//' in line '//to_text(assignment%line) &
                   //' has no value; allowed: '//allowed)
             else
-               ! A key with two owners sets the variables of both.
-               do j = 1, size(fields)
-                  if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(assignment%value, error)
-               end do
+               call fields(findloc(is_meant, .true., dim=1))%set_from_text(assignment%value, error)
             end if
          end associate
          if (allocated(error)) return
@@ -220,19 +217,6 @@ contains
       once = pack(texts, first)
    end function distinct
 
-   !> Removes repeated keys.
-   subroutine drop_repeated(fields)
-      !> The keys: [n_field].
-      type(field_type), allocatable, intent(inout) :: fields(:)
-      logical :: first(size(fields))
-      integer :: i
-
-      do i = 1, size(fields)
-         first(i) = .not. any(fields(:i - 1)%group == fields(i)%group .and. fields(:i - 1)%key == fields(i)%key)
-      end do
-      fields = pack(fields, first)
-   end subroutine drop_repeated
-
    !> The complete input as the text of a namelist file; reading it gives the same case.
    subroutine get_case_text(case, text)
       type(case_type), intent(in), target :: case
@@ -242,7 +226,6 @@ contains
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
-      call drop_repeated(fields)
       text = '! thud: the full input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
@@ -267,7 +250,6 @@ contains
       call new_case(case)
       case%name = 'my_case'
       allocate (fields, source=get_fields(case))
-      call drop_repeated(fields)
       allocate (active, source=get_active_fields(case))
       text = '! Every key of an input file with its default value. SI units.'//newline
       do i = 1, size(fields)

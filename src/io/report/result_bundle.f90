@@ -156,9 +156,8 @@ contains
       call bundle%add_array('modes.frequency', shape(modes%frequency), modes%frequency)
       call bundle%add_array('modes.harmonic', shape(modes%harmonic), real(modes%harmonic, wp))
       call bundle%add_array('modes.participation', shape(modes%participation), modes%participation)
-      call bundle%add_number('modes.rigid_frequency', modes%rigid_frequency)
-      call bundle%add_array('modes.r', shape(modes%mesh%r), modes%mesh%r)
-      call bundle%add_array('modes.z', shape(modes%mesh%z), modes%mesh%z)
+      call bundle%add_array('modes.r', shape(modes%r), modes%r)
+      call bundle%add_array('modes.z', shape(modes%z), modes%z)
       call bundle%add_array('modes.shape', shape(modes%shape), modes%shape)
    end subroutine add_modes
 

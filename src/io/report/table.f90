@@ -149,9 +149,7 @@ contains
       integer :: i
 
       text = '  free modes     frequency   harmonic   participation'//newline &
-         //'                       Hz                of the pole'//newline &
-         //'   rigid        '//flush_right(fixed(modes%rigid_frequency, 2), 9)//flush_right('1', 11) &
-         //flush_right('1.000', 16)//newline
+         //'                       Hz                of the pole'//newline
       do i = 1, size(modes%frequency)
          text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 2), 19) &
             //flush_right(to_text(modes%harmonic(i)), 11)//flush_right(fixed(modes%participation(i), 3), 16)//newline

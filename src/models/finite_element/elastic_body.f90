@@ -21,7 +21,7 @@ module thud_elastic_body
 
    !> The ball; arrays over nodes are [0:n_polar, 0:n_radial], components r and z last.
    type :: elastic_body_type
-      !> Mesh of order 1, undeformed, around the origin.
+      !> Mesh, undeformed, around the origin.
       type(mesh_type) :: mesh
       !> The elements of the mesh: [n_block].
       type(element_block_type), allocatable :: blocks(:)
@@ -54,7 +54,7 @@ contains
    !> The ball at rest.
    pure function new_elastic_body(ball, mesh, material) result(body)
       type(ball_type), intent(in) :: ball
-      !> Mesh of order 1.
+      !> The mesh.
       type(mesh_type), intent(in) :: mesh
       type(material_type), intent(in) :: material
       type(elastic_body_type) :: body

@@ -55,7 +55,7 @@ module thud_element_block
 
 contains
 
-   !> The elements of a mesh of order 1, ring after ring. Nodes 1 and 2 lie on the polar line nearer to the lowest point,
+   !> The elements of a mesh, ring after ring. Nodes 1 and 2 lie on the polar line nearer to the lowest point,
    !> 1 and 3 on the inner ring.
    pure function new_element_blocks(mesh) result(blocks)
       type(mesh_type), intent(in) :: mesh

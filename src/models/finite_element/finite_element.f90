@@ -175,7 +175,7 @@ contains
       force = 0.0_wp
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
-      pressed = new_pressed_ball(ball, new_mesh(ball, options%mesh, 1), material)
+      pressed = new_pressed_ball(ball, new_mesh(ball, options%mesh), material)
       do i = 1, size(deflection)
          call press(pressed, deflection(i), error)
          if (allocated(error)) return

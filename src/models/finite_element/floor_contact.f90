@@ -62,7 +62,7 @@ contains
    pure function new_floor_contact(options, ball, mesh) result(contact)
       type(contact_options_type), intent(in) :: options
       type(ball_type), intent(in) :: ball
-      !> Mesh of order 1, undeformed.
+      !> Mesh, undeformed.
       type(mesh_type), intent(in) :: mesh
       type(floor_contact_type) :: contact
       !> Work of the exact force-gap relation divided by maximum force and maximum gap: 1.5 B(1.5, 3.5).

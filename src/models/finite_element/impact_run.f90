@@ -81,7 +81,7 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
 
-      run%body = new_elastic_body(ball, new_mesh(ball, options%mesh, 1), material)
+      run%body = new_elastic_body(ball, new_mesh(ball, options%mesh), material)
       run%contact = new_floor_contact(options%contact, ball, run%body%mesh)
       run%floor = new_moving_floor(receiver)
       run%gravity = gravity

@@ -36,15 +36,13 @@ module thud_mesh
    end type mesh_options_type
 
    !> Nodes of quadrilaterals. Node (j, i) lies on polar line j, counted from the lowest point, and on ring i, counted from
-   !> the inner surface; an element of order p spans p intervals of each.
+   !> the inner surface.
    type :: mesh_type
-      !> Order of the elements: 1 (four nodes) or 2 (nine nodes).
-      integer :: order = 1
       !> Elements through the wall.
       integer :: n_radial = 0
       !> Elements from pole to pole.
       integer :: n_polar = 0
-      !> Distance from the axis, m: [0:order*n_polar, 0:order*n_radial].
+      !> Distance from the axis, m: [0:n_polar, 0:n_radial].
       real(wp), allocatable :: r(:, :)
       !> Height over the center, m: the same shape.
       real(wp), allocatable :: z(:, :)
@@ -88,39 +86,33 @@ contains
          *min(max_factor, sqrt(max(1.0_wp, typical_wall*ball%outer_radius/ball%wall_thickness))))
    end function get_element_counts
 
-   !> Mesh of the undeformed ball around the origin. Elements of order 1 are graded, for the contact; those of order 2,
-   !> for the free modes, are not.
-   pure function new_mesh(ball, options, order) result(mesh)
+   !> Mesh of the undeformed ball around the origin, graded for the contact.
+   pure function new_mesh(ball, options) result(mesh)
       type(ball_type), intent(in) :: ball
       !> Numbers of elements.
       type(mesh_options_type), intent(in) :: options
-      !> Order of the elements, 1 or 2.
-      integer, intent(in) :: order
       type(mesh_type) :: mesh
       real(wp) :: radius, angle, depth
-      integer :: i, j, n_ring, n_line
+      integer :: i, j
 
-      mesh%order = order
       associate (counts => get_element_counts(ball, options))
          mesh%n_radial = counts%radial_elements
          mesh%n_polar = counts%polar_elements
       end associate
-      n_ring = order*mesh%n_radial
-      n_line = order*mesh%n_polar
-      allocate (mesh%r(0:n_line, 0:n_ring), mesh%z(0:n_line, 0:n_ring))
-      do i = 0, n_ring
-         depth = real(n_ring - i, wp)/real(n_ring, wp)
+      allocate (mesh%r(0:mesh%n_polar, 0:mesh%n_radial), mesh%z(0:mesh%n_polar, 0:mesh%n_radial))
+      do i = 0, mesh%n_radial
+         depth = real(mesh%n_radial - i, wp)/real(mesh%n_radial, wp)
          radius = ball%outer_radius - ball%wall_thickness*depth
-         do j = 0, n_line
-            angle = pi*real(j, wp)/real(n_line, wp)
-            if (order == 1) angle = angle - (grading(1)*depth + grading(2)*(1 - depth))*sin(angle)
+         do j = 0, mesh%n_polar
+            angle = pi*real(j, wp)/real(mesh%n_polar, wp)
+            angle = angle - (grading(1)*depth + grading(2)*(1 - depth))*sin(angle)
             mesh%r(j, i) = radius*sin(angle)
             mesh%z(j, i) = -radius*cos(angle)
          end do
       end do
       ! The sine of pi is not quite zero.
       mesh%r(0, :) = 0.0_wp
-      mesh%r(n_line, :) = 0.0_wp
+      mesh%r(mesh%n_polar, :) = 0.0_wp
    end function new_mesh
 
 end module thud_mesh

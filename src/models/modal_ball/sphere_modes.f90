@@ -17,12 +17,12 @@ module thud_sphere_modes
    implicit none (type, external)
    private
 
-   public :: basis_type, family_type, get_families, get_family, get_static_family, limit_family, new_basis
+   public :: basis_type, family_type, get_displacements, get_families, get_family, get_modes, get_static_family
+   public :: limit_family, new_basis
 
-   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. Closer to 1/2, rounding of the
-   !> energy of compression would exceed the other energies. The modes differ from those of incompressible material by about
-   !> this distance.
-   real(wp), parameter :: incompressible_distance = 1.0e-7_wp
+   !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. The modes differ from those of
+   !> incompressible material by about this distance.
+   real(wp), parameter :: incompressible_distance = 1.0e-12_wp
 
    !> Minimum degree of the polynomials, and the part of the degree that resolves the ends of waves across the wall.
    integer, parameter :: min_degree = 10, end_degree = 4
@@ -52,8 +52,8 @@ module thud_sphere_modes
       real(wp), allocatable :: weight(:)
       !> Polynomials and two derivatives at the radii: [n_node, degree + 1, 3].
       real(wp), allocatable :: polynomial(:, :, :)
-      !> Polynomials and two derivatives at the outer and at the inner radius: [2, degree + 1, 3].
-      real(wp), allocatable :: at_end(:, :, :)
+      !> Degree beyond that which the contact needs.
+      integer :: extra_degree = 0
       !> Highest harmonic of the basis.
       integer :: highest_harmonic = 0
       !> Wavenumbers of shear and of compression waves at the highest frequency, 1/m.
@@ -78,7 +78,7 @@ module thud_sphere_modes
 contains
 
    !> Basis for all harmonics up to a highest one.
-   function new_basis(ball, highest_harmonic, with_gas, highest_omega) result(basis)
+   function new_basis(ball, highest_harmonic, with_gas, highest_omega, extra_degree) result(basis)
       type(ball_type), intent(in) :: ball
       !> Highest harmonic that will be used.
       integer, intent(in) :: highest_harmonic
@@ -86,6 +86,8 @@ contains
       logical, intent(in) :: with_gas
       !> Highest angular frequency of modes that will be used, rad/s (default: no modes).
       real(wp), intent(in), optional :: highest_omega
+      !> Degree beyond that which the contact needs (default: 0).
+      integer, intent(in), optional :: extra_degree
       type(basis_type) :: basis
       real(wp), allocatable :: node(:)
       integer :: degree, n, i
@@ -103,6 +105,7 @@ contains
          /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
 
       basis%highest_harmonic = highest_harmonic
+      if (present(extra_degree)) basis%extra_degree = extra_degree
       if (present(highest_omega)) then
          basis%shear_wavenumber = highest_omega*sqrt(basis%density/basis%shear_modulus)
          basis%compression_wavenumber = highest_omega*sqrt(basis%density/(basis%lame + 2*basis%shear_modulus))
@@ -113,15 +116,12 @@ contains
       call get_gauss_legendre(node, basis%weight)
       basis%radius = (basis%outer_radius + basis%inner_radius + ball%wall_thickness*node)/2
       basis%weight = basis%weight*ball%wall_thickness/2
-      allocate (basis%polynomial(size(node), n, 3), basis%at_end(2, n, 3))
+      allocate (basis%polynomial(size(node), n, 3))
       do i = 1, size(node)
          call get_legendre(node(i), basis%polynomial(i, :, 1), basis%polynomial(i, :, 2), basis%polynomial(i, :, 3))
       end do
-      call get_legendre(1.0_wp, basis%at_end(1, :, 1), basis%at_end(1, :, 2), basis%at_end(1, :, 3))
-      call get_legendre(-1.0_wp, basis%at_end(2, :, 1), basis%at_end(2, :, 2), basis%at_end(2, :, 3))
       do i = 2, 3
          basis%polynomial(:, :, i) = basis%polynomial(:, :, i)*(2/ball%wall_thickness)**(i - 1)
-         basis%at_end(:, :, i) = basis%at_end(:, :, i)*(2/ball%wall_thickness)**(i - 1)
       end do
 
       call set_gram(basis, n)
@@ -210,7 +210,7 @@ contains
             r = inner + (outer - inner)*i/n_radius
             oscillations = max(oscillations, (wavenumber**2 - harmonic*(harmonic + 1)/r**2)*(outer - r)*(r - inner))
          end do
-         degree = max(min_degree, end_degree + ceiling(sqrt(oscillations))) &
+         degree = basis%extra_degree + max(min_degree, end_degree + ceiling(sqrt(oscillations))) &
             + ceiling(2.4_wp*sqrt(harmonic*log(outer/inner)))
       end associate
    end function get_degree
@@ -294,29 +294,59 @@ contains
       type(family_type), intent(out) :: family
       !> Whether the eigenproblem could not be solved.
       logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), square(:), shape(:, :), work(:)
-      integer, allocatable :: iwork(:), unconverged(:)
-      integer :: n, n_mode, info, k
-      logical :: rigid
+      real(wp), allocatable :: coefficient(:, :)
+      integer :: k
 
       call get_static_family(basis, harmonic, family, failed)
+      if (.not. failed) call get_modes(basis, harmonic, highest_omega, family%omega, coefficient, failed)
       if (failed) return
-      call assemble(basis, harmonic, stiffness, mass, surface)
-      n = size(stiffness, 1)
-      allocate (square(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
-      call dsygvx(1, 'V', 'V', 'L', n, stiffness, n, mass, n, -highest_omega**2, highest_omega**2, 0, 0, 0.0_wp, n_mode, &
-         square, shape, n, work, size(work), iwork, unconverged, info)
-      failed = info /= 0
-      if (failed) return
-      ! The lowest mode of n = 1 is the rigid one.
-      rigid = harmonic == 1
-      k = merge(2, 1, rigid)
-      family%omega = sqrt(square(k:n_mode))
-      family%surface = matmul(surface, shape(:, k:n_mode))
+      family%surface = matmul(get_surface(basis, harmonic), coefficient)
       do k = 1, size(family%omega)
          family%flexibility = family%flexibility - outer(family%surface(:, k))/family%omega(k)**2
       end do
    end subroutine get_family
+
+   !> The elastic modes of one harmonic up to a frequency. The largest eigenvalues of mass over stiffness lose no digits to
+   !> the energies of compression and of thin walls, which are much larger than those of the lowest modes.
+   subroutine get_modes(basis, harmonic, highest_omega, omega, coefficient, failed)
+      type(basis_type), intent(in) :: basis
+      !> Harmonic n.
+      integer, intent(in) :: harmonic
+      !> Highest angular frequency to keep, rad/s.
+      real(wp), intent(in) :: highest_omega
+      !> Angular frequencies, ascending, rad/s: [n_mode].
+      real(wp), allocatable, intent(out) :: omega(:)
+      !> Coefficients of the functions for modes of unit modal mass, 1/sqrt(kg): [n, n_mode].
+      real(wp), allocatable, intent(out) :: coefficient(:, :)
+      !> Whether the eigenproblem could not be solved.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), momentum(:), inverse(:), shape(:, :), work(:)
+      integer, allocatable :: iwork(:), unconverged(:)
+      integer :: n, n_mode, info
+
+      call assemble(basis, harmonic, stiffness, mass)
+      if (harmonic == 1) then
+         ! The rigid mode, U = 1 and W = 0, is the first function; the others keep their elastic part, without momentum.
+         momentum = mass(2:, 1)/mass(1, 1)
+         mass = mass(2:, 2:) - mass(1, 1)*outer(momentum)
+         stiffness = stiffness(2:, 2:)
+      end if
+      n = size(stiffness, 1)
+      allocate (inverse(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
+      call dsygvx(1, 'V', 'V', 'L', n, mass, n, stiffness, n, 1/highest_omega**2, huge(1.0_wp), 0, 0, 0.0_wp, n_mode, &
+         inverse, shape, n, work, size(work), iwork, unconverged, info)
+      failed = info /= 0
+      if (failed) return
+      omega = 1/sqrt(inverse(n_mode:1:-1))
+      shape(:, :n_mode) = shape(:, n_mode:1:-1)*spread(omega, 1, n)
+      if (harmonic == 1) then
+         allocate (coefficient(0:n, n_mode))
+         coefficient(0, :) = -matmul(momentum, shape(:, :n_mode))
+         coefficient(1:, :) = shape(:, :n_mode)
+      else
+         coefficient = shape(:, :n_mode)
+      end if
+   end subroutine get_modes
 
    !> Flexibility of a harmonic, without its modes; for n = 1 without the rigid mode.
    subroutine get_static_family(basis, harmonic, family, failed)
@@ -395,7 +425,7 @@ contains
       real(wp) :: raised
       integer :: n, info
 
-      call assemble(basis, harmonic, stiffness, mass, surface)
+      call assemble(basis, harmonic, stiffness, mass)
       n = size(stiffness, 1)
       raised = 0.0_wp
       if (harmonic == 1) then
@@ -404,6 +434,7 @@ contains
          raised = basis%shear_modulus/(basis%density*basis%outer_radius**2)
          stiffness = stiffness + raised*outer(momentum)
       end if
+      surface = get_surface(basis, harmonic)
       solution = transpose(surface)
       call dposv('L', n, 2, stiffness, n, solution, n, info)
       failed = info /= 0
@@ -411,55 +442,99 @@ contains
       if (harmonic == 1) flexibility = flexibility - outer(surface(:, 1))/(mass(1, 1)*raised)
    end subroutine get_low_flexibility
 
-   !> Stiffness, mass and surface displacements of one harmonic in the basis.
-   subroutine assemble(basis, harmonic, stiffness, mass, surface)
+   !> Stiffness and mass of one harmonic in the basis.
+   subroutine assemble(basis, harmonic, stiffness, mass)
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
       !> Stiffness matrix, N/m: [n, n].
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       !> Mass matrix, kg: [n, n].
       real(wp), allocatable, intent(out) :: mass(:, :)
-      !> U and V at the outer surface: [2, n].
-      real(wp), allocatable, intent(out) :: surface(:, :)
       real(wp) :: l, area
       integer, allocatable :: used(:)
-      integer :: n, n_w, i
+      integer :: counts(2)
+      integer :: i
 
       ! Integral of P_n^2 over the unit sphere.
       area = 4*pi/(2*harmonic + 1)
       if (harmonic == 0) then
-         call assemble_breathing(basis, stiffness, mass, surface)
+         call assemble_breathing(basis, stiffness, mass)
          return
       end if
       l = real(harmonic*(harmonic + 1), wp)
-      n = get_degree(basis, harmonic, basis%shear_wavenumber) + 1
-      ! W belongs to compression waves, which are longer.
-      n_w = 0
-      if (.not. basis%incompressible) n_w = get_degree(basis, harmonic, basis%compression_wavenumber) + 1
-      used = [(i, i=1, n), (size(basis%polynomial, 2) + i, i=1, n_w)]
+      counts = get_counts(basis, harmonic)
+      used = [(i, i=1, counts(1)), (size(basis%polynomial, 2) + i, i=1, counts(2))]
       stiffness = area*(basis%gram(used, used, 1) + l*basis%gram(used, used, 2) + basis%gram(used, used, 3)/l)
       mass = area*(basis%gram(used, used, 4) + basis%gram(used, used, 5)/l)
-      allocate (surface(2, size(used)), source=0.0_wp)
-      associate (p => basis%at_end(1, :n, :))
-         surface(1, :n) = p(:, 1)
-         surface(2, :n) = (basis%outer_radius*p(:, 2) + 2*p(:, 1))/l
-         surface(2, n + 1:) = -p(:n_w, 1)/l
-      end associate
    end subroutine assemble
 
-   !> Stiffness, mass and surface displacement of n = 0: U = S/r^2 with a polynomial S, which is constant if incompressible.
-   subroutine assemble_breathing(basis, stiffness, mass, surface)
+   !> Numbers of polynomials of U and of W; W belongs to compression waves, which are longer. For n = 0 that of S alone.
+   pure function get_counts(basis, harmonic) result(counts)
+      type(basis_type), intent(in) :: basis
+      integer, intent(in) :: harmonic
+      integer :: counts(2)
+
+      counts = [get_degree(basis, harmonic, basis%shear_wavenumber) + 1, 0]
+      if (harmonic == 0) then
+         if (basis%incompressible) counts(1) = 1
+      else if (.not. basis%incompressible) then
+         counts(2) = get_degree(basis, harmonic, basis%compression_wavenumber) + 1
+      end if
+   end function get_counts
+
+   !> U and V of the functions of one harmonic at the outer surface: [2, n].
+   pure function get_surface(basis, harmonic) result(surface)
+      type(basis_type), intent(in) :: basis
+      integer, intent(in) :: harmonic
+      real(wp), allocatable :: surface(:, :)
+
+      associate (displacement => get_displacements(basis, harmonic, [1.0_wp]))
+         surface = displacement(:, 1, :)
+      end associate
+   end function get_surface
+
+   !> U and V of the functions of one harmonic at positions in the wall.
+   pure function get_displacements(basis, harmonic, position) result(displacement)
+      type(basis_type), intent(in) :: basis
+      integer, intent(in) :: harmonic
+      !> Positions from -1 at the inner to 1 at the outer surface: [n_position].
+      real(wp), intent(in) :: position(:)
+      !> U and V: [2, n_position, n].
+      real(wp), allocatable :: displacement(:, :, :)
+      real(wp) :: p(size(basis%polynomial, 2), 3)
+      real(wp) :: l, thickness, r
+      integer :: counts(2)
+      integer :: i
+
+      counts = get_counts(basis, harmonic)
+      l = real(harmonic*(harmonic + 1), wp)
+      thickness = basis%outer_radius - basis%inner_radius
+      allocate (displacement(2, size(position), sum(counts)), source=0.0_wp)
+      associate (u => displacement(1, :, :counts(1)), v => displacement(2, :, :))
+         do i = 1, size(position)
+            call get_legendre(position(i), p(:, 1), p(:, 2), p(:, 3))
+            r = basis%outer_radius - thickness*(1 - position(i))/2
+            if (harmonic == 0) then
+               u(i, :) = p(:counts(1), 1)*(basis%outer_radius/r)**2
+            else
+               u(i, :) = p(:counts(1), 1)
+               v(i, :counts(1)) = (r*(p(:counts(1), 2)*(2/thickness)) + 2*p(:counts(1), 1))/l
+               v(i, counts(1) + 1:) = -p(:counts(2), 1)/l
+            end if
+         end do
+      end associate
+   end function get_displacements
+
+   !> Stiffness and mass of n = 0: U = S/r^2 with a polynomial S, which is constant if incompressible.
+   subroutine assemble_breathing(basis, stiffness, mass)
       type(basis_type), intent(in) :: basis
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       real(wp), allocatable, intent(out) :: mass(:, :)
-      !> U at the outer surface, V = 0: [2, n].
-      real(wp), allocatable, intent(out) :: surface(:, :)
       real(wp), allocatable :: u(:, :), u_slope(:, :), divergence(:, :), volume_change(:)
       real(wp) :: scale
-      integer :: n, m
+      integer :: n, m, i
 
-      n = 1
-      if (.not. basis%incompressible) n = get_degree(basis, 0, basis%shear_wavenumber) + 1
+      n = sum(get_counts(basis, 0))
       m = size(basis%radius)
       allocate (u(m, n), u_slope(m, n), divergence(m, n), volume_change(n))
       scale = basis%outer_radius**2
@@ -471,10 +546,9 @@ contains
             + 2*matmul(transpose(u), weight*u)) + basis%lame*matmul(transpose(divergence), weight*divergence))
          mass = 4*pi*basis%density*matmul(transpose(r*u), weight*r*u)
       end associate
-      volume_change = scale*basis%at_end(2, :n, 1)/basis%inner_radius**2*4*pi*basis%inner_radius**2
+      ! At the inner surface the polynomials are 1 or -1.
+      volume_change = scale*[((-1.0_wp)**i, i=0, n - 1)]/basis%inner_radius**2*4*pi*basis%inner_radius**2
       stiffness = stiffness + basis%gas_stiffness*outer(volume_change)
-      allocate (surface(2, n), source=0.0_wp)
-      surface(1, :) = basis%at_end(1, :n, 1)
    end subroutine assemble_breathing
 
    !> Vector times its transpose: [n, n].
