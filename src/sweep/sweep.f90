@@ -5,7 +5,6 @@
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_batch_samples, only: fill_samples, suits_batch
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
    use thud_column, only: column_type
    use thud_compute, only: assess_floor, compute_impact, drop_on_floor, get_assessed_force, get_cost, impact_type, &
@@ -175,11 +174,9 @@ contains
          ! Failed samples are repeated one by one, for their error messages.
          remaining = pack(remaining, sweep%status /= 0)
       end if
-      call use_one_blas_thread()
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
       call solve_remaining()
       !$omp end parallel
-      call restore_blas_threads()
       call check_interrupt(error)
 
    contains

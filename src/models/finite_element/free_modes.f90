@@ -2,7 +2,6 @@
 module thud_free_modes
    use thud_arpack, only: dsaupd, dseupd
    use thud_ball, only: ball_type
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type
@@ -95,10 +94,8 @@ contains
       integer :: i
 
       modes%mesh = new_mesh(ball, mesh_options, 2)
-      call use_one_blas_thread()
       call new_mode_matrices(ball, modes%mesh, matrices, error)
       if (.not. allocated(error)) call find_eigenpairs(matrices, count + 1, eigenvalue, vector, error)
-      call restore_blas_threads()
       if (allocated(error)) return
       modes%rigid_frequency = sqrt(abs(eigenvalue(1)))/(2*pi)
       allocate (modes%frequency, source=sqrt(max(eigenvalue(2:), 0.0_wp))/(2*pi))
