@@ -6,6 +6,7 @@
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_answer, only: get_answer
+   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_bundle, only: bundle_type, retrieve, store
    use thud_error, only: error_type
    use thud_kinds, only: int64, int8, wp
@@ -36,9 +37,11 @@ contains
       type(error_type), allocatable :: error
 
       call begin_call()
+      call use_one_blas_thread()
       allocate (bundle)
       call get_answer(question, request_type(header, text, values), bundle, error)
       call store(bundle, error, status, handle, n_byte, n_value)
+      call restore_blas_threads()
       call end_call()
    end subroutine ask
 

@@ -4,9 +4,10 @@ module thud_floor_answers
    use thud_band, only: band_type, find_bands
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type, get_floor_number
-   use thud_compute, only: drop_on_floor
+   use thud_compute, only: drop_on_floor, prepare_floor
    use thud_constants, only: pi
-   use thud_error, only: error_type
+   use thud_error, only: error_type, input_error
+   use thud_floor_model, only: floor_state_type
    use thud_floor_modes, only: floor_modes_type
    use thud_floor_result, only: get_point_velocity
    use thud_force_history, only: force_history_type
@@ -39,18 +40,17 @@ contains
       type(bundle_type), intent(inout) :: bundle
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       type(receiver_type) :: receiver
       real(wp), allocatable :: point(:)
       complex(wp), allocatable :: mobility(:)
 
       allocate (point, source=request%get_array('point'))
-      associate (floor => case%floors(get_floor_number(case))%model)
-         if (size(point) == 2) then
-            call floor%get_transfer(point(1), point(2), receiver, error)
-         else
-            call floor%get_receiver(receiver, error)
-         end if
-      end associate
+      call prepare_floor(case, state, error)
+      if (allocated(error)) return
+      receiver = state%receiver
+      if (size(point) == 2) call case%floors(get_floor_number(case))%model%get_transfer(state, point(1), point(2), receiver, &
+         error)
       if (allocated(error)) return
       mobility = get_mobility(receiver, request%get_array('frequency'))
       call bundle%add_array('real', shape(mobility), real(mobility, wp))
@@ -65,22 +65,22 @@ contains
       !> Set if the band set is unknown, or a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
-      type(receiver_type) :: receiver
+      type(floor_state_type) :: state
       character(len=:), allocatable :: set
       real(wp), allocatable :: force(:), energy(:)
 
       call request%get_text('bands', set)
       call find_bands(set, bands, error)
-      if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
+      if (.not. allocated(error)) call prepare_floor(case, state, error)
       if (allocated(error)) return
       allocate (force, source=request%get_array('force'))
       allocate (energy(size(bands)))
-      call get_injected_energies(receiver, force, request%get_number('sample_rate'), bands, energy, error)
+      call get_injected_energies(state%receiver, force, request%get_number('sample_rate'), bands, energy, error)
       if (allocated(error)) return
       call bundle%add_array('frequency', shape(bands), bands%nominal)
       call bundle%add_array('energy', shape(bands), energy)
-      call bundle%add_array('conductance', shape(bands), get_mean_conductances(receiver, bands))
-      call bundle%add_number('total', get_total_energy(receiver, force, request%get_number('sample_rate')))
+      call bundle%add_array('conductance', shape(bands), get_mean_conductances(state%receiver, bands))
+      call bundle%add_number('total', get_total_energy(state%receiver, force, request%get_number('sample_rate')))
    end subroutine answer_floor_energy
 
    !> Velocity, m/s, of the point `point`, m, of a case's floor under the record `force`, N, at `sample_rate`, Hz.
@@ -90,14 +90,15 @@ contains
       type(bundle_type), intent(inout) :: bundle
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       real(wp), allocatable :: force(:), velocity(:), point(:)
 
       allocate (force, source=request%get_array('force'))
       allocate (point, source=request%get_array('point'))
       allocate (velocity, mold=force)
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call get_point_velocity(floor, force, request%get_number('sample_rate'), point(1), point(2), velocity, error)
-      end associate
+      call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call get_point_velocity(case%floors(get_floor_number(case))%model, state, force, &
+         request%get_number('sample_rate'), point(1), point(2), velocity, error)
       if (.not. allocated(error)) call bundle%add_array('velocity', shape(velocity), velocity)
    end subroutine answer_point_velocity
 
@@ -106,9 +107,11 @@ contains
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       type(force_history_type), allocatable :: on_floor
 
-      call drop_on_floor(case, on_floor, error)
+      call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call drop_on_floor(case, state, on_floor, error)
       if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
    end subroutine answer_floor_impact
 
@@ -119,10 +122,13 @@ contains
       type(bundle_type), intent(inout) :: bundle
       !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       type(room_level_type) :: prediction
 
-      call predict_room(case, request%get_array('force'), request%get_number('sample_rate'), .true., prediction, error)
-      if (.not. allocated(error)) call add_room_level(bundle, case, prediction)
+      call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call predict_room(case, state, request%get_array('force'), request%get_number('sample_rate'), &
+         .true., prediction, error)
+      if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
    end subroutine answer_room_level
 
    !> Sound in the modal room below for each of the positions `ball` and `microphone`, m from the corner of the room, from
@@ -210,6 +216,7 @@ contains
       type(bundle_type), intent(inout) :: bundle
       !> Set if the floor has no modes.
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       type(floor_modes_type) :: modes
       type(plate_type) :: plate
       real(wp), allocatable :: shapes(:, :)
@@ -218,10 +225,11 @@ contains
 
       associate (floor => case%floors(get_floor_number(case))%model)
          ! Without shapes, all modes; for shapes, no more than needed, because a large floor has many.
-         if (size(request%get_array('x')) == 0) then
-            call floor%get_room_modes(floor%get_support(), plate, modes, error)
+         if (size(request%get_array('x')) == 0 .or. floor%get_support() == '') then
+            call prepare_floor(case, state, error)
+            if (.not. allocated(error)) call floor%get_radiating_modes(state, plate, modes, error)
          else
-            call floor%get_room_modes(floor%get_support(), plate, modes, error, 2*request%get_number('highest'))
+            call floor%get_room_modes(state, floor%get_support(), plate, modes, error, 2*request%get_number('highest'))
          end if
       end associate
       if (allocated(error)) return
@@ -248,6 +256,7 @@ contains
       type(box_type), intent(out) :: box
       !> Set if the floor has no modes or cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: conductance(:)
 
@@ -255,11 +264,16 @@ contains
       if (allocated(error)) return
       allocate (conductance(size(bands)))
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(bands%center, plate, conductance, error)
+         call prepare_floor(case, state, error)
+         if (.not. allocated(error)) call floor%get_radiator(state, bands%center, plate, conductance, error)
          if (.not. allocated(error)) call check_below(plate, case%room, error)
          if (allocated(error)) return
          box = get_box(case%room, plate, bands)
-         call floor%get_room_modes(floor%get_support(), plate, modes, error)
+         if (.not. allocated(state%modes%omega)) error = input_error('&floor: name: this floor has no modes; allowed: a ' &
+            //'rectangular floor')
+         if (allocated(error)) return
+         plate = state%plate
+         modes = state%modes
       end associate
    end subroutine get_modes_and_box
 
@@ -270,14 +284,15 @@ contains
       type(bundle_type), intent(inout) :: bundle
       !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
       type(plate_type) :: plate
       real(wp), allocatable :: frequency(:), conductance(:)
 
       allocate (frequency, source=request%get_array('frequency'))
       allocate (conductance, mold=frequency)
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(frequency, plate, conductance, error)
-      end associate
+      call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_radiator(state, frequency, plate, &
+         conductance, error)
       if (allocated(error)) return
       associate (air => case%room%air)
          call bundle%add_number('surface_mass', get_surface_mass(plate))

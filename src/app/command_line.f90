@@ -1,5 +1,6 @@
 !> The command line of the executable.
 module thud_command_line
+   use thud_blas_threads, only: use_one_blas_thread
    use thud_case, only: case_type
    use thud_case_text, only: describe_keys
    use thud_compute, only: results_type
@@ -78,6 +79,7 @@ contains
 
       exit_code = 0
       call prepare_process()
+      call use_one_blas_thread()
       call parse_arguments(request, error)
       if (allocated(error)) then
          call print_message(error%message//newline//'Usage: '//usage, red, exit_code)

@@ -242,9 +242,6 @@ contains
    subroutine check_floor(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      type(band_type), allocatable :: bands(:)
-      type(plate_type) :: plate
-      real(wp), allocatable :: conductance(:)
       integer :: i
 
       associate (floor => case%floors(get_floor_number(case))%model)
@@ -257,9 +254,7 @@ contains
                i=1, size(floor_names))])))
             return
          end if
-         call get_room_bands(bands, error)
-         allocate (conductance(size(bands)))
-         call floor%get_radiator(bands%center, plate, conductance, error)
+         call floor%check_radiator(error)
          if (.not. allocated(error) .and. floor%has_subceiling()) call check_below_subceiling(case%room, error)
       end associate
    end subroutine check_floor

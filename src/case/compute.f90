@@ -7,6 +7,7 @@ module thud_compute
    use thud_case, only: case_type, check_case, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
+   use thud_floor_model, only: floor_state_type
    use thud_floor_result, only: floor_result_type, get_floor_result
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
@@ -15,7 +16,7 @@ module thud_compute
    use thud_memory, only: require_memory
    use thud_plate, only: plate_type
    use thud_progress, only: let_first_thread_report
-   use thud_receiver, only: is_rigid, receiver_type
+   use thud_receiver, only: is_rigid
    use thud_resolved_drop, only: get_drop_cost, solve_drop
    use thud_room, only: room_level_type
    use thud_room_prediction, only: predict_room
@@ -28,7 +29,7 @@ module thud_compute
    private
 
    public :: assess_floor, assessment_type, compress_case, compute, compute_impact, drop_on_floor, get_assessed_force
-   public :: get_cost, impact_type, is_conforming, results_type, scope_type
+   public :: get_cost, impact_type, is_conforming, prepare_floor, results_type, scope_type
 
    !> Memory per sample of a record, including transforms and text, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
@@ -70,6 +71,8 @@ module thud_compute
    type :: results_type
       !> The drop on a rigid floor.
       type(impact_type) :: impact
+      !> The floor, prepared if the case has one.
+      type(floor_state_type) :: state
       !> The drop on a mobile floor, if the model couples with it.
       type(force_history_type), allocatable :: on_floor
       !> Levels and energies of the drop on the mobile floor.
@@ -98,11 +101,12 @@ contains
       if (case%has_modes .and. .not. allocated(error)) call get_free_modes(case%ball, case%modes%count, results%modes, &
          error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
-      if (case%has_impact .and. .not. allocated(error)) call compute_drops(case, scope, results%impact, &
+      if (case%has_impact .and. .not. allocated(error)) call compute_drops(case, scope, results%state, results%impact, &
          results%on_floor, error)
-      if (case%has_impact .and. .not. allocated(error)) call assess_floor(case, scope, results%impact, results%on_floor, &
-         results%floor, results%room, error)
-      if (.not. allocated(error)) call get_warnings(case, results%impact%history, results%warning, results%on_floor)
+      if (case%has_impact .and. .not. allocated(error)) call assess_floor(case, scope, results%state, results%impact, &
+         results%on_floor, results%floor, results%room, error)
+      if (.not. allocated(error)) call get_warnings(case, results%state, results%impact%history, results%warning, &
+         results%on_floor)
       if (case%has_impact .and. case%has_room .and. scope%room .and. scope%levels .and. .not. allocated(error)) then
          associate (criteria => results%impact%assessment%criteria(:, findloc(force_names == 'floor', .true., dim=1)))
             results%room%source_conforms = all(conforms(criteria(:octave_count)))
@@ -127,10 +131,12 @@ contains
    end subroutine compute_impact
 
    !> The drops of a case on a rigid floor and on its own, at the same time if two threads are allowed and worthwhile.
-   subroutine compute_drops(case, scope, impact, on_floor, error)
+   subroutine compute_drops(case, scope, state, impact, on_floor, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
+      !> Its floor, prepared if it has one.
+      type(floor_state_type), intent(out) :: state
       type(impact_type), intent(out) :: impact
       !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
       type(force_history_type), allocatable, intent(out) :: on_floor
@@ -146,14 +152,16 @@ contains
       end associate
       if (n_thread == 1) then
          call compute_impact(case, scope, impact, error)
-         if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, on_floor, error)
+         if (.not. allocated(error)) call prepare_floor(case, state, error)
+         if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, state, on_floor, error)
          return
       end if
       call let_first_thread_report(.true.)
       !$omp parallel do num_threads(n_thread) schedule(static, 1)
       do i = 1, 2
          if (i == 1) call compute_impact(case, scope, impact, error)
-         if (i == 2) call drop_on_floor(case, on_floor, floor_error)
+         if (i == 2) call prepare_floor(case, state, floor_error)
+         if (i == 2 .and. .not. allocated(floor_error)) call drop_on_floor(case, state, on_floor, floor_error)
       end do
       !$omp end parallel do
       call let_first_thread_report(.false.)
@@ -161,10 +169,12 @@ contains
    end subroutine compute_drops
 
    !> Levels and energies of the drop on the floor and the level in the room below, if the case asks for them.
-   subroutine assess_floor(case, scope, impact, on_floor, floor, room, error)
+   subroutine assess_floor(case, scope, state, impact, on_floor, floor, room, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
       type(scope_type), intent(in) :: scope
+      !> Its floor, prepared if it has one.
+      type(floor_state_type), intent(in) :: state
       !> The drop on a rigid floor.
       type(impact_type), intent(in) :: impact
       !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
@@ -173,30 +183,38 @@ contains
       type(room_level_type), intent(out) :: room
       type(error_type), allocatable, intent(out) :: error
 
-      if (allocated(on_floor) .and. scope%levels) call get_floor_result(case, on_floor, scope%energies, floor, error)
+      if (allocated(on_floor) .and. scope%levels) call get_floor_result(case, state, on_floor, scope%energies, floor, error)
       if (allocated(error) .or. .not. (case%has_room .and. scope%room)) return
       if (allocated(on_floor)) then
-         call predict_room(case, on_floor%floor_force, on_floor%sample_rate, scope%modal_room, room, error)
+         call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, scope%modal_room, room, error)
       else
-         call predict_room(case, impact%history%floor_force, impact%history%sample_rate, scope%modal_room, room, error)
+         call predict_room(case, state, impact%history%floor_force, impact%history%sample_rate, scope%modal_room, room, error)
       end if
    end subroutine assess_floor
 
-   !> The drop of a case on its floor.
-   subroutine drop_on_floor(case, on_floor, error)
+   !> Computes once what is handed on of the floor of a case.
+   subroutine prepare_floor(case, state, error)
       type(case_type), intent(in) :: case
+      !> The floor, prepared if the case has one.
+      type(floor_state_type), intent(out) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%has_floor) call case%floors(get_floor_number(case))%model%prepare(state, error)
+   end subroutine prepare_floor
+
+   !> The drop of a case on its floor.
+   subroutine drop_on_floor(case, state, on_floor, error)
+      type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> The drop on the floor; not allocated if the floor is rigid or the model does not couple with it.
       type(force_history_type), allocatable, intent(out) :: on_floor
       type(error_type), allocatable, intent(out) :: error
-      type(receiver_type) :: receiver
 
-      associate (model => case%models(get_model_number(case))%model, floor => case%floors(get_floor_number(case))%model)
-         if (.not. model%couples()) return
-         call floor%get_receiver(receiver, error)
-         if (allocated(error)) return
-         if (is_rigid(receiver)) return
+      associate (model => case%models(get_model_number(case))%model)
+         if (.not. model%couples() .or. is_rigid(state%receiver)) return
          allocate (on_floor)
-         call solve_drop(model, case%ball, case%drop, case%sampling, on_floor, error, receiver)
+         call solve_drop(model, case%ball, case%drop, case%sampling, on_floor, error, state%receiver)
       end associate
       ! `couples` is true by default: a model that ignores the receiver has computed the drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
@@ -208,7 +226,7 @@ contains
       !> The time, s; for an invalid case the time of its check.
       real(wp) :: cost
       type(error_type), allocatable :: error
-      type(receiver_type) :: receiver
+      type(floor_state_type) :: state
 
       cost = 1.0e-3_wp
       call check_case(case, error)
@@ -216,9 +234,9 @@ contains
       associate (model => case%models(get_model_number(case))%model)
          cost = cost + get_drop_cost(model, case%ball, case%drop, case%sampling)
          if (.not. (case%has_floor .and. model%couples())) return
-         call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
-         if (allocated(error) .or. is_rigid(receiver)) return
-         cost = cost + 1.0e-3_wp + get_drop_cost(model, case%ball, case%drop, case%sampling, receiver)
+         call prepare_floor(case, state, error)
+         if (allocated(error) .or. is_rigid(state%receiver)) return
+         cost = cost + 1.0e-3_wp + get_drop_cost(model, case%ball, case%drop, case%sampling, state%receiver)
       end associate
    end function get_cost
 

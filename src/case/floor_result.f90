@@ -3,7 +3,7 @@ module thud_floor_result
    use thud_band, only: band_type, get_level_bands
    use thud_case, only: case_type, get_floor_number
    use thud_error, only: error_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, floor_state_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
@@ -34,8 +34,10 @@ module thud_floor_result
 contains
 
    !> Results on the floor of a case.
-   subroutine get_floor_result(case, contact, energies, floor_result, error)
+   subroutine get_floor_result(case, state, contact, energies, floor_result, error)
       type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> The drop on the floor.
       type(force_history_type), intent(in) :: contact
       !> Also compute energies and velocities of points.
@@ -43,7 +45,6 @@ contains
       type(floor_result_type), intent(out) :: floor_result
       !> Set if a level cannot be computed, or a point is not on the floor.
       type(error_type), allocatable, intent(out) :: error
-      type(receiver_type) :: receiver
       integer :: first, n, i
 
       call get_level_bands(case%bands, floor_result%bands, first)
@@ -53,9 +54,7 @@ contains
       call get_force_exposure_levels(contact%floor_force, contact%sample_rate, floor_result%bands, trim(case%level_method), &
          floor_result%contact_level, error)
       if (allocated(error) .or. .not. energies) return
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_receiver(receiver, error)
-         if (allocated(error)) return
+      associate (floor => case%floors(get_floor_number(case))%model, receiver => state%receiver)
          call get_injected_energies(receiver, contact%floor_force, contact%sample_rate, floor_result%bands, &
             floor_result%energy, error)
          if (allocated(error)) return
@@ -63,7 +62,7 @@ contains
          floor_result%conductance = get_mean_conductances(receiver, floor_result%bands)
          allocate (floor_result%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count
-            call get_point_velocity(floor, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
+            call get_point_velocity(floor, state, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
                floor%point_y%values(i), floor_result%point_velocity(:, i), error)
             if (allocated(error)) return
          end do
@@ -71,8 +70,10 @@ contains
    end subroutine get_floor_result
 
    !> Velocity of a point of a floor.
-   subroutine get_point_velocity(floor, force, sample_rate, x, y, velocity, error)
+   subroutine get_point_velocity(floor, state, force, sample_rate, x, y, velocity, error)
       class(floor_model_type), intent(in) :: floor
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> The contact force, N: [n_sample].
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
@@ -89,7 +90,7 @@ contains
       integer :: i
 
       velocity = 0.0_wp
-      call floor%get_transfer(x, y, transfer, error)
+      call floor%get_transfer(state, x, y, transfer, error)
       if (allocated(error)) return
       motion = new_receiver_motion(transfer)
       step = new_receiver_step(transfer, 1/sample_rate)

@@ -2,11 +2,10 @@
 !> interval of the rating.
 module thud_room_prediction
    use thud_band, only: band_type, octave_count
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_case, only: case_type, get_floor_number
    use thud_constants, only: pi
    use thud_error, only: error_type
-   use thud_floor_model, only: floor_model_type, uncoupled_support
+   use thud_floor_model, only: floor_model_type, floor_state_type, uncoupled_support
    use thud_floor_modes, only: floor_modes_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
@@ -40,9 +39,11 @@ module thud_room_prediction
 contains
 
    !> Level in the room below, from a force history.
-   subroutine predict_room(case, force, sample_rate, with_modes, prediction, error)
+   subroutine predict_room(case, state, force, sample_rate, with_modes, prediction, error)
       !> The case, with floor and room.
       type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Force on the floor, N: [n_sample].
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
@@ -51,20 +52,6 @@ contains
       logical, intent(in) :: with_modes
       type(room_level_type), intent(out) :: prediction
       !> Set if a level cannot be computed, or the floor cannot radiate into the room.
-      type(error_type), allocatable, intent(out) :: error
-
-      call use_one_blas_thread()
-      call predict(case, force, sample_rate, with_modes, prediction, error)
-      call restore_blas_threads()
-   end subroutine predict_room
-
-   !> As `predict_room`, with the threads of BLAS as they are.
-   subroutine predict(case, force, sample_rate, with_modes, prediction, error)
-      type(case_type), intent(in) :: case
-      real(wp), intent(in) :: force(:)
-      real(wp), intent(in) :: sample_rate
-      logical, intent(in) :: with_modes
-      type(room_level_type), intent(out) :: prediction
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(floor_modes_type) :: modes
@@ -80,11 +67,11 @@ contains
       if (allocated(error)) return
       associate (floor => case%floors(get_floor_number(case))%model)
          level = level - floor%get_improvement(size(bands))
-         call floor%get_radiator(bands%center, plate, conductance, error)
+         call floor%get_radiator(state, bands%center, plate, conductance, error)
          if (.not. allocated(error)) call check_below(plate, case%room, error)
-         if (.not. allocated(error)) call floor%get_radiating_modes(plate, modes, error)
+         if (.not. allocated(error)) call floor%get_radiating_modes(state, plate, modes, error)
          if (allocated(error)) return
-         call get_radiation(case%room, floor, plate, modes, bands, radiation, error)
+         call get_radiation(case%room, floor, state, plate, modes, bands, radiation, error)
          if (allocated(error)) return
          if (case%room%radiation /= modal_radiation) then
             radiation%radiation_factor = get_plate_radiation(plate, case%room%air, bands%center)
@@ -94,19 +81,21 @@ contains
          call get_room_level(plate, radiation, case%room, bands, level, prediction)
          if (.not. with_modes) return
          call get_room_level(plate, radiation, get_bare_room(case%room), bands, level, bare)
-         call add_modal_levels(case%room, floor, plate, modes, force, sample_rate, &
+         call add_modal_levels(case%room, floor, state, plate, modes, force, sample_rate, &
             prediction%level - bare%level - floor%get_improvement(size(bands)), prediction, error)
          if (.not. allocated(error)) call add_contributions(case, plate, radiation, level, prediction)
       end associate
-   end subroutine predict
+   end subroutine predict_room
 
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
    !> that of the simply supported floor without further supports, its floating plate simply supported, too: its waves are so
    !> short that these matter little. The middle of the floor represents it if not all of it is resolved. The power through
    !> bridges is that of infinite plates there.
-   subroutine get_radiation(room, floor, plate, modes, bands, radiation, error)
+   subroutine get_radiation(room, floor, state, plate, modes, bands, radiation, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       type(plate_type), intent(in) :: plate
       !> Modes of the floor as it is supported.
       type(floor_modes_type), intent(in) :: modes
@@ -125,7 +114,7 @@ contains
       area = get_area(room, plate)
       call get_modal_radiation(modes, plate, room%air, bands(:n), area, radiation)
       if (n == size(bands)) return
-      call floor%get_room_modes(uncoupled_support, simple_plate, simple_modes, error)
+      call floor%get_room_modes(state, uncoupled_support, simple_plate, simple_modes, error)
       if (allocated(error)) return
       ! Of a floor whose middle represents it, as much of the middle as the room covers; losses keep energy near the strike.
       associate (stack => simple_modes%stack)
@@ -178,9 +167,11 @@ contains
 
    !> Levels by the modes of floor and room: as the floor is supported, simply supported and clamped. Walls and a ceiling
    !> change them as much as the statistical levels.
-   subroutine add_modal_levels(room, floor, plate, modes, force, sample_rate, change, prediction, error)
+   subroutine add_modal_levels(room, floor, state, plate, modes, force, sample_rate, change, prediction, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       type(plate_type), intent(in) :: plate
       !> Modes of the floor as it is supported.
       type(floor_modes_type), intent(in) :: modes
@@ -217,7 +208,7 @@ contains
       if (prediction%n_modal == 0 .or. floor%get_support() == '') return
       do i = 1, 2
          if (floor%get_support() == supports(i)) cycle
-         call floor%get_room_modes(supports(i), other_plate, other_modes, error, get_highest_frequency(box))
+         call floor%get_room_modes(state, supports(i), other_plate, other_modes, error, get_highest_frequency(box))
          if (allocated(error)) return
          call get_modal_room(other_modes, box, force, sample_rate, ball, microphone, .false., .false., modal)
          prediction%edge_level(:modal%n_band, i) = modal%mean + change(:modal%n_band)

@@ -5,7 +5,7 @@ module thud_warnings
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type, get_floor_number, get_model_number
    use thud_error, only: error_type
-   use thud_floor_model, only: reason_length
+   use thud_floor_model, only: floor_state_type, reason_length
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -71,9 +71,11 @@ module thud_warnings
 contains
 
    !> Warnings on a case and its force.
-   subroutine get_warnings(case, history, warnings, on_floor)
+   subroutine get_warnings(case, state, history, warnings, on_floor)
       !> The case, checked.
       type(case_type), intent(in) :: case
+      !> Its floor, prepared if it has one.
+      type(floor_state_type), intent(in) :: state
       !> Force history; without samples if the case has no impact.
       type(force_history_type), intent(in) :: history
       !> Messages: [n].
@@ -91,8 +93,8 @@ contains
       if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
          '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
          //': its force is that on a rigid floor')
-      if (case%has_floor) call add_floor_warning(case, warnings)
-      if (case%has_room) call add_height_warning(case, warnings)
+      if (case%has_floor) call add_floor_warning(case, state, warnings)
+      if (case%has_room) call add_height_warning(case, state, warnings)
       call add_limit_warnings(case, history, warnings)
       call add_level_warnings(history, warnings)
       call add_error_warning(history, '', warnings)
@@ -180,16 +182,18 @@ contains
    end subroutine add_level_warnings
 
    !> Adds warnings on octaves of the standard in which the floor model is not valid.
-   subroutine add_floor_warning(case, warnings)
+   subroutine add_floor_warning(case, state, warnings)
       !> A case with a floor.
       type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       character(len=reason_length) :: reason
       real(wp) :: lowest, highest
 
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_validity(lowest, highest, reason)
+         call floor%get_validity(state, lowest, highest, reason)
       end associate
       if (lowest > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below '//fixed(lowest, 0)//' Hz ' &
          //trim(reason))
@@ -230,9 +234,11 @@ contains
    end subroutine add_modes_warning
 
    !> Adds warnings on a room of unusual height and a room that is not as large as the floor.
-   subroutine add_height_warning(case, warnings)
+   subroutine add_height_warning(case, state, warnings)
       !> A case with floor and room.
       type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
       type(band_type) :: bands(octave_count)
@@ -243,7 +249,7 @@ contains
 
       bands = get_octaves()
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(bands%center, plate, conductance, error)
+         call floor%get_radiator(state, bands%center, plate, conductance, error)
       end associate
       if (allocated(error)) return
       room = get_completed_room(case%room, plate)

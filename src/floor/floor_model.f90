@@ -15,7 +15,7 @@ module thud_floor_model
    implicit none (type, external)
    private
 
-   public :: floor_model_type, reason_length, uncoupled_support
+   public :: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support
 
    !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
@@ -23,6 +23,16 @@ module thud_floor_model
    !> Simply supported edges without further supports and rows across ribs; of large floors the middle, as far as modes reach
    !> the highest frequency of a rating.
    character(len=*), parameter :: uncoupled_support = 'uncoupled'
+
+   !> What is computed once of a floor, and handed on.
+   type :: floor_state_type
+      !> Mobility under the source.
+      type(receiver_type) :: receiver
+      !> The bearing plate with homogeneous stiffness, and the modes of the floor as it is supported; a floor without modes
+      !> has no frequencies.
+      type(plate_type) :: plate
+      type(floor_modes_type) :: modes
+   end type floor_state_type
 
    !> The floor, whose components are its options: procedures name it `options`.
    type, abstract :: floor_model_type
@@ -36,8 +46,11 @@ module thud_floor_model
       procedure(get_fields), deferred, pass(options) :: get_fields
       procedure(get_receiver), deferred, pass(options) :: get_receiver
       procedure, pass(options) :: check
+      procedure, pass(options) :: prepare
+      procedure, pass(options) :: get_sides
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: has_radiator
+      procedure, pass(options) :: check_radiator
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: get_room_modes
@@ -94,19 +107,35 @@ contains
       character(len=*), intent(in) :: group
       !> Set if a point lacks a coordinate or does not lie on the floor.
       type(error_type), allocatable, intent(out) :: error
-      type(receiver_type) :: transfer
+      real(wp) :: sides(2)
       integer :: i
 
       if (options%point_x%count /= options%point_y%count) then
          error = input_error('&'//trim(group)//': point_x has '//to_text(options%point_x%count)//' values and point_y ' &
             //to_text(options%point_y%count)//'; allowed: the same number of both')
-         return
+      else if (options%point_x%count > 0) then
+         call options%get_sides(sides, error)
       end if
       do i = 1, options%point_x%count
-         call options%get_transfer(options%point_x%values(i), options%point_y%values(i), transfer, error)
-         if (allocated(error)) return
+         if (.not. allocated(error)) call check_point(group, sides, options%point_x%values(i), options%point_y%values(i), error)
       end do
    end subroutine check_points
+
+   !> Checks that a point lies on a floor.
+   subroutine check_point(group, sides, x, y, error)
+      !> Namelist group, for messages.
+      character(len=*), intent(in) :: group
+      !> Length and width of the floor, m: [2].
+      real(wp), intent(in) :: sides(2)
+      !> Coordinates of the point along length and width, m.
+      real(wp), intent(in) :: x, y
+      !> Set if it lies outside.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (min(x, y) >= 0.0_wp .and. x <= sides(1) .and. y <= sides(2)) return
+      error = input_error('&'//trim(group)//': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; allowed: 0 to ' &
+         //to_text(sides(1))//' m and 0 to '//to_text(sides(2))//' m')
+   end subroutine check_point
 
    !> Checks options that depend on each other; by default, none do.
    subroutine check(options, error)
@@ -117,18 +146,44 @@ contains
 
    end subroutine check
 
-   !> Transfer mobility from the source to another point; floors defined only at the source point return an error.
-   subroutine get_transfer(options, x, y, transfer, error)
+   !> Computes what is handed on: by default the mobility.
+   subroutine prepare(options, state, error)
+      !> The options, checked.
       class(floor_model_type), intent(in) :: options
+      type(floor_state_type), intent(out) :: state
+      !> Set if mobility or modes cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+
+      call options%get_receiver(state%receiver, error)
+   end subroutine prepare
+
+   !> Length and width; floors defined only at the source point return an error.
+   subroutine get_sides(options, sides, error)
+      class(floor_model_type), intent(in) :: options
+      !> Length and width, m: [2].
+      real(wp), intent(out) :: sides(2)
+      !> Set if the floor has none.
+      type(error_type), allocatable, intent(out) :: error
+
+      sides = 0.0_wp
+      error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a ' &
+         //'rectangular floor')
+   end subroutine get_sides
+
+   !> Transfer mobility from the source to another point; floors defined only at the source point return an error.
+   subroutine get_transfer(options, state, x, y, transfer, error)
+      class(floor_model_type), intent(in) :: options
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Coordinates of the point along length and width, m.
       real(wp), intent(in) :: x, y
       !> The transfer mobility, as poles and residues.
       type(receiver_type), intent(out) :: transfer
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
+      real(wp) :: sides(2)
 
-      error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a ' &
-         //'rectangular floor')
+      call options%get_sides(sides, error)
    end subroutine get_transfer
 
    !> Whether the floor has a plate that radiates into a room below; by default it has.
@@ -139,10 +194,20 @@ contains
       yes = .true.
    end function has_radiator
 
+   !> Checks that the options of a floor that has a radiator determine it; by default they do.
+   subroutine check_radiator(options, error)
+      class(floor_model_type), intent(in) :: options
+      !> Set if options are missing.
+      type(error_type), allocatable, intent(out) :: error
+
+   end subroutine check_radiator
+
    !> The plate that radiates into the room below, and its conductance: the power into this plate per mean-square force,
    !> averaged over force positions. Floors without such a plate return an error.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
+   subroutine get_radiator(options, state, frequency, plate, conductance, error)
       class(floor_model_type), intent(in) :: options
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
@@ -156,8 +221,10 @@ contains
    end subroutine get_radiator
 
    !> Frequency band in which the model of the floor is valid; by default all frequencies.
-   subroutine get_validity(options, lowest, highest, reason)
+   subroutine get_validity(options, state, lowest, highest, reason)
       class(floor_model_type), intent(in) :: options
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Lowest and highest valid frequency, Hz.
       real(wp), intent(out) :: lowest, highest
       !> Reason for the limits, as the end of a message.
@@ -168,9 +235,12 @@ contains
       reason = ''
    end subroutine get_validity
 
-   !> Modes of the floor, with its own support or another one; floors without modes return an error.
-   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
+   !> Modes of the floor with another support than its own; floors without modes return an error, those with modes from a
+   !> file their own.
+   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
       class(floor_model_type), intent(in) :: options
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> Support of the edges, or `uncoupled_support`.
       character(len=*), intent(in) :: support
       !> The plate that radiates.
@@ -185,15 +255,22 @@ contains
    end subroutine get_room_modes
 
    !> Modes that give the radiation factor; by default those of the floor.
-   subroutine get_radiating_modes(options, plate, modes, error)
+   subroutine get_radiating_modes(options, state, plate, modes, error)
       class(floor_model_type), intent(in) :: options
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       !> The plate that radiates.
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       !> Set if there are none, or they cannot be computed.
       type(error_type), allocatable, intent(out) :: error
 
-      call options%get_room_modes(options%get_support(), plate, modes, error)
+      if (allocated(state%modes%omega)) then
+         plate = state%plate
+         modes = state%modes
+      else
+         error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
+      end if
    end subroutine get_radiating_modes
 
    !> Whether the sound in the room below can be predicted by the modes of the floor; by default, if it radiates.

@@ -3,7 +3,7 @@ module thud_joist_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
-   use thud_floor_model, only: reason_length
+   use thud_floor_model, only: floor_state_type, reason_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: plate_type
@@ -266,8 +266,9 @@ contains
    end function get_torsion_constant
 
    !> Frequency band in which the sheathing is thin.
-   subroutine get_validity(options, lowest, highest, reason)
+   subroutine get_validity(options, state, lowest, highest, reason)
       class(joist_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
       type(base_floor_type) :: base

@@ -2,7 +2,7 @@
 module thud_laminate_floor
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
-   use thud_floor_model, only: reason_length
+   use thud_floor_model, only: floor_state_type, reason_length
    use thud_kinds, only: wp
    use thud_legendre, only: get_gauss_legendre
    use thud_new_field, only: list_field, real_field
@@ -163,8 +163,9 @@ contains
    end function get_base
 
    !> Frequency band in which shear waves are longer than two thicknesses.
-   subroutine get_validity(options, lowest, highest, reason)
+   subroutine get_validity(options, state, lowest, highest, reason)
       class(laminate_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
       type(base_floor_type) :: base

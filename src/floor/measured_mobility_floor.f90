@@ -5,7 +5,7 @@ module thud_measured_mobility_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
-   use thud_floor_model, only: floor_model_type, reason_length
+   use thud_floor_model, only: floor_model_type, floor_state_type, reason_length
    use thud_floor_modes, only: floor_modes_type
    use thud_injected_energy, only: get_mean_conductances
    use thud_kinds, only: wp
@@ -40,6 +40,7 @@ module thud_measured_mobility_floor
       procedure, pass(options) :: check
       procedure, pass(options) :: get_receiver
       procedure, pass(options) :: get_validity
+      procedure, pass(options) :: check_radiator
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_radiating_modes
       procedure, pass(options) :: has_room_modes
@@ -124,43 +125,50 @@ contains
       end if
    end subroutine get_receiver
 
+   !> Checks that a plate is stated.
+   subroutine check_radiator(options, error)
+      class(measured_mobility_floor_type), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. options%radiator%plate%thickness > 0.0_wp) error = input_error('&measured_mobility: a mobility alone does ' &
+         //'not radiate into a room; allowed: with the plate that it was measured on (thickness above 0)')
+   end subroutine check_radiator
+
    !> The plate; its conductance is the mean real part of the mobility in one-third octaves around the frequencies, and
    !> outside the measurement that of the infinite plate.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
+   subroutine get_radiator(options, state, frequency, plate, conductance, error)
       class(measured_mobility_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
       real(wp), intent(out) :: conductance(:)
       type(error_type), allocatable, intent(out) :: error
-      type(receiver_type) :: receiver
       integer :: i
 
       plate = options%radiator%plate
       conductance = 0.0_wp
-      if (.not. plate%thickness > 0.0_wp) then
-         error = input_error('&measured_mobility: a mobility alone does not radiate into a room; allowed: with the plate ' &
-            //'that it was measured on (thickness above 0)')
-         return
-      end if
-      call get_receiver(options, receiver, error)
+      call options%check_radiator(error)
       if (allocated(error)) return
-      conductance = get_mean_conductances(receiver, [(band_type(lower=frequency(i)*10**(-0.05_wp), &
+      conductance = get_mean_conductances(state%receiver, [(band_type(lower=frequency(i)*10**(-0.05_wp), &
          upper=frequency(i)*10**0.05_wp), i=1, size(frequency))])
       where (frequency < options%lowest_frequency .or. frequency > options%highest_frequency) &
          conductance = 1/get_resistance(plate)
    end subroutine get_radiator
 
    !> Modes of the plate, simply supported: its radiation factor. The floor has another mobility, and other modes.
-   subroutine get_radiating_modes(options, plate, modes, error)
+   subroutine get_radiating_modes(options, state, plate, modes, error)
       class(measured_mobility_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
       type(plate_floor_type) :: radiator
+      type(floor_state_type) :: prepared
 
       radiator = options%radiator
       radiator%air = options%air
-      call radiator%get_radiating_modes(plate, modes, error)
+      call radiator%prepare(prepared, error)
+      if (.not. allocated(error)) call radiator%get_radiating_modes(prepared, plate, modes, error)
    end subroutine get_radiating_modes
 
    !> The mobility of one point contains no shapes of modes.
@@ -172,8 +180,9 @@ contains
    end function has_room_modes
 
    !> Frequency band of the measurement.
-   subroutine get_validity(options, lowest, highest, reason)
+   subroutine get_validity(options, state, lowest, highest, reason)
       class(measured_mobility_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
 

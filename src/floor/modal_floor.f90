@@ -3,7 +3,7 @@ module thud_modal_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, name_length
-   use thud_floor_model, only: floor_model_type, reason_length
+   use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length
    use thud_floor_modes, only: floor_modes_type, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: path_field, real_field
@@ -33,7 +33,10 @@ module thud_modal_floor
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
+      procedure, pass(options) :: prepare
       procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: get_sides
+      procedure, pass(options) :: check_radiator
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
@@ -145,19 +148,43 @@ contains
       plate%known_loss = modes%loss_factor
    end function get_plate
 
+   !> Modes of the file, and the mobility at the source.
+   subroutine prepare(options, state, error)
+      class(modal_floor_type), intent(in) :: options
+      type(floor_state_type), intent(out) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      call get_modes(options, state%modes, error)
+      if (allocated(error)) return
+      state%plate = get_plate(options, state%modes)
+      associate (source => [options%source_x, options%source_y])
+         call new_floor_receiver('modal_floor', state%modes, get_residual_resistance(options, state%modes), source, source, &
+            state%receiver, error)
+      end associate
+   end subroutine prepare
+
    !> Mobility at the source.
    subroutine get_receiver(options, receiver, error)
       class(modal_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
+
+      call options%prepare(state, error)
+      if (.not. allocated(error)) receiver = state%receiver
+   end subroutine get_receiver
+
+   !> Length and width of the grid of the file.
+   subroutine get_sides(options, sides, error)
+      class(modal_floor_type), intent(in) :: options
+      real(wp), intent(out) :: sides(2)
+      type(error_type), allocatable, intent(out) :: error
       type(floor_modes_type) :: modes
 
+      sides = 0.0_wp
       call get_modes(options, modes, error)
-      associate (source => [options%source_x, options%source_y])
-         if (.not. allocated(error)) call new_floor_receiver('modal_floor', modes, get_residual_resistance(options, modes), &
-            source, source, receiver, error)
-      end associate
-   end subroutine get_receiver
+      if (.not. allocated(error)) sides = [modes%stack%length, modes%stack%width]
+   end subroutine get_sides
 
    !> Resistance at high frequencies of the infinite plate, or of the residual modes with a stated compliance, N s/m.
    pure function get_residual_resistance(options, modes) result(resistance)
@@ -176,74 +203,69 @@ contains
    end function get_residual_resistance
 
    !> Transfer mobility to another point; a point outside the floor is an error.
-   subroutine get_transfer(options, x, y, transfer, error)
+   subroutine get_transfer(options, state, x, y, transfer, error)
       class(modal_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
       type(error_type), allocatable, intent(out) :: error
-      type(floor_modes_type) :: modes
 
-      call get_modes(options, modes, error)
-      if (allocated(error)) return
-      associate (length => modes%stack%length, width => modes%stack%width)
-         if (x >= 0.0_wp .and. x <= length .and. y >= 0.0_wp .and. y <= width) then
-            call new_floor_receiver('modal_floor', modes, get_residual_resistance(options, modes), &
-               [options%source_x, options%source_y], [x/length, y/width], transfer, error)
-         else
-            error = input_error('&modal_floor: the point ('//to_text(x)//', '//to_text(y) &
-               //') m lies outside; allowed: 0 to '//to_text(length)//' m and 0 to '//to_text(width)//' m')
-         end if
+      associate (modes => state%modes, sides => [state%modes%stack%length, state%modes%stack%width])
+         call check_point('modal_floor', sides, x, y, error)
+         if (.not. allocated(error)) call new_floor_receiver('modal_floor', modes, get_residual_resistance(options, modes), &
+            [options%source_x, options%source_y], [x, y]/sides, transfer, error)
       end associate
    end subroutine get_transfer
 
-   !> The plate, which replaces the modes above the highest one.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
+   !> Checks that a plate is stated, which replaces the modes above the highest one.
+   subroutine check_radiator(options, error)
       class(modal_floor_type), intent(in) :: options
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. options%plate%thickness > 0.0_wp) error = input_error('&modal_floor: the level in a room needs the mass of ' &
+         //'the floor, and a plate in place of the modes above those of the file; allowed: thickness (above 0), density ' &
+         //'and wave_speed of a plate like the floor')
+   end subroutine check_radiator
+
+   !> The plate, which replaces the modes above the highest one.
+   subroutine get_radiator(options, state, frequency, plate, conductance, error)
+      class(modal_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
       real(wp), intent(out) :: conductance(:)
       type(error_type), allocatable, intent(out) :: error
-      type(floor_modes_type) :: modes
 
       conductance = 0.0_wp
-      call get_modes(options, modes, error)
+      call options%check_radiator(error)
       if (allocated(error)) return
-      if (options%plate%thickness > 0.0_wp) then
-         plate = get_plate(options, modes)
-         conductance = 1/get_resistance(plate)
-      else
-         error = input_error('&modal_floor: the level in a room needs the mass of the floor, and a plate in place of the ' &
-            //'modes above '//fixed(maxval(modes%omega)/(2*pi), 0)//' Hz; allowed: thickness (above 0), density and ' &
-            //'wave_speed of a plate like the floor')
-      end if
+      plate = state%plate
+      conductance = 1/get_resistance(plate)
    end subroutine get_radiator
 
    !> The modes, whose edges are those of the floor.
-   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
+   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
       class(modal_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       character(len=*), intent(in) :: support
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: max_frequency
 
-      call get_modes(options, modes, error)
-      if (.not. allocated(error)) plate = get_plate(options, modes)
+      plate = state%plate
+      modes = state%modes
    end subroutine get_room_modes
 
    !> Frequencies up to the highest mode.
-   subroutine get_validity(options, lowest, highest, reason)
+   subroutine get_validity(options, state, lowest, highest, reason)
       class(modal_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
-      type(floor_modes_type) :: modes
-      type(error_type), allocatable :: error
 
       lowest = 0.0_wp
-      highest = huge(highest)
-      call get_modes(options, modes, error)
-      if (allocated(error)) return
-      highest = maxval(modes%omega)/(2*pi)
+      highest = maxval(state%modes%omega)/(2*pi)
       if (options%plate%thickness > 0.0_wp) then
          reason = 'the file has no modes, and the infinite plate takes their place'
       else if (options%residual_compliance > 0.0_wp) then

@@ -3,6 +3,7 @@ module thud_plate_floor
    use thud_double_plate, only: get_lower_conductance
    use thud_error, only: error_type
    use thud_field, only: field_type
+   use thud_floor_model, only: floor_state_type
    use thud_kinds, only: wp
    use thud_plate, only: get_plate_fields, get_resistance, plate_type
    use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
@@ -42,8 +43,9 @@ contains
 
    !> The plate itself; its conductance, averaged over positions, is that of the infinite plate, or the power through the
    !> layer and the bridges of a floating plate with both plates infinite.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
+   subroutine get_radiator(options, state, frequency, plate, conductance, error)
       class(plate_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
       real(wp), intent(out) :: conductance(:)

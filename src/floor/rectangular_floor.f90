@@ -4,7 +4,7 @@ module thud_rectangular_floor
    use thud_edge_walls, only: edge_walls_type, get_edge_wall_fields, get_wall_edge, get_wall_limit
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
-   use thud_floor_model, only: floor_model_type, reason_length, uncoupled_support
+   use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support
    use thud_floor_modes, only: floor_modes_type, get_floor_modes, get_mode_limit, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
@@ -77,11 +77,12 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_build_up_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: check_build_up
+      procedure, pass(options) :: prepare
       procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: get_sides
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_mobility_at
       procedure, pass(options) :: get_source
-      procedure, pass(options) :: get_modes
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_validity
       procedure, pass(options) :: limit_by_surroundings
@@ -267,16 +268,29 @@ contains
       end subroutine check_positions
    end subroutine check_build_up
 
+   !> Modes of the floor as it is supported, and its mobility at the source.
+   subroutine prepare(options, state, error)
+      class(rectangular_floor_type), intent(in) :: options
+      type(floor_state_type), intent(out) :: state
+      type(error_type), allocatable, intent(out) :: error
+
+      call get_modes(options, options%support, state%plate, state%modes, error)
+      if (allocated(error)) return
+      associate (source => options%get_source())
+         call options%get_mobility_at(state, source, source, state%receiver, error)
+      end associate
+      if (.not. allocated(error) .and. options%covering_stiffness > 0.0_wp) call add_covering(options, state%receiver)
+   end subroutine prepare
+
    !> Mobility at the source.
    subroutine get_receiver(options, receiver, error)
       class(rectangular_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
 
-      associate (source => options%get_source())
-         call options%get_mobility_at(source, source, receiver, error)
-      end associate
-      if (.not. allocated(error) .and. options%covering_stiffness > 0.0_wp) call add_covering(options, receiver)
+      call options%prepare(state, error)
+      if (.not. allocated(error)) receiver = state%receiver
    end subroutine get_receiver
 
    !> Adds the mobility s/(k + c s) of a covering in series; its dashpot c has the loss factor at 50 Hz.
@@ -292,42 +306,51 @@ contains
       end associate
    end subroutine add_covering
 
-   !> Transfer mobility to another point; a point outside the floor is an error.
-   subroutine get_transfer(options, x, y, transfer, error)
+   !> Length and width.
+   subroutine get_sides(options, sides, error)
       class(rectangular_floor_type), intent(in) :: options
+      real(wp), intent(out) :: sides(2)
+      type(error_type), allocatable, intent(out) :: error
+      type(base_floor_type) :: base
+
+      base = options%get_base()
+      sides = [base%plate%length, base%plate%width]
+   end subroutine get_sides
+
+   !> Transfer mobility to another point; a point outside the floor is an error.
+   subroutine get_transfer(options, state, x, y, transfer, error)
+      class(rectangular_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
       base = options%get_base()
-      associate (length => base%plate%length, width => base%plate%width)
-         if (x >= 0.0_wp .and. x <= length .and. y >= 0.0_wp .and. y <= width) then
-            call options%get_mobility_at(options%get_source(), [x/length, y/width], transfer, error)
-         else
-            error = input_error('&'//trim(base%group)//': the point ('//to_text(x)//', '//to_text(y) &
-               //') m lies outside; allowed: 0 to '//to_text(length)//' m and 0 to '//to_text(width)//' m')
-         end if
+      associate (sides => [base%plate%length, base%plate%width])
+         call check_point(base%group, sides, x, y, error)
+         if (.not. allocated(error)) call options%get_mobility_at(state, options%get_source(), [x, y]/sides, transfer, error)
       end associate
    end subroutine get_transfer
 
    !> Transfer mobility from a source to a point of the upper plate, without covering.
-   subroutine get_mobility_at(options, source, point, receiver, error)
+   subroutine get_mobility_at(options, state, source, point, receiver, error)
       class(rectangular_floor_type), intent(in) :: options
+      !> The floor, with its modes.
+      type(floor_state_type), intent(in) :: state
       !> Positions of source and point, as fractions of length and width: [2].
       real(wp), intent(in) :: source(2), point(2)
       !> The transfer mobility, as poles and residues.
       type(receiver_type), intent(out) :: receiver
       !> Set if the losses are too high.
       type(error_type), allocatable, intent(out) :: error
-      type(floor_modes_type) :: modes
+      type(base_floor_type) :: base
       type(plate_type) :: plate
-      character(len=key_length) :: group
 
-      call options%get_modes(group, plate, modes, error)
-      if (allocated(error)) return
+      base = options%get_base()
+      plate = base%plate
       if (options%screed%thickness > 0.0_wp) plate = get_screed_plate(options%screed, plate)
-      call new_floor_receiver(trim(group), modes, get_resistance(plate), source, point, receiver, error)
+      call new_floor_receiver(trim(base%group), state%modes, get_resistance(plate), source, point, receiver, error)
    end subroutine get_mobility_at
 
    !> Relative position of the source.
@@ -338,26 +361,24 @@ contains
       source = [options%source_x, options%source_y]
    end function get_source
 
-   !> Modes of the floor.
-   subroutine get_modes(options, group, plate, modes, error, support, max_frequency)
+   !> Modes of the floor with a support of its edges.
+   subroutine get_modes(options, support, plate, modes, error, max_frequency)
       class(rectangular_floor_type), intent(in) :: options
-      !> Namelist group of the floor.
-      character(len=key_length), intent(out) :: group
+      !> Support of the edges, or `uncoupled_support`.
+      character(len=*), intent(in) :: support
       !> The bearing plate with homogeneous stiffness.
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       !> Set if they cannot be computed.
       type(error_type), allocatable, intent(out) :: error
-      !> Support of the edges (default: its own).
-      character(len=*), intent(in), optional :: support
       !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
       real(wp), intent(in), optional :: max_frequency
       type(base_floor_type) :: base
 
       base = options%get_base()
-      group = base%group
       plate = base%plate
-      call get_floor_modes(trim(group), get_stack(options, base, support), plate, options%air, modes, error, max_frequency)
+      call get_floor_modes(trim(base%group), get_stack(options, base, support), plate, options%air, modes, error, &
+         max_frequency)
    end subroutine get_modes
 
    !> The plates above each other.
@@ -434,17 +455,17 @@ contains
       end if
    end function get_channels
 
-   !> Modes of the floor with a support of its edges.
-   subroutine get_room_modes(options, support, plate, modes, error, max_frequency)
+   !> Modes of the floor with another support of its edges.
+   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
       class(rectangular_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       character(len=*), intent(in) :: support
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: max_frequency
-      character(len=key_length) :: group
 
-      call options%get_modes(group, plate, modes, error, support, max_frequency)
+      call get_modes(options, support, plate, modes, error, max_frequency)
    end subroutine get_room_modes
 
    !> Support of the edges.
@@ -504,8 +525,9 @@ contains
    end function get_four
 
    !> The plate, and its conductance if it were infinite.
-   subroutine get_radiator(options, frequency, plate, conductance, error)
+   subroutine get_radiator(options, state, frequency, plate, conductance, error)
       class(rectangular_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
       real(wp), intent(out) :: conductance(:)
@@ -554,8 +576,9 @@ contains
    end function get_bridge_conductance
 
    !> Frequency band in which all plates are thin.
-   subroutine get_validity(options, lowest, highest, reason)
+   subroutine get_validity(options, state, lowest, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
       real(wp), intent(out) :: lowest, highest
       character(len=reason_length), intent(out) :: reason
       type(base_floor_type) :: base

@@ -28,7 +28,8 @@ module thud_blas_threads
 
 contains
 
-   !> Limits OpenBLAS to the calling thread, in the whole process, until `restore_blas_threads`.
+   !> Limits OpenBLAS to the calling thread, in the whole process, until `restore_blas_threads`: every call of the library
+   !> does so, because the number of threads changes the last digits of results.
    subroutine use_one_blas_thread()
       !$omp critical (blas_threads)
       if (n_caller == 0) then

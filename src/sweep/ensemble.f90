@@ -7,7 +7,6 @@ module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_window_length, get_window_index, &
       is_projection_fast, new_band_projection
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: reference_force, reference_time
    use thud_error, only: error_type, input_error, numerical_error
@@ -120,11 +119,9 @@ contains
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
       if (allocated(error)) return
       call get_blocks(samples, computed, order, first)
-      call use_one_blas_thread()
       !$omp parallel num_threads(threads)
       call run_blocks()
       !$omp end parallel
-      call restore_blas_threads()
 
    contains
 

@@ -5,21 +5,22 @@
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_batch_samples, only: fill_samples, suits_batch
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
-   use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
    use thud_column, only: column_type
-   use thud_compute, only: assess_floor, drop_on_floor, get_assessed_force, get_cost, scope_type
+   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, get_assessed_force, get_cost, impact_type, &
+      prepare_floor, scope_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
-   use thud_field, only: check_fields, field_type
+   use thud_field, only: check_fields, field_type, key_length
    use thud_floor_columns, only: column_name_length, get_floor_columns, get_floor_values
+   use thud_floor_model, only: floor_state_type
    use thud_floor_result, only: floor_result_type
    use thud_force_history, only: force_count, force_history_type
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_quantities, only: get_quantities, sample_quantity_count
+   use thud_registry, only: floor_names
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count, get_step_count
    use thud_shell_samples, only: sample_type
@@ -70,14 +71,22 @@ module thud_sweep
       character(len=column_name_length), allocatable :: floor_column(:)
       !> Values of these columns: [n_column, n_sample].
       real(wp), allocatable :: floor_value(:, :)
-      !> The latest drop on a rigid floor, reused by later calls.
-      type(blocked_type) :: blocked
       !> Forces, N; of size 0 if not wanted: [n_time, force_count, n_sample].
       real(wp), allocatable :: force(:, :, :)
    end type sweep_type
 
-   !> Sweep of an earlier call, for reuse of its matrices and latest drop on a rigid floor; `acquire_sweep` moves it to one
-   !> thread at a time.
+   !> What the samples of one thread share.
+   type :: shared_type
+      !> The drop on a rigid floor, and its error, if it failed.
+      type(impact_type) :: impact
+      type(error_type), allocatable :: error
+      !> The floor, prepared.
+      type(floor_state_type) :: floor
+      !> They are those of an earlier sample.
+      logical :: has_impact = .false., has_floor = .false.
+   end type shared_type
+
+   !> Sweep of an earlier call, for reuse of its matrices; `acquire_sweep` moves it to one thread at a time.
    type(sweep_type), allocatable :: kept
 
 contains
@@ -165,11 +174,9 @@ contains
          ! Failed samples are repeated one by one, for their error messages.
          remaining = pack(remaining, sweep%status /= 0)
       end if
-      call use_one_blas_thread()
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
       call solve_remaining()
       !$omp end parallel
-      call restore_blas_threads()
       call check_interrupt(error)
 
    contains
@@ -177,7 +184,7 @@ contains
       !> Computes the samples of one thread, one by one.
       subroutine solve_remaining()
          type(case_type), target :: thread_case
-         type(blocked_type) :: blocked
+         type(shared_type) :: shared
          type(field_type), allocatable :: fields(:)
          integer :: i
 
@@ -186,16 +193,12 @@ contains
          call keep_impact_only(thread_case)
          ! No table has its numbers.
          thread_case%sampling%verify = .false.
-         blocked = sweep%blocked
          !$omp do schedule(dynamic)
          do i = 1, size(remaining)
             if (.not. is_interrupted()) call solve_sample(thread_case, fields, columns, values(:, remaining(i)), &
-               remaining(i), blocked, sweep)
+               remaining(i), shared, sweep)
          end do
          !$omp end do
-         !$omp single
-         sweep%blocked = blocked
-         !$omp end single
       end subroutine solve_remaining
 
    end subroutine solve_sweep
@@ -259,7 +262,7 @@ contains
    end subroutine set_size
 
    !> Computes one sample, not in a batch.
-   subroutine solve_sample(case, fields, columns, values, sample, blocked, sweep)
+   subroutine solve_sample(case, fields, columns, values, sample, shared, sweep)
       !> The case; the keys of the columns are overwritten.
       type(case_type), intent(inout), target :: case
       !> Keys of the case: [n_field].
@@ -270,8 +273,8 @@ contains
       real(wp), intent(in) :: values(:)
       !> Index of the sample.
       integer, intent(in) :: sample
-      !> The drop on a rigid floor of an earlier sample; afterwards of this one.
-      type(blocked_type), intent(inout) :: blocked
+      !> What an earlier sample of the same call has computed; afterwards also what this one has.
+      type(shared_type), intent(inout) :: shared
       type(sweep_type), intent(inout) :: sweep
       type(scope_type) :: scope
       type(force_history_type), allocatable :: on_floor
@@ -287,9 +290,9 @@ contains
       end do
       call set_floor_air(case)
       if (.not. allocated(error)) call check_case(case, error)
-      if (.not. allocated(error)) call solve_blocked(case, fields, scope, blocked, error)
-      if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, on_floor, error)
-      if (.not. allocated(error)) call assess_floor(case, scope, blocked%impact, on_floor, floor, room, error)
+      if (.not. allocated(error)) call compute_shared(case, is_of_floor(fields(columns%field)), scope, shared, error)
+      if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, shared%floor, on_floor, error)
+      if (.not. allocated(error)) call assess_floor(case, scope, shared%floor, shared%impact, on_floor, floor, room, error)
       sweep%status(sample) = 0
       sweep%quantity(:, sample) = not_a_number
       sweep%level(:, :, sample) = not_a_number
@@ -300,8 +303,8 @@ contains
          return
       end if
       if (case%has_floor) call get_floor_values(case, size(sweep%bands) - sweep%first_band + 1, sweep%levels, &
-         blocked%impact, on_floor, floor, room, sweep%floor_value(:, sample))
-      associate (history => blocked%impact%history, assessment => blocked%impact%assessment)
+         shared%impact, on_floor, floor, room, sweep%floor_value(:, sample))
+      associate (history => shared%impact%history, assessment => shared%impact%assessment)
          all_quantities = get_quantities(history)
          sweep%quantity(:, sample) = all_quantities(:sample_quantity_count)
          if (size(sweep%force) > 0) then
@@ -314,6 +317,36 @@ contains
       end associate
       call set_verdict(case, sample, sweep)
    end subroutine solve_sample
+
+   !> Computes the drop on a rigid floor, unless samples differ only in floor and room and an earlier one has it; prepares
+   !> the floor, unless samples do not differ in floor and room and an earlier one has it.
+   subroutine compute_shared(case, of_floor, scope, shared, error)
+      !> The case of a sample, checked.
+      type(case_type), intent(in) :: case
+      !> Whether the keys in which samples differ are those of floor and room: [n_column].
+      logical, intent(in) :: of_floor(:)
+      type(scope_type), intent(in) :: scope
+      type(shared_type), intent(inout) :: shared
+      !> Set if the drop fails, or the floor cannot be prepared.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. (shared%has_impact .and. all(of_floor))) then
+         call compute_impact(case, scope, shared%impact, shared%error)
+         shared%has_impact = .true.
+      end if
+      if (allocated(shared%error)) error = shared%error
+      if (allocated(error) .or. shared%has_floor .and. .not. any(of_floor)) return
+      call prepare_floor(case, shared%floor, error)
+      shared%has_floor = .not. allocated(error)
+   end subroutine compute_shared
+
+   !> Whether a key is one of floor or room.
+   elemental function is_of_floor(field) result(yes)
+      type(field_type), intent(in) :: field
+      logical :: yes
+
+      yes = any(field%owner == [character(len=key_length) :: 'floor', 'room', floor_names])
+   end function is_of_floor
 
    !> Sets margin and verdict of a sample, by the assessed force.
    subroutine set_verdict(case, sample, sweep)

@@ -293,12 +293,17 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     return read_construction(Path(name))
 
 
-@cache
 def _library() -> Constructions:
-    """Return all constructions of the inputs."""
+    """Return all constructions of the inputs, with dictionaries of their own."""
+    return Constructions(
+        tuple(replace(entry, room={**entry.room}, sources={**entry.sources}) for entry in _entries())
+    )
+
+
+@cache
+def _entries() -> list[Construction]:
     files = (inputs_folder() / "constructions").glob("*.toml")
-    entries = map(read_construction, files)
-    return Constructions(tuple(sorted(entries, key=lambda entry: (entry.kind, _order(entry.name)))))
+    return sorted(map(read_construction, files), key=lambda entry: (entry.kind, _order(entry.name)))
 
 
 def _order(name: str) -> list[tuple[int, str]]:

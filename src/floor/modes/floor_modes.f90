@@ -39,17 +39,6 @@ module thud_floor_modes
       real(wp) :: known_limit = huge(1.0_wp)
    end type floor_modes_type
 
-   !> Modes, and the numbers that determine them.
-   type :: cached_modes_type
-      real(wp), allocatable :: key(:)
-      type(floor_modes_type) :: modes
-   end type cached_modes_type
-
-   !> Modes of the last floors of each thread, because a case needs them several times, and the number of the oldest.
-   type(cached_modes_type) :: cached(4)
-   integer :: oldest = 1
-   !$omp threadprivate(cached, oldest)
-
 contains
 
    !> Modes of a stack of plates. To the losses of its parts those of the bearing plate at its edges and by radiation are
@@ -68,7 +57,6 @@ contains
       !> Frequency up to which modes are wanted, Hz (default: `mode_limit`, and beyond for the static compliance).
       real(wp), intent(in), optional :: max_frequency
       type(plate_stack_type) :: held
-      real(wp), allocatable :: key(:)
       real(wp) :: wanted, resolved
       integer :: i
       logical :: failed
@@ -77,15 +65,6 @@ contains
       wanted = mode_limit*resolution
       if (is_uncoupled(held) .and. .not. has_shear(held)) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
-      allocate (key, source=[wanted, air%density, air%sound_speed, get_key(held, bearing)])
-      do i = 1, size(cached)
-         if (.not. allocated(cached(i)%key)) exit
-         if (size(key) /= size(cached(i)%key)) cycle
-         if (all(abs(key - cached(i)%key) <= 0.0_wp)) then
-            modes = cached(i)%modes
-            return
-         end if
-      end do
       modes%stack = held
       call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
       if (failed) then
@@ -101,9 +80,6 @@ contains
          modes%omega = [(block(i)%omega, i=1, size(block))]
          modes%loss_factor = [(block(i)%loss_factor, i=1, size(block))]
       end associate
-      cached(oldest)%modes = modes
-      call move_alloc(key, cached(oldest)%key)
-      oldest = 1 + mod(oldest, size(cached))
    end subroutine get_floor_modes
 
    !> Frequency up to which the modes of a stack are treated individually because higher ones are not resolved, Hz.
@@ -183,41 +159,6 @@ contains
 
       yes = any([(maxval(stack%plate(i)%shear) > 0.0_wp, i=1, size(stack%plate))])
    end function has_shear
-
-   !> All numbers that determine the modes.
-   pure function get_key(stack, bearing) result(key)
-      type(plate_stack_type), intent(in) :: stack
-      type(plate_type), intent(in) :: bearing
-      real(wp), allocatable :: key(:)
-      integer :: i, j
-
-      key = [stack%length, stack%width, real([stack%radiator, stack%bearing], wp), bearing%thickness, bearing%density, &
-         bearing%wave_speed, bearing%stiffness_ratio, bearing%torsion_ratio, bearing%loss_factor, &
-         bearing%edge_absorption, real(iachar([(bearing%edges(i:i), i=1, len(bearing%edges))]), wp)]
-      do i = 1, size(stack%plate)
-         associate (plate => stack%plate(i))
-            key = [key, plate%along, plate%across, plate%coupling, plate%torsion, plate%shear, plate%mass, plate%inertia, &
-               plate%loss_factor, plate%edge%deflection, plate%edge%rotation, plate%edge%loss_factor]
-            if (allocated(plate%line_x)) key = [key, 1.0_wp, plate%line_x]
-            if (allocated(plate%line_y)) key = [key, 2.0_wp, plate%line_y]
-            if (.not. allocated(plate%ribs)) cycle
-            do j = 1, size(plate%ribs)
-               associate (ribs => plate%ribs(j))
-                  key = [key, ribs%position, merge(1.0_wp, 0.0_wp, ribs%along_width), ribs%bending, ribs%shear, &
-                     ribs%torsion, ribs%mass, ribs%inertia, ribs%fastening, ribs%loss_factor]
-               end associate
-            end do
-         end associate
-      end do
-      do i = 1, size(stack%layer)
-         associate (layer => stack%layer(i))
-            key = [key, layer%stiffness, layer%loss_factor, layer%line_stiffness, layer%line_loss_factor]
-            if (allocated(layer%line_y)) key = [key, layer%line_y]
-            if (allocated(layer%point)) key = [key, layer%point%x, layer%point%y, layer%point%stiffness, &
-               layer%point%loss_factor]
-         end associate
-      end do
-   end function get_key
 
    !> Transfer mobility of the upper plate from a source to a point, as poles and residues. Modes above the limit are
    !> residual modes: static compliances, and the conductance of the infinite plate at high frequencies.

@@ -19,16 +19,6 @@ module thud_sampled_modes
    !> Maximum size of a file, bytes.
    integer(int64), parameter :: max_size = 200000000_int64
 
-   !> The text of a file and its modes.
-   type :: cached_file_type
-      character(len=:), allocatable :: text
-      type(floor_modes_type) :: modes
-   end type cached_file_type
-
-   !> The last file of each thread, because a case needs it several times.
-   type(cached_file_type) :: cached
-   !$omp threadprivate(cached)
-
 contains
 
    !> Modes of a floor from a file; see `thud_mode_table`.
@@ -39,26 +29,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
       type(mode_table_type) :: table
-      logical :: is_cached
 
       call read_text_file(path, text, error, 'table of modes', max_size)
-      if (.not. allocated(error)) then
-         is_cached = allocated(cached%text)
-         if (is_cached) is_cached = len(text) == len(cached%text)
-         if (is_cached) is_cached = text == cached%text
-         if (is_cached) then
-            modes = cached%modes
-            return
-         end if
-         call read_mode_table(text, table, error)
-      end if
+      if (.not. allocated(error)) call read_mode_table(text, table, error)
       if (allocated(error)) then
          error = input_error(path//': '//error%message)
-         return
+      else
+         call get_sampled_modes(table, modes)
       end if
-      call get_sampled_modes(table, modes)
-      call move_alloc(text, cached%text)
-      cached%modes = modes
    end subroutine read_sampled_modes
 
    !> Modes of a floor from a table.

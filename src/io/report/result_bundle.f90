@@ -4,6 +4,7 @@ module thud_result_bundle
    use thud_case, only: case_type
    use thud_compression, only: compression_type
    use thud_compute, only: results_type
+   use thud_floor_model, only: floor_state_type
    use thud_force_history, only: force_history_type
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
@@ -28,7 +29,7 @@ contains
 
       if (case%has_impact) call add_history(bundle, '', results%impact%history)
       if (allocated(results%on_floor)) call add_history(bundle, 'on_floor.', results%on_floor)
-      if (allocated(results%room%bands)) call add_room_level(bundle, case, results%room)
+      if (allocated(results%room%bands)) call add_room_level(bundle, case, results%state, results%room)
       if (case%has_modes) call add_modes(bundle, results%modes)
       if (case%has_compression) call add_compression(bundle, results%compression)
       call add_warnings(bundle, 'warnings.', results%warning)
@@ -97,9 +98,11 @@ contains
    end subroutine add_history
 
    !> Adds the level in the room below to a bundle, with warnings on the floor.
-   subroutine add_room_level(bundle, case, room)
+   subroutine add_room_level(bundle, case, state, room)
       type(bundle_type), intent(inout) :: bundle
       type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
       type(room_level_type), intent(in) :: room
       character(len=warning_length), allocatable :: warnings(:)
       integer :: n(1)
@@ -142,8 +145,8 @@ contains
       call bundle%add_array('room_history.time', shape(room%history_time), room%history_time)
       call bundle%add_array('room_history.level', shape(room%history), room%history)
       allocate (warnings(0))
-      call add_floor_warning(case, warnings)
-      call add_height_warning(case, warnings)
+      call add_floor_warning(case, state, warnings)
+      call add_height_warning(case, state, warnings)
       call add_modes_warning(room, warnings)
       call add_warnings(bundle, 'room_warnings.', warnings)
    end subroutine add_room_level

@@ -7,7 +7,6 @@
 module thud_modal_ball
    use thud_ball, only: ball_type
    use thud_ball_motion, only: ball_motion_type, new_ball_motion, stays_clear, take_step
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
@@ -149,7 +148,6 @@ contains
          history%model_history_name = [character(len=24) :: 'contact_radius_m']
       end if
       allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
-      call use_one_blas_thread()
       rings = new_surface_rings(options%get_ring_count(), options%outermost_angle, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, modes, static, contact, error)
       if (.not. allocated(error)) then
@@ -164,7 +162,6 @@ contains
             min(options%get_highest_frequency(), max_phase/(2*pi*interval)))
          call add_model_quantity(history, 'substeps', '', real(sampling%substeps, wp))
       end if
-      call restore_blas_threads()
    end subroutine solve
 
    !> Sets the modes, the factors of their time steps, and the response of the rings.

@@ -1,7 +1,6 @@
 !> Options of the modal ball; `thud_modal_ball` adds the solution.
 module thud_modal_ball_options
    use thud_ball, only: ball_type, get_density
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
@@ -164,10 +163,8 @@ contains
       options%coarse_frequency = get_coarse_frequency(ball)
       highest_omega = min(2*pi*max(get_level_frequency(options, 0), get_level_frequency(options, 1)), &
          max_phase*sampling%sample_rate*sampling%substeps*max_refinement)
-      call use_one_blas_thread()
       ! After an error there are no families; the drop repeats it, and returns the error.
       call get_families(ball, options%cavity_gas, highest_omega, options%families, error)
-      call restore_blas_threads()
    end subroutine share_setup
 
    !> Sets the resolution: modes, rings around the contact of the coarser drop, and time steps.

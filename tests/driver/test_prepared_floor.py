@@ -1,0 +1,120 @@
+"""A result depends on its own case only, never on cases that were computed before it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import python
+
+import thud
+
+# Name and keys of a floor, name and keys of a model.
+Chosen = tuple[str, dict[str, Any], str, dict[str, Any]]
+
+FREQUENCIES = [30.0, 80.0, 200.0]
+SOURCE = {"source_x": 0.31, "source_y": 0.22}
+# Near-equal floors and models: round positions and counts, digits, lengths, keys without effect.
+FLOORS: dict[str, tuple[Any, dict[str, list[Any]]]] = {
+    "plate": (thud.Plate, {
+        "line_x": [(), (1.0,), (2.0,), (1.0, 2.0)],
+        "line_y": [(), (2.0,), (3.0,), (2.0, 3.0)],
+        "length": [5.0, 5.000001, 4.0],
+        "width": [4.0, 5.0],
+        "support": ["simple", "clamped"],
+        "screed_thickness": [0.0, 0.05],
+        "layer_stiffness": [1e7, 1e7 * (1 + 1e-12)],
+        "subceiling_thickness": [0.0, 0.002],
+    }),
+    "joist_floor": (thud.JoistFloor, {"line_x": [(), (1.0,)], "length": [4.0, 4.5]}),
+    "laminate_floor": (thud.LaminateFloor, {"line_y": [(), (1.0,)], "length": [4.0, 5.0]}),
+    "oscillator": (thud.Oscillator, {"mass": [100.0, 100.0 + 1e-9], "stiffness": [2e6, 2.1e6]}),
+}  # fmt: skip
+MODELS: dict[str, tuple[Any, dict[str, list[Any]]]] = {
+    "hollow_sphere": (thud.HollowSphere, {"momentum_flux": ["momentum_balance", "retarding"]}),
+    "hunt_crossley": (thud.HuntCrossley, {"contact_time": [0.02], "exponent": [1.0, 1.5]}),
+    "two_mass": (thud.TwoMass, {}),
+}
+
+
+def draw(number: int) -> list[Chosen]:
+    """Return a pair of cases that differ in a few keys."""
+    rng = np.random.default_rng(number)
+
+    def choose(keys: dict[str, list[Any]]) -> dict[str, Any]:
+        return {key: values[rng.integers(len(values))] for key, values in keys.items()}
+
+    floor = str(rng.choice(list(FLOORS), p=[0.7, 0.1, 0.1, 0.1]))
+    model = str(rng.choice(list(MODELS)))
+    first = choose(FLOORS[floor][1])
+    changed = rng.choice(list(first), size=min(2, len(first)), replace=False)
+    second = {**first, **{key: choose(FLOORS[floor][1])[key] for key in changed}}
+    return [(floor, keys, model, choose(MODELS[model][1])) for keys in (first, second)]
+
+
+def result(case: Chosen) -> str:
+    """Return the mobility of a floor and the force of a drop on it, bit for bit; or the refusal."""
+    floor, keys, model, options = case
+    position = {} if floor == "oscillator" else SOURCE
+    try:
+        built = FLOORS[floor][0](**keys, **position)
+        mobility = thud.mobility(built, FREQUENCIES)
+        impact = thud.solve(thud.Case(model=MODELS[model][0](**options), floor=built))
+    except thud.ThudError as error:
+        return str(error)
+    force = impact.on_floor.floor_force if impact.on_floor else impact.floor_force
+    return mobility.tobytes().hex() + force[::50].tobytes().hex()
+
+
+@pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])
+def test_pairs_in_any_order_and_alone_give_the_same_bits(count: int) -> None:
+    cases = [case for number in range(count) for case in draw(number)]
+    done = python(__file__, str(count))
+    alone = json.loads(done.stdout)
+    assert len(set(alone)) > count // 2
+    assert list(map(result, cases)) == alone
+    assert list(map(result, cases[::-1])) == alone[::-1]
+
+
+def test_floors_that_once_were_mistaken_for_each_other() -> None:
+    plates = [
+        thud.Plate(line_x=(1.0, 2.0), line_y=(3.0,), **SOURCE),
+        thud.Plate(line_x=(1.0,), line_y=(2.0, 3.0), **SOURCE),
+    ]
+    first, second = (abs(thud.mobility(plate, [30.0])[0]) for plate in plates)
+    assert first == pytest.approx(1.57e-7, rel=0.01)
+    assert second == pytest.approx(3.42e-7, rel=0.01)
+
+
+def test_constructions_have_dictionaries_of_their_own() -> None:
+    name = next(entry.name for entry in thud.constructions() if entry.room)
+    thud.construction(name).room["ceiling_mass"] = 1.0
+    assert thud.construction(name).room["ceiling_mass"] != 1.0
+
+
+def test_samples_that_differ_in_the_floor_share_no_drop_of_another_case() -> None:
+    """A text is part of the case: the flux term of an earlier call is not that of the next."""
+    levels = [
+        thud.solve_many(
+            {"mass": [100.0, 200.0]},
+            thud.Case(model=thud.HollowSphere(momentum_flux=flux), floor=thud.Oscillator()),
+        ).restitution
+        for flux in ("momentum_balance", "conservative")
+    ]
+    assert np.all(levels[0] < 0.95)
+    assert levels[1] == pytest.approx(1.0, abs=1e-6)
+
+
+def main() -> None:
+    """Print the results of all pairs, each computed by a fork of a process that computes nothing."""
+    cases = [case for number in range(int(sys.argv[1])) for case in draw(number)]
+    with get_context("fork").Pool(2, maxtasksperchild=1) as processes:
+        json.dump(processes.map(result, cases, chunksize=1), sys.stdout)
+
+
+if __name__ == "__main__":
+    main()
