@@ -17,7 +17,7 @@ from typing import IO, TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-START = "import sys; from thud_driver import main; {}; sys.exit(main())"
+START = "import sys; from thud.__main__ import main; {}; sys.exit(main())"
 Served = tuple[str, "subprocess.Popen[str]"]
 
 

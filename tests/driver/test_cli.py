@@ -238,25 +238,6 @@ def test_files_named_as_modules_of_python_are_not_imported(
     assert (tmp_path / "outputs/case/force.csv").exists()
 
 
-@pytest.mark.parametrize("screen", ["> /dev/full", ">&-"])
-def test_errors_that_nobody_can_read_change_no_exit_code(
-    screen: str, case_file: CaseFile, tmp_path: Path
-) -> None:
-    case_file(MINIMAL)
-    case_file("&ball", "bad.nml")
-    for name, code in (("case", 0), ("bad", 1)):
-        command = f"{sys.executable} -m thud run --no-figures {name}.nml 2{screen}"
-        done = subprocess.run(
-            ["/bin/sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=False
-        )
-        assert done.returncode == code
-        quiet = subprocess.run(["/bin/sh", "-c", f"{command} >&-"], cwd=tmp_path, check=False)
-        assert quiet.returncode == code
-        # Errors do not end up among the results.
-        assert done.stdout.count("thud-driver") == 0
-        assert bool(done.stdout) == (code == 0)
-
-
 def test_interruption_is_not_a_traceback(
     case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, errors_of: ErrorsOf
 ) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import signal
 import socket
-import subprocess
 import time
-from contextlib import closing, suppress
+from contextlib import closing
 from http.client import HTTPConnection
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,6 @@ from explorer_server import Served, drag, place_of, serve, solve_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
 SHELL = {"model": {"name": "hollow_sphere"}}
 SLOW = {"model": {"name": "finite_element"}, "mesh": {"polar_elements": 600}}
@@ -129,77 +127,6 @@ def test_abandoned_works_hinder_neither_a_user_nor_the_end(server: Served) -> No
     await_end(works)
 
 
-HANGING = "import asyncio, uvicorn; uvicorn.Server.shutdown = lambda *_, **__: asyncio.sleep(600)"
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.slow
-def test_second_signal_ends_a_server_that_hangs(number: signal.Signals, tmp_path: Path) -> None:
-    before = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}; {HANGING}"
-    with serve(before=before) as server:
-        assert solve_at(server[0], SHELL)
-        abandon(server, SLOW, 60)
-        works = processes_of(server)
-        server[1].send_signal(number)
-        with pytest.raises(subprocess.TimeoutExpired):
-            server[1].wait(1)
-        server[1].send_signal(number)
-        assert server[1].wait(20) == 128 + number
-    await_end(works)
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("files", [200, 1000])
-@pytest.mark.slow
-def test_unfinished_heads_hinder_nobody_and_fill_no_log(files: int, tmp_path: Path) -> None:
-    limit = f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))"
-    kinds = (b"", b"POST /so", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")
-    with (tmp_path / "screen").open("w+") as screen, serve(before=limit, screen=screen) as server:
-        host, port, _ = place_of(server[0])
-        heads = []
-        for i in range(3 * files // 2):
-            heads.append(socket.create_connection((host, port), 60))
-            heads[-1].sendall(kinds[i % 3])
-        assert solve_at(server[0], SHELL)
-        for one in heads:
-            one.close()
-        screen.seek(0)
-        assert len(screen.readlines()) < 5
-
-
-def test_heads_have_a_time() -> None:
-    before = "from thud.explorer import connections; connections.HEAD_TIME = 0.5"
-    with serve(before=before) as server:
-        host, port, _ = place_of(server[0])
-        for text in (b"", b"GET", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET"):
-            with socket.create_connection((host, port), 20) as connection:
-                connection.sendall(text)
-                # A byte now and then makes it no longer.
-                sent = 0
-                with suppress(ConnectionError):
-                    for sent in range(100):  # noqa: B007 - how many there were
-                        time.sleep(0.05)
-                        connection.sendall(b"x")
-                assert sent < 99
-
-
-@pytest.mark.slow
-def test_answers_have_to_be_read() -> None:
-    before = "from thud.explorer import connections; connections.HEAD_TIME = 0.5"
-    count = 20_000
-    ask = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * count
-    read = 0
-    with serve(before=before) as server:
-        host, port, _ = place_of(server[0])
-        # What was sent may still be read; then the connection is gone.
-        with socket.create_connection((host, port), 20) as connection, suppress(ConnectionError):
-            connection.sendall(ask)
-            time.sleep(5)
-            while part := connection.recv(2**20):
-                read += len(part)
-    assert read < count * 10_000
-
-
 def test_version_6_of_this_machine_is_served() -> None:
     with serve("--host", "::1") as (address, _):
         host, port, _ = place_of(address)
@@ -212,11 +139,11 @@ def test_version_6_of_this_machine_is_served() -> None:
 
 
 def test_body_of_an_answer_does_not_wait_for_an_acknowledgment(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    connections = pytest.importorskip("thud.explorer.connections")
-    monkeypatch.setattr("thud.explorer.connections._Server.run", lambda _self, sockets: sockets)
+    server = pytest.importorskip("thud.explorer.server")
+    monkeypatch.setattr("uvicorn.Server.run", lambda _self, sockets: sockets)
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        connections.run_server(None, listener, tmp_path)
+        server.run_server(None, listener)
         with socket.create_connection(listener.getsockname()), listener.accept()[0] as connection:
             assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)

@@ -54,7 +54,7 @@ LONG = "&ball /\n&drop /\n&model name = 'finite_element' /\n&mesh {} /\n".format
 )
 # One line, and nothing else.
 KEPT = re.compile(naming("interrupted", "kept") + r"[^\n]*\n\Z")
-DRIVER = [sys.executable, "-c", "import sys, thud_driver; sys.exit(thud_driver.main())"]
+DRIVER = [sys.executable, "-m", "thud"]
 
 
 @contextmanager
@@ -240,78 +240,6 @@ def test_executable_ends_samples_and_leaves_nothing(
     assert not list((tmp_path / "outputs").iterdir())
 
 
-def test_library_that_cannot_be_loaded_is_one_sentence() -> None:
-    code = "import sys, thud_driver; sys.modules['numpy'] = None; sys.exit(thud_driver.main())"
-    done = python("-c", code)
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    # The library prints what it misses.
-    assert re.fullmatch("thud-driver: .*numpy.*", done.stderr.splitlines()[-1])
-
-
-@pytest.mark.parametrize("delay", [0.0, 0.1, 0.2, 0.4])
-def test_interrupt_at_the_start_of_the_driver_is_one_sentence(delay: float, tmp_path: Path) -> None:
-    (tmp_path / "long.nml").write_text(LONG)
-    # Prints a line when it handles signals.
-    code = """
-import sys, thud_driver
-handle = thud_driver._handle
-thud_driver._handle = lambda handler: (handle(handler), print(flush=True))
-sys.exit(thud_driver.main())
-"""
-    command = [sys.executable, "-c", code, "run", "-q", "long.nml"]
-    with subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout
-        process.stdout.readline()
-        time.sleep(delay)
-        assert KEPT.match(ended(process, signal.SIGINT))
-
-
-@pytest.mark.parametrize(
-    "work",
-    [
-        """
-def draw():
-    try:
-        signal.raise_signal(signal.SIGINT)
-    except KeyboardInterrupt:
-        raise TypeError("incompatible function arguments")
-""",
-        """
-async def write():
-    pass
-def draw():
-    with warnings.catch_warnings():
-        never_awaited = write()
-        signal.raise_signal(signal.SIGINT)
-""",
-        """
-class Half:
-    def __init__(self):
-        signal.raise_signal(signal.SIGINT)
-        self.whole = True
-    def __del__(self):
-        assert self.whole
-draw = Half
-""",
-    ],
-    ids=["made an error", "with a coroutine", "with a half-made object"],
-)
-def test_interrupt_of_a_library_is_one_sentence(work: str) -> None:
-    code = f"""
-import signal, sys, time, warnings, thud_driver
-from thud import cli
-{work}
-cli.main = lambda: draw()
-sys.exit(thud_driver.main())
-"""
-    done = python("-c", code)
-    assert KEPT.match(done.stderr)
-    assert done.returncode == 130
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_cases_keep_those_that_are_done(number: int, tmp_path: Path) -> None:
     (tmp_path / "short.nml").write_text(MINIMAL)
@@ -355,31 +283,3 @@ def test_main_thread_alone_defers_signals() -> None:
     with ThreadPoolExecutor(1) as thread:
         thread.submit(defer).result()
     assert done == [1, 1]
-
-
-def test_second_interrupt_ends_what_has_lost_the_first(tmp_path: Path) -> None:
-    code = """
-import time, thud_driver
-from thud import cli
-
-def lose():
-    while True:
-        try:
-            print(flush=True)
-            time.sleep(60)
-        except KeyboardInterrupt:
-            pass
-
-cli.main = lose
-thud_driver.main()
-"""
-    command = [sys.executable, "-c", code]
-    with subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        process.stdout.readline()
-        time.sleep(1.5)
-        assert KEPT.match(ended(process, signal.SIGINT))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import http.client
 import json
-import resource
 import signal
 import socket
 import subprocess
@@ -229,20 +228,6 @@ def _leave(server: Explorer, chance: random.Random) -> str:
     return _well(server) or (f"grown: {grown} bytes" if grown > GROWTH else "")
 
 
-def _unfinished(server: Explorer, chance: random.Random) -> str:
-    """Begin more heads than the server has files, while a page is answered."""
-    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (limits[1], limits[1]))
-    lines = len(server.screen.read_text().splitlines())
-    heads = [server.begin("/solve", b"{}", sent=chance.randint(0, 60)) for _ in range(1100)]
-    fault = _well(server)
-    for head in heads:
-        head.close()
-    resource.setrlimit(resource.RLIMIT_NOFILE, limits)
-    lines = len(server.screen.read_text().splitlines()) - lines
-    return fault or (f"grown: {lines} lines are logged" if lines > LINES else "")
-
-
 def _kill_work(server: Explorer, chance: random.Random) -> str:
     with _work(server) as answer:
         _signal(server, signal.SIGKILL, chance)
@@ -275,5 +260,4 @@ KINDS: dict[str, Callable[[Explorer, Any], str]] = {
     "page left": _leave,
     "work killed": _kill_work,
     "work stopped": _stop_work,
-    "heads": _unfinished,
 }

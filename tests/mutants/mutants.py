@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from covering import Covering
 
 FOLDER = ROOT / "build/mutants"
-SOURCES = ("src/**/*.f90", "src/**/*.c", "driver/thud/**/*.py", "driver/thud_driver/*.py")
+SOURCES = ("src/**/*.f90", "src/**/*.c", "driver/thud/**/*.py")
 GENERATED = {"_schema.py"}
 
 

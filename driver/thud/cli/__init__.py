@@ -162,7 +162,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 raise InputError(message)
             with print_immediately():
                 code = command.function(options)
-        sys.stdout.flush()
+        print(end="", flush=True)
+    except BrokenPipeError:
+        # The reader of the output has ended, such as `head`.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = InputError.exit_code
     except KeyboardInterrupt as interrupt:
         print_error(f"interrupted; {after_interrupt}")
         return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)

@@ -30,8 +30,7 @@ ALL_ADDRESSES = {"0.0.0.0": "localhost", "[::]": "[::1]"}  # noqa: S104 - only c
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until interrupted; return the exit code."""
     with require_extra("explorer"):
-        from thud.explorer.connections import run_server
-        from thud.explorer.server import new_application, start_with
+        from thud.explorer.server import new_application, run_server, start_with
     start = start_with(options.case)
     token = secrets.token_urlsafe(16)
     version_6 = ":" in options.host
@@ -62,7 +61,7 @@ def explore(options: argparse.Namespace) -> int:
         with _temporary_files_in(folder):
             if not options.no_browser:
                 webbrowser.open(_redirect(folder, address))
-            run_server(application, listener, folder)
+            run_server(application, listener)
     return 0
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
+import socket
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import anyio
+import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
@@ -56,6 +58,9 @@ FILE_KEYS = {
 # Maximum number of files and of fields in a form.
 MAX_FILES = 100
 MAX_FIELDS = 100
+# Maximum number of requests at a time, and time that an idle connection stays open, s.
+MAX_REQUESTS = 500
+IDLE_TIME = 10
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Header that is "SI" if fields and messages are to have SI units.
@@ -409,3 +414,18 @@ def start_with(path: Path | None) -> dict[str, Any]:
         return {}
     case = read_case(path / "effective.nml" if path.is_dir() else path)
     return {group: dict(keys) for group, keys in case.to_namelist().items()}
+
+
+def run_server(application: Starlette, listener: socket.socket) -> None:
+    """Serve an application on a listening socket until a signal."""
+    # Without it the body of an answer may wait 40 ms for the acknowledgment of its head.
+    listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    config = uvicorn.Config(
+        application,
+        http="h11",
+        log_level="warning",
+        limit_concurrency=MAX_REQUESTS,
+        timeout_keep_alive=IDLE_TIME,
+        timeout_graceful_shutdown=1,
+    )
+    uvicorn.Server(config).run(sockets=[listener])
