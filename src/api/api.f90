@@ -16,7 +16,7 @@ module thud_api
    implicit none (type, external)
    private
 
-   public :: ask, ask_alone, collect, end_calls, get_progress
+   public :: ask, collect, end_calls, get_progress
 
 contains
 
@@ -44,20 +44,6 @@ contains
       call restore_blas_threads()
       call end_call()
    end subroutine ask
-
-   !> Answers a question while no other Python thread runs. For procedures with state in static memory, such as functions
-   !> that return texts of deferred length.
-   subroutine ask_alone(question, header, text, values, n, status, handle, n_byte, n_value)
-      !f2py integer, intent(hide), depend(values) :: n = len(values)
-      !> All arguments are those of `ask`.
-      character(len=*), intent(in) :: question, header, text
-      integer, intent(in) :: n
-      real(wp), intent(in), target :: values(n)
-      integer, intent(out) :: status, n_byte, n_value
-      integer(int64), intent(out) :: handle
-
-      call ask(question, header, text, values, n, status, handle, n_byte, n_value)
-   end subroutine ask_alone
 
    !> Hands a bundle over and deallocates it.
    subroutine collect(handle, n_byte, n_value, bytes, values)

@@ -70,7 +70,10 @@ contains
       call request%get_text('folder', options%folder)
       options%output = options%folder
       if (request%get_number('progress') > 0.0_wp) call begin_progress()
+      ! gfortran keeps the lengths of texts that functions return in static memory: one run writes its tables at a time.
+      !$omp critical (thud_run)
       call run_case(path, options, case, results, outcome, error)
+      !$omp end critical (thud_run)
       call end_progress()
       if (allocated(error)) return
       call get_case_text(case, text)

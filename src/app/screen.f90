@@ -66,7 +66,7 @@ contains
       if (status == 0 .or. is_closed(status)) return
       exit_code = bad_input
       if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
-         //get_system_message(status)//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
+         //trim(get_system_message(status))//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
    end subroutine write_screen
 
    !> Whether a descriptor shows colors, and the user wants them (https://no-color.org).

@@ -278,7 +278,7 @@ contains
          call check_interrupt(error)
       else
          error = input_error(self%path//': '//trim(self%name)//' cannot be written (' &
-            //get_system_message(status)//'); allowed: a directory that you may write to, with space on its disk')
+            //trim(get_system_message(status))//'); allowed: a directory that you may write to, with space on its disk')
       end if
    end subroutine require_written
 
@@ -289,7 +289,7 @@ contains
       integer, intent(in) :: status
       type(error_type) :: error
 
-      error = input_error(path//' cannot be used ('//get_system_message(status)//'); allowed: a directory ' &
+      error = input_error(path//' cannot be used ('//trim(get_system_message(status))//'); allowed: a directory ' &
          //'in a folder that you may write to')
    end function unusable_error
 

@@ -183,11 +183,10 @@ contains
    !> The system's message for an error number.
    function get_system_message(status) result(text)
       integer, intent(in) :: status
-      character(len=:), allocatable :: text
-      character(len=128) :: buffer
+      character(len=128) :: text
 
-      call c_get_error_text(int(status, c_int), buffer, len(buffer, c_size_t))
-      text = buffer(:index(buffer, c_null_char) - 1)
+      call c_get_error_text(int(status, c_int), text, len(text, c_size_t))
+      text = text(:index(text, c_null_char) - 1)
    end function get_system_message
 
    !> Whether a descriptor is a terminal.

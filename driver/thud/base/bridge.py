@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 api = _core.thud_api
 
-# Questions that use static memory of the library: no other Python thread runs meanwhile.
-_ALONE = {"effective_case", "modes", "run"}
 # The status of an interrupt is this number plus the number of the signal.
 _INTERRUPTED = 128
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
@@ -41,9 +39,8 @@ def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) 
     signal handlers and asks again if they raise nothing; other threads raise KeyboardInterrupt.
     Raise InputError or NumericalError with the message of the library.
     """
-    routine = api.ask_alone if question in _ALONE else api.ask
     packed = _packed(request)
-    while (answer := routine(question, *packed))[0] > _INTERRUPTED:
+    while (answer := api.ask(question, *packed))[0] > _INTERRUPTED:
         api.collect(*answer[1:])
         if threading.current_thread() is not threading.main_thread():
             raise KeyboardInterrupt
