@@ -102,7 +102,7 @@ contains
                //'replaced; allowed: another directory')
          end do
          if (allocated(error)) return
-         if (present_names(i) == identity .and. command /= '') cycle
+         if (present_names(i) == identity .and. (command /= '' .or. self%replace) .and. .not. directory_exists(path)) cycle
          if (.not. directory_exists(path)) then
             if (any(names == present_names(i))) cycle
             if (is_page(present_names(i))) then

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import signal
-import stat
 import subprocess
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -17,7 +16,6 @@ from conftest import MINIMAL, REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.base.files import MANIFEST, TEMPORARY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -139,7 +137,8 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     return run
 
 
-@pytest.fixture(params=list(WRITERS))
+# `listen` writes a single file, which it replaces.
+@pytest.fixture(params=[name for name in WRITERS if name != "listen"])
 def name(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     """Return the name of a command whose inputs lie in the directory of the test."""
     name: str = request.param
@@ -181,7 +180,6 @@ def test_files_of_the_user_and_inputs_are_never_replaced(
         said = capfd.readouterr().err
         assert (out / path).read_bytes() == MINE
         assert "--replace" in said
-        assert path in said or name in {"thud", "sets", "run"}
         if inputs:
             source = list(inputs)[i % len(inputs)]
             (out / path).unlink()
@@ -197,10 +195,13 @@ def test_files_of_the_user_and_inputs_are_never_replaced(
     out.mkdir()
     (out / "notes.txt").write_bytes(MINE)
     (out / written[-1]).write_bytes(MINE)
-    if not stat.S_ISDIR((out / written[-1]).stat().st_mode):
+    code = command(name, "--replace")
+    assert (out / "notes.txt").read_bytes() == MINE
+    if code == 1:
+        assert "notes.txt" in capfd.readouterr().err
+        (out / "notes.txt").unlink()
         assert command(name, "--replace") in (0, 2)
-        assert (out / written[-1]).read_bytes() != MINE
-        assert (out / "notes.txt").read_bytes() == MINE
+    assert (out / written[-1]).read_bytes() != MINE
 
 
 @pytest.mark.slow
@@ -216,12 +217,12 @@ def test_nothing_but_regular_files_is_opened(
         lambda path: path.symlink_to(tmp_path / "nowhere"),
     ]
     (tmp_path / "elsewhere").write_bytes(MINE)
-    written = {*names_written(out), MANIFEST}
+    written = set(names_written(out))
     tries = {(path, kind) for i, path in enumerate(sorted(written)) for kind in (0, 1 + i % 3)}
     # What it may read, too.
     if "s.toml" in WRITERS[name].inputs:
         tries |= {(path, 0) for path in ("s.nc", "s.zarr", "s.partial", "s_surrogate.npz")}
-    for path, kind in sorted({(TEMPORARY, 0), *tries}):
+    for path, kind in sorted(tries):
         out.mkdir()
         kinds[kind](out / path)
         before = (out / path).lstat()

@@ -204,7 +204,7 @@ def test_plate_takes_over_above_the_highest_mode(path: Path) -> None:
 
 def test_without_a_plate_nothing_stands_for_higher_modes(path: Path) -> None:
     slab(330, *grid(15, 13)).write(path)
-    with pytest.raises(thud.InputError, match=naming("modal_floor", 304, "thickness", "density")):
+    with pytest.raises(thud.InputError, match=naming("modal_floor", "thickness", "density")):
         thud.predict_level(floor=BARE, room=ROOM)
     for floor, words in ((BARE, "residual_compliance"), (FLOOR, "infinite plate")):
         with pytest.warns(UserWarning, match=f"above 304 Hz the file has no modes.*{words}"):

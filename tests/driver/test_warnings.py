@@ -154,5 +154,5 @@ def test_run_names_the_groups_that_are_left_out(
     assert "&ball &model" in capsys.readouterr().out
     assert cli.main(["run", "--no-figures", "-o", "m", str(case_file("&modes count = 1 /"))]) == 0
     assert re.search(r"defaults.*&ball(?! &model)", capsys.readouterr().out, re.IGNORECASE)
-    assert cli.main(["run", "--no-figures", "outputs/case/effective.nml"]) == 0
+    assert cli.main(["run", "--no-figures", "-o", "again", "outputs/case/effective.nml"]) == 0
     assert "default" not in capsys.readouterr().out.lower()

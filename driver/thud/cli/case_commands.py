@@ -137,6 +137,7 @@ def assess_case(options: argparse.Namespace) -> int:
         progress=shows_progress(quiet=options.quiet),
         replace_files=options.replace,
     )
+    folder.mkdir(parents=True, exist_ok=True)
     StudyDirectory(folder, (options.case,)).write({FILE: verdict.to_csv().encode()})
     print_notes(verdict.warnings)
     print_results(verdict.message if options.quiet else str(verdict))

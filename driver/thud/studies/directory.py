@@ -6,6 +6,7 @@ import os
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
@@ -75,13 +76,15 @@ def open_directory(
     """
     directory = StudyDirectory(Path(folder), study.inputs, replace)
     directory.folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=directory.folder):
+        pass  # a directory that cannot be written is an error now, not after hours
     names = kind.identity_files(study)
     listed = kind.listed_files(study)
     readers = dict.fromkeys((directory.folder / name for name in names), kind.identity_in)
     begun = any(map(os.path.lexists, readers))
     for path in (directory.folder / n for n in listed if figures or not n.endswith(FORMATS)):
         directory.require_no_input(path)
-        if is_directory(path) or (path.exists() and not (begun or replace)):
+        if is_directory(path) or (os.path.lexists(path) and not (begun or replace)):
             refuse_foreign(path)
     require_version(readers, study, directory, listed)
     return directory
