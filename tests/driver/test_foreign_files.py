@@ -97,7 +97,7 @@ def test_no_command_escapes() -> None:
         for name, command in cli.COMMANDS.items()
     }
     all_writing = {name for name, words in options.items() if "--output" in words}
-    assert all("--replace" in options[name] for name in all_writing)
+    assert all("--replace" in options[name] for name in all_writing - {"listen"})
     writing = all_writing - OTHERS
     assert writing | {"thud", "sets"} == WRITERS.keys()
     assert writing | OTHERS == cli.COMMANDS.keys()
