@@ -11,6 +11,7 @@ module thud_floor_modes
    use thud_receiver, only: receiver_type
    use thud_ritz_system, only: get_mode_values, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
+   use thud_text, only: to_text
    use thud_truncated_compliance, only: get_truncated_compliance
    implicit none (type, external)
    private
@@ -67,7 +68,12 @@ contains
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
       modes%stack = held
       call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
-      if (failed) then
+      if (.not. resolved > 0.0_wp) then
+         error = input_error('&'//group//': length = '//to_text(stack%length)//' m and width = '//to_text(stack%width) &
+            //' m need too many functions to resolve any wave; allowed: a smaller part of the floor, joists farther apart ' &
+            //'(spacing), stiffer plates, or support = simple')
+         return
+      else if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
          return
       end if
