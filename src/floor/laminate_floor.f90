@@ -91,8 +91,8 @@ contains
       if (min(base%stiffness%along, base%stiffness%across) > 0.0_wp) then
          call options%check_build_up(error)
       else
-         error = input_error('&laminate_floor: cross_modulus = '//to_text(options%cross_modulus)//' Pa leaves layers of one ' &
-            //'direction without stiffness across it; allowed: a modulus above 0, or layer_angle with 0 and 90')
+         error = input_error('&laminate_floor: cross_modulus = '//to_text(options%cross_modulus)//' Pa leaves layers of ' &
+            //'one direction without stiffness across it; allowed: a modulus above 0, or layer_angle with 0 and 90')
       end if
    end subroutine check
 

@@ -18,8 +18,8 @@ Chosen = tuple[str, dict[str, Any], str, dict[str, Any]]
 
 FREQUENCIES = [30.0, 80.0, 200.0]
 SOURCE = {"source_x": 0.31, "source_y": 0.22}
-# Near-equal floors and models: round positions and counts, digits, lengths, keys without effect. Small
-# and thick ones have few functions.
+# Near-equal floors and models: round positions and counts, digits, lengths, keys without effect.
+# Small and thick ones have few functions.
 FLOORS: dict[str, tuple[Any, dict[str, list[Any]]]] = {
     "plate": (thud.Plate, {
         "line_x": [(), (1.0,), (2.0,), (1.0, 2.0)],
@@ -123,7 +123,7 @@ def test_samples_that_differ_in_the_floor_share_no_drop_of_another_case() -> Non
 
 
 def main() -> None:
-    """Print the results of all pairs, each computed by a fork of a process that computes nothing."""
+    """Print the results of all pairs, each computed by a fork of a fresh process."""
     cases = [case for number in range(int(sys.argv[1])) for case in draw(number)]
     with get_context("fork").Pool(2, maxtasksperchild=1) as processes:
         json.dump(processes.map(result, cases, chunksize=1), sys.stdout)

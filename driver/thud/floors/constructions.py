@@ -296,7 +296,9 @@ def construction(name: str | os.PathLike[str]) -> Construction:
 def _library() -> Constructions:
     """Return all constructions of the inputs, with dictionaries of their own."""
     return Constructions(
-        tuple(replace(entry, room={**entry.room}, sources={**entry.sources}) for entry in _entries())
+        tuple(
+            replace(entry, room={**entry.room}, sources={**entry.sources}) for entry in _entries()
+        )
     )
 
 

@@ -70,11 +70,10 @@ contains
       call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
       if (.not. resolved > 0.0_wp) then
          error = get_unresolved(group, stack)
-         return
       else if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
-         return
       end if
+      if (allocated(error)) return
       modes%sum_limit = 2*pi*resolved
       modes%limit = 2*pi*min(mode_limit, resolved/resolution)
       do i = 1, size(modes%modes%block)
