@@ -49,8 +49,8 @@ contains
       call prepare_floor(case, state, error)
       if (allocated(error)) return
       receiver = state%receiver
-      if (size(point) == 2) call case%floors(get_floor_number(case))%model%get_transfer(state, point(1), point(2), receiver, &
-         error)
+      if (size(point) == 2) call case%floors(get_floor_number(case))%model%get_transfer(state, point(1), point(2), &
+         receiver, error)
       if (allocated(error)) return
       mobility = get_mobility(receiver, request%get_array('frequency'))
       call bundle%add_array('real', shape(mobility), real(mobility, wp))
@@ -126,8 +126,8 @@ contains
       type(room_level_type) :: prediction
 
       call prepare_floor(case, state, error)
-      if (.not. allocated(error)) call predict_room(case, state, request%get_array('force'), request%get_number('sample_rate'), &
-         .true., prediction, error)
+      if (.not. allocated(error)) call predict_room(case, state, request%get_array('force'), &
+         request%get_number('sample_rate'), .true., prediction, error)
       if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
    end subroutine answer_room_level
 
@@ -227,7 +227,7 @@ contains
          ! Without shapes, all modes; for shapes, no more than needed, because a large floor has many.
          if (size(request%get_array('x')) == 0 .or. floor%get_support() == '') then
             call prepare_floor(case, state, error)
-            if (.not. allocated(error)) call floor%get_radiating_modes(state, plate, modes, error)
+            if (.not. allocated(error)) call get_own_modes(state, plate, modes, error)
          else
             call floor%get_room_modes(state, floor%get_support(), plate, modes, error, 2*request%get_number('highest'))
          end if
@@ -269,13 +269,26 @@ contains
          if (.not. allocated(error)) call check_below(plate, case%room, error)
          if (allocated(error)) return
          box = get_box(case%room, plate, bands)
-         if (.not. allocated(state%modes%omega)) error = input_error('&floor: name: this floor has no modes; allowed: a ' &
-            //'rectangular floor')
-         if (allocated(error)) return
-         plate = state%plate
-         modes = state%modes
+         call get_own_modes(state, plate, modes, error)
       end associate
    end subroutine get_modes_and_box
+
+   !> Modes of a floor as it is supported, and the plate that radiates.
+   subroutine get_own_modes(state, plate, modes, error)
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      !> Set if the floor has no modes.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (allocated(state%modes%omega)) then
+         plate = state%plate
+         modes = state%modes
+      else
+         error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
+      end if
+   end subroutine get_own_modes
 
    !> The plate of a floor that radiates into the room below, at the frequencies `frequency`, Hz.
    subroutine answer_radiator(case, request, bundle, error)

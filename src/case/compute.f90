@@ -188,7 +188,8 @@ contains
       if (allocated(on_floor)) then
          call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, scope%modal_room, room, error)
       else
-         call predict_room(case, state, impact%history%floor_force, impact%history%sample_rate, scope%modal_room, room, error)
+         call predict_room(case, state, impact%history%floor_force, impact%history%sample_rate, scope%modal_room, room, &
+            error)
       end if
    end subroutine assess_floor
 

@@ -117,7 +117,8 @@ contains
          call options%get_sides(sides, error)
       end if
       do i = 1, options%point_x%count
-         if (.not. allocated(error)) call check_point(group, sides, options%point_x%values(i), options%point_y%values(i), error)
+         if (.not. allocated(error)) call check_point(group, sides, options%point_x%values(i), &
+            options%point_y%values(i), error)
       end do
    end subroutine check_points
 
@@ -133,8 +134,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (min(x, y) >= 0.0_wp .and. x <= sides(1) .and. y <= sides(2)) return
-      error = input_error('&'//trim(group)//': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; allowed: 0 to ' &
-         //to_text(sides(1))//' m and 0 to '//to_text(sides(2))//' m')
+      error = input_error('&'//trim(group)//': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; ' &
+         //'allowed: 0 to '//to_text(sides(1))//' m and 0 to '//to_text(sides(2))//' m')
    end subroutine check_point
 
    !> Checks options that depend on each other; by default, none do.

@@ -18,6 +18,7 @@ module thud_infinite_plate_floor
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: has_radiator
    end type infinite_plate_floor_type
 
 contains
@@ -40,5 +41,13 @@ contains
       receiver%direct = 1/options%resistance
       allocate (receiver%pole(0), receiver%residue(0))
    end subroutine get_receiver
+
+   !> A resistance alone does not radiate into a room.
+   pure function has_radiator(options) result(yes)
+      class(infinite_plate_floor_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function has_radiator
 
 end module thud_infinite_plate_floor

@@ -74,6 +74,7 @@ contains
    subroutine check(options, error)
       class(laminate_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
+      type(base_floor_type) :: base
 
       associate (thickness => options%layer_thickness, angle => options%layer_angle)
          if (angle%count > 0 .and. angle%count /= max(thickness%count, merge(size(default_thickness), 0, &
@@ -85,7 +86,14 @@ contains
                angle%values(:angle%count) > 0.0_wp))//' degrees; allowed: 0 or 90')
          end if
       end associate
-      if (.not. allocated(error)) call options%check_build_up(error)
+      if (allocated(error)) return
+      base = options%get_base()
+      if (min(base%stiffness%along, base%stiffness%across) > 0.0_wp) then
+         call options%check_build_up(error)
+      else
+         error = input_error('&laminate_floor: cross_modulus = '//to_text(options%cross_modulus)//' Pa leaves layers of ' &
+            //'one direction without stiffness across it; allowed: a modulus above 0, or layer_angle with 0 and 90')
+      end if
    end subroutine check
 
    !> Thicknesses, m, and whether the grain runs along the length: [n_layer].

@@ -30,8 +30,8 @@ module thud_rectangular_floor
    !> Minimum distance of two rigid lines, m: less than any wall or beam is thick.
    real(wp), parameter :: min_line_distance = 0.01_wp
 
-   !> Thickness of the thinnest subceiling whose waves are resolved, m: a metal sheet.
-   real(wp), parameter :: min_subceiling = 0.0005_wp
+   !> Thickness of the thinnest floating plate or subceiling, m: a metal sheet.
+   real(wp), parameter :: min_sheet = 0.0005_wp
 
    !> Frequency that uncoupled functions resolve, Hz: above the highest band of a rating.
    real(wp), parameter :: resolved_limit = 800.0_wp
@@ -199,7 +199,10 @@ contains
       else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
          error = input_error('&'//trim(base%group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
             //' values and bridge_y '//to_text(options%screed%bridge_y%count)//'; allowed: the same number of both')
-      else if (options%has_subceiling() .and. options%subceiling%thickness < min_subceiling) then
+      else if (options%screed%thickness > 0.0_wp .and. options%screed%thickness < min_sheet) then
+         error = input_error('&'//trim(base%group)//': screed_thickness = '//to_text(options%screed%thickness) &
+            //' m; allowed: 0, or 0.0005 to 0.5 m')
+      else if (options%has_subceiling() .and. options%subceiling%thickness < min_sheet) then
          error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(options%subceiling%thickness) &
             //' m; allowed: 0, or 0.0005 to 0.2 m')
       else if (options%screed%bridge_x%count > 0 .and. options%screed%thickness <= 0.0_wp) then

@@ -82,8 +82,9 @@ module thud_sweep
       type(error_type), allocatable :: error
       !> The floor, prepared.
       type(floor_state_type) :: floor
-      !> They are those of an earlier sample.
+      !> They are those of an earlier sample with these values of the keys in which samples differ: [n_column].
       logical :: has_impact = .false., has_floor = .false.
+      real(wp), allocatable :: values(:)
    end type shared_type
 
    !> Sweep of an earlier call, for reuse of its matrices; `acquire_sweep` moves it to one thread at a time.
@@ -290,7 +291,8 @@ contains
       end do
       call set_floor_air(case)
       if (.not. allocated(error)) call check_case(case, error)
-      if (.not. allocated(error)) call compute_shared(case, is_of_floor(fields(columns%field)), scope, shared, error)
+      if (.not. allocated(error)) call compute_shared(case, is_of_floor(fields(columns%field)), values, scope, &
+         shared, error)
       if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, shared%floor, on_floor, error)
       if (.not. allocated(error)) call assess_floor(case, scope, shared%floor, shared%impact, on_floor, floor, room, error)
       sweep%status(sample) = 0
@@ -318,24 +320,32 @@ contains
       call set_verdict(case, sample, sweep)
    end subroutine solve_sample
 
-   !> Computes the drop on a rigid floor, unless samples differ only in floor and room and an earlier one has it; prepares
-   !> the floor, unless samples do not differ in floor and room and an earlier one has it.
-   subroutine compute_shared(case, of_floor, scope, shared, error)
+   !> Computes the drop on a rigid floor, unless the sample before differs only in floor and room; prepares the floor, unless
+   !> the sample before does not differ in floor and room.
+   subroutine compute_shared(case, of_floor, values, scope, shared, error)
       !> The case of a sample, checked.
       type(case_type), intent(in) :: case
       !> Whether the keys in which samples differ are those of floor and room: [n_column].
       logical, intent(in) :: of_floor(:)
+      !> Values of these keys: [n_column].
+      real(wp), intent(in) :: values(:)
       type(scope_type), intent(in) :: scope
       type(shared_type), intent(inout) :: shared
       !> Set if the drop fails, or the floor cannot be prepared.
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. (shared%has_impact .and. all(of_floor))) then
+      if (.not. allocated(shared%values)) shared%values = values
+      associate (changed => .not. abs(values - shared%values) <= 0.0_wp)
+         shared%has_impact = shared%has_impact .and. .not. any(changed .and. .not. of_floor)
+         shared%has_floor = shared%has_floor .and. .not. any(changed .and. of_floor)
+      end associate
+      shared%values = values
+      if (.not. shared%has_impact) then
          call compute_impact(case, scope, shared%impact, shared%error)
          shared%has_impact = .true.
       end if
       if (allocated(shared%error)) error = shared%error
-      if (allocated(error) .or. shared%has_floor .and. .not. any(of_floor)) return
+      if (allocated(error) .or. shared%has_floor) return
       call prepare_floor(case, shared%floor, error)
       shared%has_floor = .not. allocated(error)
    end subroutine compute_shared

@@ -11,6 +11,7 @@ module thud_floor_modes
    use thud_receiver, only: receiver_type
    use thud_ritz_system, only: get_mode_values, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
+   use thud_text, only: to_text
    use thud_truncated_compliance, only: get_truncated_compliance
    implicit none (type, external)
    private
@@ -67,10 +68,12 @@ contains
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
       modes%stack = held
       call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
-      if (failed) then
+      if (.not. resolved > 0.0_wp) then
+         error = get_unresolved(group, stack)
+      else if (failed) then
          error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
-         return
       end if
+      if (allocated(error)) return
       modes%sum_limit = 2*pi*resolved
       modes%limit = 2*pi*min(mode_limit, resolved/resolution)
       do i = 1, size(modes%modes%block)
@@ -81,6 +84,17 @@ contains
          modes%loss_factor = [(block(i)%loss_factor, i=1, size(block))]
       end associate
    end subroutine get_floor_modes
+
+   !> The error of a floor of which no mode is resolved.
+   function get_unresolved(group, stack) result(error)
+      character(len=*), intent(in) :: group
+      type(plate_stack_type), intent(in) :: stack
+      type(error_type) :: error
+
+      error = input_error('&'//group//': length = '//to_text(stack%length)//' m and width = '//to_text(stack%width) &
+         //' m need too many functions to resolve the lowest mode; allowed: a smaller part of the floor, joists farther ' &
+         //'apart (spacing), stiffer plates, or support = simple')
+   end function get_unresolved
 
    !> Frequency up to which the modes of a stack are treated individually because higher ones are not resolved, Hz.
    pure function get_mode_limit(stack) result(limit)
@@ -187,6 +201,11 @@ contains
          call get_mode_values(modes%modes, 1, length*[source(1), point(1)], width*[source(2), point(2)], value)
          gain = value(:, 1)*value(:, 2)
          individual = omega < modes%limit
+         ! The mean mobility alone would take up too little energy: there would be no resonance.
+         if (modes%limit < 2*pi*mode_limit .and. .not. any(individual)) then
+            error = get_unresolved(group, modes%stack)
+            return
+         end if
          compliance = sum(gain/max(omega, 1.0_wp)**2, mask=.not. individual .and. (omega < modes%sum_limit .or. has_all))
          ! Shorter waves cancel on average, except at the source.
          if (any(abs(source - point) >= epsilon(1.0_wp))) then

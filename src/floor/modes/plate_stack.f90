@@ -20,6 +20,9 @@ module thud_plate_stack
    integer, parameter :: max_coupled(0:2) = [700, 1100, 1700]
    integer, parameter :: max_half_coupled = 6000, max_uncoupled = 100000
 
+   !> Lowest frequency that functions resolve, Hz: far below all bands; the few waves up to it are resolved by the fewest.
+   real(wp), parameter :: min_resolved = 1.0_wp
+
    !> Ratio of the number of modes of a beam to that of the half waves which they resolve.
    real(wp), parameter :: beam_ratio = 1.2_wp
 
@@ -118,7 +121,7 @@ contains
       end do
    end function with_rigid_edges
 
-   !> Frequency up to which the functions of a stack resolve its waves, Hz.
+   !> Frequency up to which the functions of a stack resolve its waves, Hz; 0 if even few waves need too many functions.
    pure function get_resolved_frequency(stack, max_frequency) result(frequency)
       type(plate_stack_type), intent(in) :: stack
       !> Frequency up to which the modes are wanted, Hz.
@@ -134,6 +137,9 @@ contains
       frequency = max_frequency
       do while (sum([(product(real(get_all_counts(stack%plate(i)), wp)), i=1, size(stack%plate))]) > limit)
          frequency = 0.95_wp*frequency
+         if (frequency >= min_resolved) cycle
+         frequency = 0.0_wp
+         exit
       end do
    contains
 

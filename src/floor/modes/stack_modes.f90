@@ -34,7 +34,8 @@ contains
       !> Frequency up to which the modes are wanted, Hz.
       real(wp), intent(in) :: max_frequency
       type(modes_type), intent(out) :: modes
-      !> Frequency up to which the functions resolve the waves, Hz: less than the wanted one for large or soft plates.
+      !> Frequency up to which the functions resolve the waves, Hz: less than the wanted one for large or soft plates, 0 for
+      !> those of which they resolve none.
       real(wp), intent(out) :: resolved
       !> The system has no solution.
       logical, intent(out) :: failed
@@ -46,6 +47,8 @@ contains
       integer :: i
 
       resolved = get_resolved_frequency(stack, max_frequency)
+      failed = .not. resolved > 0.0_wp
+      if (failed) return
       do i = 1, size(stack%plate)
          motion(i) = new_motion(stack, stack%plate(i), resolved)
          call add_displacement(system, motion(i)%deflection, motion(i)%w)
