@@ -440,10 +440,8 @@ def test_fits_by_a_surrogate_are_those_of_the_model(known: bool) -> None:  # noq
     np.testing.assert_allclose(found.estimate, expected.estimate, rtol=1e-7)
     np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-3)
     columns = found.to_dataframe()
-    np.testing.assert_allclose(
-        found.residuals,
-        columns["residual"] / columns["uncertainty"] / (1 if known else found.noise),
-    )
+    deviation = columns["uncertainty"] if known else found.noise
+    np.testing.assert_allclose(found.residuals, columns["residual"] / deviation)
     np.testing.assert_array_equal(found.impact.floor_force, thud.solve(found.case).floor_force)
 
 
