@@ -240,7 +240,7 @@ def test_what_level_below_my_slab(browser: Browser, server: Served) -> None:
     sync_api.expect(page.locator("#improve")).to_have_count(0)
     fill(page, "room.required", "49")
     settle(page)
-    sync_api.expect(page.locator("#verdict")).to_have_class("fails")
+    sync_api.expect(page.locator("#verdict")).to_have_class("does_not_conform")
     sync_api.expect(page.locator("#verdict")).to_contain_text(f"Not met: {prediction.octave_text}")
     sync_api.expect(page.locator("#improve")).to_have_text("Change that meets 49 dB")
     # Another construction fills floor and ceiling, and names its sources.
@@ -691,7 +691,7 @@ def test_smallest_change_that_conforms_is_applied(browser: Browser, server: Serv
     sync_api.expect(page.locator("#improve")).to_have_count(0)
     fill(page, "modal_ball.loss_factor", "0.2")
     settle(page)
-    sync_api.expect(page.locator("#verdict")).to_have_class("fails")
+    sync_api.expect(page.locator("#verdict")).to_have_class("does_not_conform")
     page.locator("#improve").click()
     sync_api.expect(page.locator("#result li")).to_contain_text("Loss factor")
     page.locator("#result button").first.click()

@@ -60,7 +60,7 @@ def test_idle_and_slow_connections_hinder_nobody(server: Served) -> None:
     slow = [socket.create_connection((host, port)) for _ in range(300)]
     for i, one in enumerate(slow):
         one.sendall((b"", b"POST /so", begun + token.encode() + b"\r\n\r\n{")[i % 3])
-    assert solve_at(server[0], SHELL)["verdict"] == "does not conform"
+    assert solve_at(server[0], SHELL)["result"] == "does_not_conform"
     for one in slow:
         one.close()
 

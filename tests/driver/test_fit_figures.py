@@ -70,9 +70,15 @@ def test_level_target_has_no_ellipse_of_one_parameter() -> None:
     assert np.allclose(spans, [(level - 0.5, level + 0.5) for level in levels])
 
 
+@pytest.mark.parametrize("freedom", [None, 7, 40])
 @pytest.mark.parametrize("known", [True, False])
-def test_ellipse_is_the_joint_confidence_region(known: bool) -> None:  # noqa: FBT001
+def test_ellipse_is_the_joint_confidence_region(
+    known: bool,  # noqa: FBT001
+    freedom: int | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     fit = fit_with_noise(5.0, "youngs_modulus", "height")
+    monkeypatch.setattr(fit.misfit, "noise_freedom", freedom)
     pair = dataclasses.replace(
         fit,
         names=fit.names[:2],
@@ -86,6 +92,7 @@ def test_ellipse_is_the_joint_confidence_region(known: bool) -> None:  # noqa: F
     units = [size for _, size in pair.display_units.values()]
     points = axes.patches[0].get_xy() * units - pair.estimate
     square = np.einsum("ij,jk,ik->i", points, np.linalg.inv(pair.covariance), points)
-    freedom = pair.degrees_of_freedom
-    quantile = stats.chi2.ppf(0.95, 2) if known else 2 * stats.f.ppf(0.95, 2, freedom)
+    # The region of one parameter with the same freedom is the interval: F with 1 is t squared.
+    freedom = freedom if known else pair.degrees_of_freedom
+    quantile = 2 * stats.f.ppf(0.95, 2, freedom) if freedom else stats.chi2.ppf(0.95, 2)
     np.testing.assert_allclose(square, quantile, rtol=1e-6)

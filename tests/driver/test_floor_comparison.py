@@ -316,7 +316,7 @@ def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:
     low = thud.predict_level(thud.solve(replace(case, drop=thud.Drop(height=0.1))))
     assert low.octave_rating.korean_class
     assert low.requirement is not None
-    assert low.requirement.verdict == "undecided: the source does not conform"
+    assert low.requirement.shown_verdict == "undecided: the source does not conform"
     assert low.class_text == "class not stated: the source does not conform"
     assert "does not conform" in repr(low)
     assert "does not conform" not in repr(conforming)

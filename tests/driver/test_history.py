@@ -22,6 +22,7 @@ from thud.level.levels import get_bands
 from thud.report.ball_history import (
     ACTION,
     YEAR,
+    ControlLimits,
     History,
     _control_limits,
     _trend,
@@ -29,6 +30,7 @@ from thud.report.ball_history import (
 )
 from thud.report.ball_history_figure import draw_history
 from thud.report.contents import FORMAT
+from thud.report.rows import criterion_style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -177,6 +179,25 @@ def test_values_beyond_the_control_limits_are_named() -> None:
     assert "31.5 Hz, dB: two of the last three values" in found.warnings()[0]
     reports[7]["criteria"][0]["value"] = 39.0
     assert not any("two of the last" in warning for warning in found.warnings())
+
+
+@pytest.mark.parametrize(
+    ("distances", "named"),
+    [((2.5, 2.6, -2.5), True), ((-2.5, 2.5, -2.5), True), ((2.5, -2.5, 0.0), False),
+     ((2.5, 0.0, 2.5), True), ((-2.1, -2.1, -2.1), True), ((2.5, 1.9, -2.5), False)],
+)  # fmt: skip
+def test_values_beyond_a_warning_limit_count_on_each_side(
+    distances: tuple[float, float, float],
+    named: bool,  # noqa: FBT001
+) -> None:
+    found = history(count=3)
+    entries = [
+        {**report["criteria"][0], "value": 39.0 + distance}
+        for report, distance in zip(found.reports, distances, strict=True)
+    ]
+    style = criterion_style(entries[0])
+    warnings = found._control_warnings(style, entries, ControlLimits(39.0, 1.0))  # noqa: SLF001
+    assert len(warnings) == named
 
 
 def test_action_limits_are_rarely_passed_by_chance() -> None:

@@ -18,6 +18,7 @@ import thud
 from thud.base.tables import format_rows, wrap
 from thud.cli import main
 from thud.comparison import comparison
+from thud.level.estimate import NORMAL_FACTOR
 from thud.studies import bundled_surrogate, model_assessment
 from thud.studies.bundled_surrogate import FILE, find_unknowns
 from thud.studies.unknowns import STANDARD_BALL, Unknown
@@ -258,16 +259,33 @@ def test_verdict_does_not_depend_on_the_mesh_of_the_case() -> None:
 
 def test_probability_is_an_interval_within_its_bounds() -> None:
     verdict = thud.assess(thud.read_case(FLAGSHIP))
-    wide = replace(verdict, probability=0.22, error=0.45)
+    wide = replace(verdict, probability_range=(0.0, 0.67))
     assert wide.shown_probability == "0 to 67 %"
-    assert replace(verdict, probability=0.9, error=0.3).shown_probability == "60 to 100 %"
+    assert replace(verdict, probability_range=(0.6, 1.0)).shown_probability == "60 to 100 %"
+
+
+@pytest.mark.parametrize(
+    ("inside", "adverse", "favorable"),
+    [(960, 958, 1000), (960, 900, 962), (500, 100, 500), (0, 0, 400), (1000, 1000, 1000)],
+)
+def test_errors_count_on_the_side_that_they_change(
+    inside: int, adverse: int, favorable: int
+) -> None:
+    samples = [np.arange(1000) < count for count in (inside, adverse, favorable)]
+    probability, (low, high) = model_assessment._probability(*samples)  # noqa: SLF001
+    assert probability == inside / 1000
+    sampling = NORMAL_FACTOR * np.sqrt(probability * (1 - probability) / 1000)
+    assert low == pytest.approx(probability - np.hypot(sampling, (inside - adverse) / 1000))
+    assert high == pytest.approx(
+        min(probability + np.hypot(sampling, (favorable - inside) / 1000), 1.0)
+    )
 
 
 def test_wide_probabilities_raise_a_warning() -> None:
     verdict = thud.assess(thud.read_case(FLAGSHIP))
     assert not verdict.warnings
     criteria = list(verdict.criteria)
-    criteria[4] = replace(criteria[4], probability=0.5, error=0.21)
+    criteria[4] = replace(criteria[4], probability_range=(0.29, 0.71))
     errors = {
         model_assessment._SURROGATE: np.full(10, 0.1),  # noqa: SLF001
         model_assessment._NUMERICAL: np.full(10, 0.2),  # noqa: SLF001
@@ -431,7 +449,8 @@ def test_two_damping_laws_of_the_same_ball_have_one_verdict() -> None:
     assert plain == ["does not conform", "conforms"]
     first, second = (thud.assess(case) for case in cases)
     assert first.result == second.result == "undecided by the model"
-    assert abs(first.probability - second.probability) < first.error
+    low, high = first.probability_range
+    assert low < second.probability < high
     page = comparison.compare(cases)
     assert page.rows()[-1][1:3] == ("undecided by the model",) * 2
     assert len({id(verdict) for verdict in page.model_verdicts.values()}) == 1
@@ -448,7 +467,8 @@ def test_verdict_of_direct_drops_is_that_of_a_closed_form() -> None:
     (contact,) = (c for c in verdict.criteria if c.name == "contact_time")
     ends = np.pi**2 * 2.5 / np.array([0.022, 0.018]) ** 2
     expected = (min(ends[1], 8e4) - max(ends[0], 5e4)) / 3e4
-    assert contact.probability == pytest.approx(expected, abs=contact.error + 0.01)
+    low, high = contact.probability_range
+    assert low - 0.01 <= expected <= high + 0.01
     quantiles = 5e4 + np.array([0.975, 0.025]) * 3e4
     np.testing.assert_allclose(
         [contact.low, contact.high], np.pi * np.sqrt(2.5 / quantiles), atol=5e-5
@@ -462,15 +482,15 @@ def test_verdict_of_direct_drops_is_that_of_a_closed_form() -> None:
 
 
 @pytest.mark.parametrize(
-    ("probability", "error", "result"),
-    [(0.96, 0.0, "conforms"), (0.95, 0.0, "conforms"), (0.94, 0.0, "undecided by the model"),
-     (0.96, 0.02, "undecided by the model"), (0.06, 0.0, "undecided by the model"),
-     (0.04, 0.02, "undecided by the model"), (0.04, 0.0, "does not conform")],
+    ("low", "high", "result"),
+    [(0.96, 0.96, "conforms"), (0.95, 1.0, "conforms"), (0.94, 0.94, "undecided by the model"),
+     (0.94, 0.98, "undecided by the model"), (0.06, 0.06, "undecided by the model"),
+     (0.02, 0.06, "undecided by the model"), (0.0, 0.05, "does not conform")],
 )  # fmt: skip
-def test_outcome_needs_95_percent(probability: float, error: float, result: str) -> None:
+def test_outcome_needs_95_percent(low: float, high: float, result: str) -> None:
     verdict = thud.assess(thud.read_case(EXAMPLE))
-    assert replace(verdict, probability=probability, error=error).result == result
-    criterion = replace(verdict.criteria[0], probability=probability, error=error)
+    assert replace(verdict, probability_range=(low, high)).result == result
+    criterion = replace(verdict.criteria[0], probability_range=(low, high))
     assert criterion.result == result
 
 

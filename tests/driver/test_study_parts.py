@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +20,7 @@ from thud.studies import sampling
 from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
 from thud.studies.sensitivity import sobol_indices
-from thud.studies.surrogate_levels import SurrogateLevels, recompute, within_region
+from thud.studies.surrogate_levels import SurrogateLevels, within_region
 from thud.studies.surrogate_training import regress
 from thud.studies.temperature import Temperature, read_temperature
 from thud.studies.trained_surrogate import (
@@ -381,23 +381,6 @@ def test_mark_of_a_map_is_the_ball_of_the_paper_or_the_case(
     assert (name == "paper's ball") == of_paper
 
 
-@dataclass(frozen=True)
-class Target:
-    """What `recompute` takes of a target."""
-
-    case: object
-    misfit: object
-    impact: object
-
-
-@dataclass(frozen=True)
-class Found:
-    """What `recompute` takes of a fit."""
-
-    targets: tuple[Target, ...]
-    warnings: tuple[str, ...]
-
-
 # What `SurrogateLevels` takes of a comparison with levels.
 MISFIT: dict[str, Any] = {
     "kind": "floor", "bands": "octave", "known_noise": True, "indices": np.array([1, 3]),
@@ -407,25 +390,12 @@ MISFIT: dict[str, Any] = {
 
 
 class _Answers:
-    """A surrogate with known errors."""
+    """A surrogate of the force on the floor."""
 
     outputs = {"floor_level": 5, "contact_time": 1, "restitution": 1}  # noqa: RUF012
 
-    @staticmethod
-    def mean_square(name: str) -> np.ndarray:
-        known = {"floor_level": [1e-4, 4e-4, 1e-4, 9e-4, 1e-4], "contact_time": [4e-6]}
-        return np.array(known.get(name, [1e-4]))
 
-
-def test_errors_of_a_surrogate_add_to_the_variances() -> None:
-    found = SurrogateLevels(SimpleNamespace(**MISFIT), _Answers(), thud.Case())  # type: ignore[arg-type]
-    # dB of 20 lg: a relative error of ln 10/20 for each, and one sample of the contact time.
-    relative = np.log(10) / 20
-    expected = np.array([
-        0.02, 0.03, np.hypot(0.02 * 2e-3 * relative, 1 / 44100), 0.8 * 1e-2 * relative,
-    ])  # fmt: skip
-    assert found.model_error == pytest.approx(expected)
-    assert found.deviation == pytest.approx(np.sqrt(MISFIT["deviation"] ** 2 + expected**2))
+def test_surrogates_without_the_force_are_refused() -> None:
     with pytest.raises(thud.InputError, match="elastic_level"):
         SurrogateLevels(
             SimpleNamespace(**{**MISFIT, "kind": "elastic"}),  # type: ignore[arg-type]
@@ -453,35 +423,6 @@ def test_search_stays_within_the_region(
     else:
         found = within_region(entry, answers)  # type: ignore[arg-type]
         assert (found.low, found.high) == found.spread == expected
-
-
-@pytest.mark.parametrize(
-    ("off", "noise", "count"),
-    [(0.0, True, 1), (0.039, True, 1), (0.041, True, 2), (0.041, False, 1), (0.0, False, 0)],
-)
-def test_result_that_the_surrogate_misses_is_doubted(
-    monkeypatch: pytest.MonkeyPatch,
-    off: float,
-    noise: bool,  # noqa: FBT001 - one of two cases
-    count: int,
-) -> None:
-    """More than four of its standard errors; and its share of the variances, in per cent."""
-    misfit = SimpleNamespace(
-        model_error=np.array([0.01, 0.0, 0.03]), deviation=np.array([0.05, 1.0, 0.1]),
-        known_noise=noise,
-        values=lambda impact: np.array([off, 5.0, 0.0]) if impact == "model" else np.zeros(3),
-    )  # fmt: skip
-    monkeypatch.setattr("thud.studies.surrogate_levels.compute", lambda _: "model")
-    target = Target(case=None, misfit=misfit, impact="answer")
-    found = recompute(Found((target,), ("before",)))  # type: ignore[arg-type]
-    assert found.targets[0].impact == "model"
-    assert found.warnings[0] == "before"
-    assert len(found.warnings) == 1 + count
-    if noise:
-        # (0.03/0.1)**2 is the largest.
-        assert "9 %" in found.warnings[1]
-    if off > 0.04:
-        assert f"{off / 0.01:.2g} " in found.warnings[-1]
 
 
 def answering() -> Surrogate:

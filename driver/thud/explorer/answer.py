@@ -12,7 +12,13 @@ from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse
 from thud.case.case import tables_case
 from thud.case.keys import humanize
-from thud.explorer.criteria import criterion_facts, model_headline, room_headline, unknowns_text
+from thud.explorer.criteria import (
+    RESULTS,
+    criterion_facts,
+    model_headline,
+    room_headline,
+    unknowns_text,
+)
 from thud.explorer.messages import in_words
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.motion import motion_of
@@ -48,6 +54,8 @@ SNAPSHOT_INTERVAL = 1e-3
 MAX_SAMPLES = 200_000
 # Maximum estimated duration of a computation while a slider moves, s.
 MAX_QUICK_TIME = 0.1
+# Peaks of the force on the floor and of the elastic force.
+PEAKS = "peak_force", "peak_elastic_force"
 # Maximum density of a wall, kg/m3: that of the densest metal, osmium.
 MAX_DENSITY = 22_600.0
 
@@ -112,11 +120,17 @@ def answer_case(case: Case) -> Answer:
     answer["headline"] = model_headline(case, assessed, verdict)
     if verdict:
         answer["model_verdict"] = {
-            "result": verdict.result, "reason": verdict.reason, "unknowns": unknowns_text(verdict),
-        }  # fmt: skip
+            "result": RESULTS[verdict.result],
+            "reason": verdict.reason,
+            "unknowns": unknowns_text(verdict),
+        }
         answer["warnings"] += verdict.warnings
         for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
+            scale = criterion.criterion.quantity.display_scale
             entry["range"] = criterion.range
+            if criterion.range:
+                entry["ends"] = [scale * criterion.low, scale * criterion.high]
+            entry["result"] = RESULTS[criterion.result]
     on_floor = impact.on_floor
     answer["motion"] = motion_of(on_floor or impact)
     answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
@@ -148,21 +162,23 @@ def common_answer(
             },
         },
         "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
-        "conforms": bool(verdict.conforms),
-        "verdict": verdict.result,
+        "result": RESULTS[verdict.result],
         "numbers": _numbers(source),
         "warnings": [],
     }
 
 
 def _numbers(source: ImpactResult) -> list[list[Any]]:
-    """Return title, value and unit of known quantities, with the peak of the assessed force."""
-    other = "peak_force" if source.assessed_force() == "elastic" else "peak_elastic_force"
+    """Return title, value, unit and name of known quantities, with the peak of the force."""
+    other = PEAKS[source.assessed_force() == "floor"]
     rows: list[list[Any]] = []
     for name in SAMPLE_QUANTITIES:
         value, quantity = source.quantity(name), QUANTITIES[name]
         if name != other and not math.isnan(value):
-            rows.append([quantity.title, value * quantity.display_scale, quantity.display_unit])
+            value *= quantity.display_scale
+            # One name for the peak of the force that is assessed.
+            code = "peak" if name in PEAKS else name
+            rows.append([quantity.title, value, quantity.display_unit, code])
     return rows
 
 
@@ -176,14 +192,14 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
-        "band": bool(name),
+        "band": band.replace("_", ".") if name else "",
         "unit": unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
         "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
         "uncertainty_name": criterion.uncertainty_name,
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
-        "verdict": criterion.result,
+        "result": RESULTS[criterion.result],
         **criterion_facts(criterion.name, source),
     }
 

@@ -12,6 +12,7 @@ from thud.case.keys import humanize
 from thud.explorer.form import fields_by_key
 from thud.explorer.messages import lower
 from thud.level.assessment import VERDICTS
+from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
 from thud.studies.bundled_surrogate import reason_without_defaults
 from thud.studies.model_verdict import OUTCOMES
@@ -25,17 +26,17 @@ if TYPE_CHECKING:
     from thud.level.assessment import Criterion, Verdict
     from thud.studies.model_verdict import ModelCriterion, ModelVerdict
 
-# Results of a headline by that of a verdict, of a model or of a requirement.
+# Code of the result of a verdict, of a model or of a requirement; the page reads no words.
 RESULTS = {
     VERDICTS[0]: "conforms",
-    VERDICTS[1]: "fails",
+    VERDICTS[1]: "does_not_conform",
     OUTCOMES[2]: "undecided",
     "met": "conforms",
-    "not met": "fails",
+    "not met": "does_not_conform",
     VERDICTS[2]: "undecided",
 }
-# Words of the results.
-WORDS = {"conforms": VERDICTS[0], "fails": VERDICTS[1], "undecided": VERDICTS[2]}
+# Words of the codes.
+WORDS = dict(zip(("conforms", "does_not_conform", "undecided"), VERDICTS, strict=True))
 # Bands of the ratings of a room.
 BANDS: dict[RoomRequiredRating, str] = {
     "octaves": "octaves",
@@ -82,11 +83,14 @@ def criterion_facts(name: str, source: LimitsSource) -> dict[str, str]:
     }
 
 
-def recording_headline(verdict: Verdict, excluded: str, *, is_stated: bool) -> dict[str, str]:
-    """Return text, result and detail of the verdict on a recording.
+def recording_headline(
+    verdict: Verdict, shown: Mapping[str, str], excluded: str, *, is_stated: bool
+) -> dict[str, str]:
+    """Return the headline of the verdict on a recording, see `_headline`.
 
-    The detail of an undecided level names the largest contribution to its uncertainty; `excluded`
-    is a sentence on what the uncertainty lacks, and `is_stated` whether the source is stated.
+    `shown` are values with uncertainties by the name of a criterion. The detail of an undecided
+    level names the largest contribution to its uncertainty; `excluded` is a sentence on what the
+    uncertainty lacks, and `is_stated` whether the source is stated.
     """
     result = RESULTS[verdict.result]
     parts = [excluded, _standard(verdict)]
@@ -96,7 +100,7 @@ def recording_headline(verdict: Verdict, excluded: str, *, is_stated: bool) -> d
     if not is_stated:
         parts.append("The source is not stated: these limits are assumed.")
     detail = " ".join(filter(None, parts))
-    return _headline(verdict, result, WORDS[result], detail)
+    return _headline(verdict, WORDS[result], detail, shown)
 
 
 def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
@@ -111,14 +115,14 @@ def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
 def model_headline(
     case: Case, verdict: Verdict, ranges: ModelVerdict | None = None
 ) -> dict[str, str]:
-    """Return text, result and detail of the verdict on the source of a case.
+    """Return the headline of the verdict on the source of a case, see `_headline`.
 
     The verdict over what is not known, `ranges`, goes before that of the values of the model.
     """
     if ranges is None:
         detail = f"{_without_ranges(case)} {_standard(verdict)}"
         words = f"{WORDS[RESULTS[verdict.result]]} by this model"
-        return _headline(verdict, RESULTS[verdict.result], words, detail)
+        return _headline(verdict, words, detail)
     result = RESULTS[ranges.result]
     names = [_label(entry.key) for entry in ranges.unknowns]
     detail = (
@@ -129,18 +133,26 @@ def model_headline(
     entries = [entry for entry in ranges.criteria if entry.result == ranges.result]
     causes = {entry.criterion.quantity.title: _range_text(entry) for entry in entries}
     if result == "conforms":
-        return _headline(verdict, result, words, detail)
-    return {"text": f"{words}: {_listed(causes)}", "result": result, "detail": detail}
+        return _texts(result, words, f"{_closest(verdict)} {detail}")
+    return _texts(result, words, detail, *_listed(causes))
 
 
-def _headline(verdict: Verdict, result: str, words: str, detail: str) -> dict[str, str]:
+def _headline(
+    verdict: Verdict, words: str, detail: str, shown: Mapping[str, str] | None = None
+) -> dict[str, str]:
     """Return the headline of a verdict by its values, with their causes or the closest limit."""
+    result = RESULTS[verdict.result]
     if result == "conforms":
-        return {"text": words, "result": result, "detail": f"{_closest(verdict)} {detail}"}
+        return _texts(result, words, f"{_closest(verdict)} {detail}")
     entries = [entry for entry in verdict.criteria if entry.result == verdict.result]
-    causes = {e.quantity.title: _cause(e) for e in entries if not math.isnan(e.value)}
+    causes = {e.quantity.title: _cause(e, shown or {}) for e in entries if not math.isnan(e.value)}
     unknown = [entry.quantity.title for entry in entries if math.isnan(entry.value)]
-    return {"text": f"{words}: {_listed(causes, unknown)}", "result": result, "detail": detail}
+    return _texts(result, words, detail, *_listed(causes, unknown))
+
+
+def _texts(result: str, words: str, detail: str, why: str = "", also: str = "") -> dict[str, str]:
+    """Return a headline: code of the result, words, causes, what narrow screens omit, detail."""
+    return {"result": result, "words": words, "why": why, "also": also, "detail": detail}
 
 
 def _standard(verdict: Verdict) -> str:
@@ -183,35 +195,39 @@ def unknowns_text(ranges: ModelVerdict) -> str:
 
 
 def room_headline(prediction: RoomPrediction) -> dict[str, str]:
-    """Return text, result and detail of the level in a room; with a requirement, of its rating.
+    """Return the headline of the level in a room; with a requirement, of its rating.
 
-    The text names the bands of the rating, as ratings of other bands differ.
+    It names the bands of the rating, as ratings of other bands differ.
     """
     required = prediction.requirement
     name = required.rating if required else "thirds"
     title = RATINGS[name] if prediction.is_ball else f"A-weighted level ({name})"
     if required:
         # A source that does not conform is named after the verdict.
-        result = RESULTS[required.verdict.partition(":")[0]]
-        text, parts = required.shown, [f"{title}, required {required.required:g} dB"]
-        if required.verdict.startswith("undecided:"):
-            parts.append(required.verdict)
+        result, words = RESULTS[required.verdict], f"{required.verdict}: "
+        level, interval = required.level, required.interval
+        parts = [f"{title}, required {required.required:g} dB"]
+        if not required.conforms:
+            parts.append(required.shown_verdict)
         parts.append(f"{prediction.rated_name}{prediction.standards[0]} {prediction.rated_text}")
     else:
-        result, text, parts = "level", prediction.rated_text, [f"{title} with its range"]
+        result, words, parts = "level", "", [f"{title} with its range"]
+        level, interval = prediction.rated, prediction.interval
     if prediction.class_text:
         parts.append(f"KS F 2863-2: {prediction.class_text}")
-    return {"text": text, "result": result, "bands": BANDS[name], "detail": "; ".join(parts)}
+    mean, ends = level_texts(level, interval)
+    return _texts(result, f"{words}{mean}", "; ".join(parts), f" {ends}, {BANDS[name]}")
 
 
-def _listed(causes: Mapping[str, str], unknown: Sequence[str] = ()) -> str:
-    """Return the first causes, the titles of the others, and those of unknown quantities."""
+def _listed(causes: Mapping[str, str], unknown: Sequence[str] = ()) -> tuple[str, str]:
+    """Return the first causes; and the titles of the others, and those of unknown quantities."""
     parts = list(causes.values())[:MAX_NAMED]
-    if rest := list(causes)[MAX_NAMED:]:
-        parts.append(f"also {_joined(rest)}")
-    if unknown:
-        parts.append(f"{_joined(unknown)} not known")
-    return "; ".join(parts)
+    rest = [f"also {_joined(names)}"] if (names := list(causes)[MAX_NAMED:]) else []
+    missing = [f"{_joined(unknown)} not known"] if unknown else []
+    if not rest:
+        parts, missing = [*parts, *missing], []
+    also = "".join(f"; {text}" for text in (*rest, *missing))
+    return f": {'; '.join(parts)}", also
 
 
 def _joined(names: Sequence[str]) -> str:
@@ -226,7 +242,7 @@ def _closest(verdict: Verdict) -> str:
     return f"Closest to a limit: {closest.quantity.title}, {closest.margin:.2f} dB."
 
 
-def _cause(criterion: Criterion) -> str:
+def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
     """Return name, value and limit of a criterion that is not met or not decided."""
     quantity = criterion.quantity
     value, expanded = criterion.value, criterion.estimate.expanded
@@ -234,11 +250,12 @@ def _cause(criterion: Criterion) -> str:
         is_low = value < criterion.lower
         limit = criterion.lower if is_low else criterion.upper
         word = "below" if is_low else "above"
-        shown = _shown(criterion, value)
+        text = _shown(criterion, value)
         # A value close to its limit has all decimals.
         if _number(criterion, value) == _number(criterion, limit):
-            shown = f"{quantity.show(value)} {quantity.display_unit}".rstrip()
-        return f"{quantity.title} {shown}, {word} {limit * quantity.display_scale:g}"
+            text = f"{quantity.show(value)} {quantity.display_unit}".rstrip()
+        text = shown.get(criterion.name, text)
+        return f"{quantity.title} {text}, {word} {limit * quantity.display_scale:g}"
     if criterion.result_if_stated != criterion.result:
         missing = " and ".join(criterion.estimate.not_stated)
         return f"{quantity.title} {_shown(criterion, value)}, uncertainty of {missing} not stated"

@@ -149,6 +149,9 @@ def _field(key: Key, default: object) -> dict[str, Any]:
             "step": 1 if is_whole else _step(key.unit, value or 0.0, *ends),
             "slider": _slider(value or 0.0, *ends, whole=is_whole),
         }
+        if zero := re.search(r"\b0: ([^;,]+)", meaning):
+            # Such a zero, as "none", is an empty field without a slider.
+            field["zero"] = None if field["slider"] else zero[1]
     return field
 
 

@@ -124,7 +124,8 @@ def improve(values: Values) -> Work:
     if changes:
         return {"changes": changes, "none": "", "note": NOTE}
     labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
-    reason = model_headline(case, verdict)["text"]
+    headline = model_headline(case, verdict)
+    reason = "".join(headline[part] for part in ("words", "why", "also"))
     none = (
         f"No change of a single parameter makes the source conform: tried {labels}, each from half "
         f"to twice its value in steps of {100 * STEP:g} %. It {reason}."
@@ -148,7 +149,7 @@ def _improve_floor(case: Case) -> Work:
         refuse("&room: required = 0: the room has no requirement", "the required level, dB")
     if required.verdict == "met":
         return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
-    if required.verdict.startswith("undecided:"):
+    if not required.conforms:
         reason = " ".join(prediction.source_warnings)
         none = f"No floor meets the requirement with this source: {reason}. Choose another source."
         return {"changes": [], "none": none, "note": ""}
@@ -194,7 +195,7 @@ def _floor_changes(
     start = float(getattr(case.floor, name))
     _, high = limits(find_key(name, key_owners(case))[0], case)
     steps = range(1, FLOOR_STEPS + 1)
-    if name.endswith("stiffness"):
+    if name == "layer_stiffness":
         tried = [start * (1 - STIFFNESS_STEP) ** i for i in steps]
     else:
         tried = [start + THICKNESS_STEP * i for i in steps if THICKNESS_STEP * i <= start]

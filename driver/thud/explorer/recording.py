@@ -53,7 +53,14 @@ def answer_recording(
         entry["uncertainty_text"] = expanded_text(row)
         entry["mark"] = INCOMPLETE if row["excluded"] else ""
     excluded = excluded_text(rows).replace(f"{INCOMPLETE} U", f"{INCOMPLETE} The uncertainty")
-    answer["headline"] = recording_headline(verdict, excluded, is_stated="source" in table)
+    shown = {
+        criterion.name: " ".join(filter(None, (
+            entry["value_text"], "±", entry["uncertainty_text"], entry["mark"], entry["unit"]
+        )))
+        for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True)
+        if entry["uncertainty"]
+    }  # fmt: skip
+    answer["headline"] = recording_headline(verdict, shown, excluded, is_stated="source" in table)
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording, verdict)
     # The page shows the name of a single file next to its warnings.

@@ -177,7 +177,7 @@ def _required(prediction: RoomPrediction) -> str:
     required = prediction.requirement
     if required is None:
         return ""
-    return f"{required.required:g} ({required.rating}): {required.verdict.partition(':')[0]}"
+    return f"{required.required:g} ({required.rating}): {required.verdict}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:

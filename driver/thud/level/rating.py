@@ -91,8 +91,8 @@ class Requirement:
     conforms : bool
         Whether the source conforms to the standards.
     verdict : str
-        ``"met"``, ``"not met"``, or ``"undecided"`` if the interval, rounded, holds both, or, with
-        the reason, if the source does not conform.
+        ``"met"``, ``"not met"``, or ``"undecided"`` if the interval, rounded, holds both, or if the
+        source does not conform.
     """
 
     rating: RoomRequiredRating
@@ -103,16 +103,17 @@ class Requirement:
     conforms: bool = True
 
     @property
-    def verdict(
-        self,
-    ) -> Literal["met", "not met", "undecided", "undecided: the source does not conform"]:
+    def verdict(self) -> Literal["met", "not met", "undecided"]:
         """Whether all levels of the interval, rounded, are at most the required one."""
-        if not self.conforms:
-            return "undecided: the source does not conform"
         low, high = meets(self.interval, self.required)
-        if high:
+        if high and self.conforms:
             return "met"
-        return "undecided" if low else "not met"
+        return "undecided" if low or not self.conforms else "not met"
+
+    @property
+    def shown_verdict(self) -> str:
+        """Verdict, with the reason if the source does not conform."""
+        return self.verdict if self.conforms else f"{self.verdict}: the source does not conform"
 
     @property
     def shown(self) -> str:
@@ -125,14 +126,19 @@ class Requirement:
         title = RATINGS[self.rating] if is_ball else f"A-weighted level ({self.rating})"
         return (
             f"{title}: {self.shown}, "
-            f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.verdict}"
+            f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.shown_verdict}"
         )
 
 
 def range_text(level: float, interval: tuple[float, float]) -> str:
     """Return a level with its interval, rounded, such as ``"49 dB (46 to 51)"``."""
+    return " ".join(level_texts(level, interval))
+
+
+def level_texts(level: float, interval: tuple[float, float]) -> tuple[str, str]:
+    """Return a level and its interval, rounded, such as ``"49 dB"`` and ``"(46 to 51)"``."""
     low, high = map(rounded, interval)
-    return f"{rounded(level)} dB ({low} to {high})"
+    return f"{rounded(level)} dB", f"({low} to {high})"
 
 
 def rounded(level: float) -> int:

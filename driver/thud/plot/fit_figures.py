@@ -212,11 +212,11 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
 
 
 def _squared_radius(fit: Fit) -> float:
-    """Return the quantile of chi-square, or twice that of Fisher's F if the noise is estimated."""
+    """Return twice the quantile of F where the intervals use Student's t, else of chi-square."""
     logarithm = np.log1p(-fit.confidence)
-    if fit.known_noise:
+    freedom = fit.interval_freedom
+    if freedom is None:
         return float(-2 * logarithm)
-    freedom = fit.degrees_of_freedom
     return float(freedom * np.expm1(-2 * logarithm / freedom))
 
 

@@ -247,7 +247,8 @@ class History:
             warnings.append(
                 f"{style.title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
             )
-        if abs(limits.beyond(values[-3:], WARNING).sum()) > 1:
+        sides = limits.beyond(values[-3:], WARNING).tolist()
+        if max(sides.count(1.0), sides.count(-1.0)) > 1:
             warnings.append(
                 f"{style.title}: two of the last three values lie beyond one warning limit "
                 f"({WARNING:g} σ)"

@@ -26,7 +26,7 @@ from thud.studies.fitting.read_target import Target, read_target
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
-from thud.studies.surrogate_levels import recompute, surrogate_misfit, within_region
+from thud.studies.surrogate_levels import surrogate_misfit, within_region
 from thud.studies.trained_surrogate import Surrogate, get_surrogate, read_plan
 
 if TYPE_CHECKING:
@@ -98,8 +98,8 @@ def fit(  # noqa: PLR0913 - options of a search
         What is not known of the ball or the floor of a force: intervals include what the force does
         not exclude; none: the case is trusted.
     surrogate
-        A surrogate, or the path of its file, that predicts the levels of the search instead of the
-        model. Its errors add to the uncertainties of the target; the model computes the result.
+        A surrogate, or the path of its file, that predicts levels instead of the model until the
+        search has converged; from there the model continues, and all results are the model's.
     progress
         Show the number of computed impacts.
 
@@ -184,12 +184,18 @@ def _search(
     *,
     progress: bool,
 ) -> Fit:
-    if surrogate is None:
-        pairs = [(_with_mesh(case, misfit, ranges), misfit) for case, misfit in pairs]
-        return search(pairs, ranges, options, progress=progress)
-    pairs = _with_surrogate(pairs, surrogate, ranges)
-    inside = [within_region(entry, surrogate) for entry in ranges]
-    return recompute(search(pairs, inside, options, progress=progress))
+    if surrogate is not None:
+        predicted = _with_surrogate(pairs, surrogate, ranges)
+        inside = [within_region(entry, surrogate) for entry in ranges]
+        values = search(predicted, inside, options, progress=progress).values
+        # Rounding may move a value at a limit beyond it.
+        ranges = [
+            replace(entry, start=min(max(values[entry.name], entry.low), entry.high))
+            for entry in ranges
+        ]
+        options = {**options, "starts": 1}
+    pairs = [(_with_mesh(case, misfit, ranges), misfit) for case, misfit in pairs]
+    return search(pairs, ranges, options, progress=progress)
 
 
 def _with_mesh(case: Case, misfit: Misfit, ranges: list[Range]) -> Case:

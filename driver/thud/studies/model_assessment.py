@@ -190,12 +190,13 @@ def _warnings(criteria: tuple[ModelCriterion, ...], sizes: dict[str, Values]) ->
 
 def _probability(
     inside: NDArray[np.bool_], adverse: NDArray[np.bool_], favorable: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """Return the fraction of samples that conform, and its error (95 %)."""
+) -> tuple[float, tuple[float, float]]:
+    """Return the fraction of samples that conform, and its interval (95 %)."""
     probability = float(inside.mean())
     sampling = NORMAL_FACTOR * math.sqrt(probability * (1 - probability) / len(inside))
-    systematic = float(favorable.mean() - adverse.mean()) / 2
-    return probability, math.hypot(sampling, systematic)
+    low = probability - math.hypot(sampling, max(probability - float(adverse.mean()), 0.0))
+    high = probability + math.hypot(sampling, max(float(favorable.mean()) - probability, 0.0))
+    return probability, (max(low, 0.0), min(high, 1.0))
 
 
 def _number(case: Case, key: str) -> float:

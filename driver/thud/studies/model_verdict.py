@@ -38,8 +38,9 @@ class ModelCriterion(Displayed):
         Range that holds at least 95 % of the distribution, with the errors of surrogate and drops.
     probability : float
         Probability that the source meets the criterion.
-    error : float
-        Error of the probability (95 %): samples, surrogate, and numerical error of the drops.
+    probability_range : tuple of float
+        Its interval (95 %): samples, surrogate, and numerical error of the drops, by their effects
+        on either side.
     indices : dict of str to float
         Total Sobol index of each unknown; empty if the value does not vary.
     """
@@ -48,18 +49,13 @@ class ModelCriterion(Displayed):
     low: float
     high: float
     probability: float
-    error: float
+    probability_range: tuple[float, float]
     indices: dict[str, float]
 
     @property
     def name(self) -> str:
         """Name of the criterion."""
         return self.criterion.name
-
-    @property
-    def probability_range(self) -> tuple[float, float]:
-        """Interval of the probability (95 %)."""
-        return _interval(self.probability, self.error)
 
     @property
     def result(self) -> str:
@@ -121,8 +117,8 @@ class ModelVerdict(Displayed):
         Keys that are not known, with their ranges and reasons.
     criteria : tuple of ModelCriterion
         Octave levels, contact time, restitution, number of peaks, mass, drop height.
-    probability, error : float
-        Probability that the source meets all criteria, and its error (95 %).
+    probability, probability_range : float and tuple of float
+        Probability that the source meets all criteria, and its interval (95 %).
     method : str
         How the distribution was computed.
     warnings : tuple of str
@@ -133,14 +129,9 @@ class ModelVerdict(Displayed):
     unknowns: tuple[Unknown, ...]
     criteria: tuple[ModelCriterion, ...]
     probability: float
-    error: float
+    probability_range: tuple[float, float]
     method: str
     warnings: tuple[str, ...] = ()
-
-    @property
-    def probability_range(self) -> tuple[float, float]:
-        """Interval of the probability (95 %)."""
-        return _interval(self.probability, self.error)
 
     @property
     def result(self) -> str:
@@ -150,8 +141,8 @@ class ModelVerdict(Displayed):
     @property
     def identity(self) -> tuple[object, ...]:
         """Everything but the values of the case, to find equal verdicts."""
-        results = ((c.low, c.high, c.probability, c.error) for c in self.criteria)
-        return self.source, self.unknowns, self.method, self.probability, self.error, *results
+        results = ((c.low, c.high, c.probability_range) for c in self.criteria)
+        return self.source, self.unknowns, self.method, self.probability_range, *results
 
     @property
     def decisive(self) -> ModelCriterion:
@@ -235,10 +226,6 @@ class ModelVerdict(Displayed):
             label = f"{entry.key}, {unit}".removesuffix(", ")
             rows.append((label, low, high, f"{deviation:g}" if deviation else "", entry.reason))
         return rows
-
-
-def _interval(probability: float, error: float) -> tuple[float, float]:
-    return max(probability - error, 0.0), min(probability + error, 1.0)
 
 
 def _outcome(low: float, high: float) -> str:

@@ -9,9 +9,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
-from thud.base.immutable import freeze
 from thud.case.keys import value_in
-from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
 
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
-    from thud.studies.fitting.fit_result import Fit
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
     from thud.studies.trained_surrogate import Surrogate
@@ -34,10 +31,7 @@ class PredictedLevels:
 
 
 class SurrogateLevels(LevelMisfit):
-    """Misfit between a target and the levels that a surrogate predicts.
-
-    The mean squares of its held-out errors are added to the variances of the target, if known.
-    """
+    """Misfit between a target and the levels that a surrogate predicts."""
 
     def __init__(self, misfit: LevelMisfit, surrogate: Surrogate, case: Case) -> None:
         vars(self).update(vars(misfit))
@@ -47,17 +41,6 @@ class SurrogateLevels(LevelMisfit):
             self.name = self.name.replace("_", f"_{self.bands}_")
         if self.name not in surrogate.outputs:
             refuse(f"the surrogate has no {self.name}", f"{', '.join(surrogate.outputs)}")
-        level_errors = np.sqrt(surrogate.mean_square(self.name))[self.indices]
-        ratios = [np.sqrt(surrogate.mean_square(n)[0]) * np.log(10) / 20 for n in self.extra]
-        other_targets = self.target[len(level_errors) :]
-        other_errors = [np.array([r * s]) for r, s in zip(ratios, other_targets, strict=True)]
-        for i, quantity in enumerate(self.extra):
-            if quantity == "contact_time":
-                # Many drops have a contact time rounded to the next sample.
-                other_errors[i] = np.hypot(other_errors[i], 1 / case.sampling.sample_rate)
-        self.model_error = freeze(np.concatenate([level_errors, *other_errors]))
-        if self.known_noise:
-            self.deviation = freeze(np.hypot(self.deviation, self.model_error))
 
     def solve(self, case: Case) -> Impact:
         """Return the prediction for a case in place of an impact; only `values` reads it."""
@@ -100,36 +83,3 @@ def within_region(entry: Range, surrogate: Surrogate) -> Range:
         )
     spread = max(low, entry.spread[0]), min(high, entry.spread[1])
     return replace(entry, low=low, high=high, spread=spread)
-
-
-def recompute(fit: Fit) -> Fit:
-    """Return a fit with the impacts of the model, and warnings if the surrogate differs."""
-    targets = []
-    max_deviation = max_fraction = 0.0
-    for target in fit.targets:
-        misfit = cast("SurrogateLevels", target.misfit)
-        impact = compute(target.case)
-        deviation = np.abs(misfit.values(impact) - misfit.values(target.impact))
-        # Quantities that are equal in all training drops have no error.
-        varies = misfit.model_error > 0
-        max_deviation = max(
-            max_deviation, float((deviation[varies] / misfit.model_error[varies]).max(initial=0.0))
-        )
-        if misfit.known_noise:
-            max_fraction = max(
-                max_fraction, float((misfit.model_error / misfit.deviation).max() ** 2)
-            )
-        targets.append(replace(target, impact=impact))
-    messages = []
-    if max_fraction:
-        messages.append(
-            f"the errors of the surrogate are up to {100 * max_fraction:.2g} % of the variances of "
-            "the residuals"
-        )
-    # Exceeded by 1 in 15 000 normal errors; held-out errors have longer tails.
-    if max_deviation > 4:  # noqa: PLR2004
-        messages.append(
-            f"at the result the model differs from the surrogate by {max_deviation:.2g} standard "
-            "deviations of the surrogate's errors"
-        )
-    return replace(fit, targets=tuple(targets), warnings=(*fit.warnings, *messages))

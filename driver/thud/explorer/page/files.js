@@ -101,7 +101,7 @@ th, td { border-bottom: 1px solid #dcdfe2; padding: .2rem .9rem .2rem 0; text-al
 .scroll { overflow-x: auto; background: linear-gradient(to left, #fff 50%, transparent) right / 2.4rem 100% no-repeat local, linear-gradient(to left, #83898f, transparent) right / .8rem 100% no-repeat scroll; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); gap: 0 1rem; }
 figure { margin: 1rem 0; break-inside: avoid; } figcaption { font-weight: 600; } figure svg { width: 100%; height: auto; } small { color: #565c62; } td small { display: block; } .curve { stroke-width: 2; }
-.conforms { color: #00583f; } .fails { color: #9a2c00; } .undecided { color: #6b4a00; }`;
+.conforms { color: #00583f; } .does_not_conform { color: #9a2c00; } .undecided { color: #6b4a00; }`;
 
 /** Return a page of its own with headline, inputs, criteria, plots and warnings of all variants. */
 export function pageOf(variants, version) {

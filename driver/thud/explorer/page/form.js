@@ -401,7 +401,7 @@ function listInput(field, id, onInput, handlers) {
 function numberInput(field, id, onInput, handlers) {
   let current = scaled(valueOf(field), -field.power);
   // A zero that is not a number, such as "none", is an empty field.
-  const [, zero] = field.slider ? [] : field.help.match(/\b0: ([^;,]+)/) ?? [];
+  const { zero } = field;
   const textOf = (value) => (zero && value === 0 ? "" : String(Number(value.toPrecision(DIGITS))));
   const number = element("input", { id, type: "text", inputmode: "decimal", value: textOf(current), placeholder: zero, class: `number${zero ? " open" : ""}` });
   const take = (entered) => {

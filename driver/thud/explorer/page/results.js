@@ -2,36 +2,28 @@
 import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
 import { interpolate, plot, swatch } from "./plot.js";
 
-const RESULTS = { conforms: "conforms", undecided: "undecided" };
 const UNCERTAINTIES = { "numerical error": "numerical error of the computation", "uncertainty (95 %)": "measurement uncertainty (95 %)" };
-// Verdicts on a source, and on the required level of a room, by the result of a headline.
-export const SOURCE_VERDICTS = { conforms: "conforms", fails: "does not conform", undecided: "undecided" };
-const ROOM_VERDICTS = { conforms: "met", fails: "not met", undecided: "undecided" };
-const SIGNS = { conforms: "✓", fails: "✕", undecided: "?", level: "" };
+// Verdicts on a source, and signs, by the code of the result.
+export const SOURCE_VERDICTS = { conforms: "conforms", does_not_conform: "does not conform", undecided: "undecided" };
+const SIGNS = { conforms: "✓", does_not_conform: "✕", undecided: "?", level: "" };
 // Uncertainties that are smaller are not drawn, dB.
 const MIN_UNCERTAINTY = 0.02;
 
-/** Return the headline of an answer: the verdict on a required level, and uncertainties of the measured values in it. */
-export function headlineText({ headline: { text, result, bands }, room, criteria }) {
-  if (room) return `${ROOM_VERDICTS[result] ? `${ROOM_VERDICTS[result]}: ` : ""}${text}, ${bands}`;
-  return criteria.filter(({ uncertainty, value_text: measured }) => uncertainty && measured).reduce((shown, criterion) => shown.replace(
-    new RegExp(`((?:^|: |; )${criterion.name}) -?[\\d.]+(?= ${criterion.unit})`, "i"), `$1 ${valueTextOf(criterion)} ± ${uncertaintyText(criterion)}`), text);
-}
+/** Return the headline of an answer as a text. */
+export const headlineText = ({ headline: { words, why, also } }) => `${words}${why}${also}`;
 
 const valueTextOf = (criterion) => criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
 const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${text ?? Number(uncertainty.toPrecision(2))}${mark ? ` ${mark}` : ""}`;
 
 /** Show the answer to the question; `variant` has a label and an answer. */
 function showHeadline({ label, answer }) {
-  const { result, detail } = answer.headline;
-  const [, first, rest] = headlineText(answer).match(answer.room ? /^([^(]+)(.*)$/s : /^([^:(]+)(.*)$/s);
   // Narrow screens leave further criteria to the table.
-  const [, why, also] = rest.replace(/^\(/, " (").match(/^(.*?)((?:; also .*)?)$/s);
+  const { result, words, why, also, detail } = answer.headline;
   byId("verdict").className = result;
   byId("verdict").replaceChildren(
     ...(SIGNS[result] ? [element("span", { class: "sign", "aria-hidden": "true" }, SIGNS[result])] : []),
     element("span", { class: "subject" }, `${label} `),
-    element("b", {}, capitalize(first.trim())), element("span", { class: "why" }, why, element("span", { class: "wide" }, also)));
+    element("b", {}, capitalize(words)), element("span", { class: "why" }, why, element("span", { class: "wide" }, also)));
   byId("detail").replaceChildren(...withSymbols(detail ?? ""));
   // Narrow screens name the case here.
   if (SIGNS[result]) byId("detail").dataset.subject = label;
@@ -48,19 +40,8 @@ export function showWarnings({ answer: { warnings, open_warnings: open = [] } })
 }
 
 /** Return the low and high end of a criterion: the range of a model or the uncertainty of a recording. */
-function endsOf({ value, uncertainty, range }) {
-  const ends = range?.match(/^(−?[\d.]+) to (−?[\d.]+)/);
-  if (ends) return ends.slice(1).map((end) => Number(end.replace("−", "-")));
-  return uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : [];
-}
-
-/** Return the result of a criterion; with the range of a model, that over the range. */
-function resultOf(criterion) {
-  const { lower, upper, range, verdict } = criterion;
-  const [low, high] = range ? endsOf(criterion) : [];
-  if (low === undefined) return RESULTS[verdict] ?? "fails";
-  if (low >= lower && high <= upper) return "conforms";
-  return high < lower || low > upper ? "fails" : "undecided";
+function endsOf({ value, uncertainty, ends }) {
+  return ends ?? (uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : []);
 }
 
 /** Show force and levels of variants; options: third octaves, and differences to the first variant. */
@@ -85,7 +66,7 @@ function showForces(variants, { thirds, differences }) {
     x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
     y: { title: isDifference ? `Difference to ${first.label}` : "Level", unit: "dB", reference: isDifference ? "" : " re 1 N", zero: isDifference },
     limits: thirds || isDifference ? undefined : octaves.map((criterion) => [criterion.lower, criterion.upper]),
-    results: octaves.map(resultOf),
+    results: octaves.map(({ result }) => result),
   });
   const curves = shown.flatMap((variant) => {
     const { force, floor } = variant.answer;
@@ -145,7 +126,7 @@ function marginOf(criterion) {
 
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
-  if (criterion.verdict === "undecided") return criterion.verdict;
+  if (criterion.result === "undecided") return criterion.result;
   if (marginOf(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
@@ -153,7 +134,7 @@ function missedSide(criterion) {
 /** Show the criteria of the standards; their names explain themselves. */
 function showCriteria(variants) {
   const cell = (criterion) => {
-    const value = element("td", { class: `value ${resultOf(criterion)}` }, valueTextOf(criterion));
+    const value = element("td", { class: `value ${criterion.result}` }, valueTextOf(criterion));
     if (criterion.uncertainty && !criterion.range) value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertaintyText(criterion)}`));
     if (criterion.range) value.append(" ", element("small", {}, `(${criterion.range})`));
     return value;

@@ -168,9 +168,9 @@ function renameIn(name, variant, rename) {
 }
 
 function sourceColumns([first]) {
-  const bands = first.answer.criteria.filter((criterion) => criterion.band).map((criterion, i) => [criterion.name.replace(" Hz", ""), ({ answer }) => answer.criteria[i].value, "dB", 1]);
-  const number = (title, name, unit, decimals) => [title, ({ answer }) => answer.numbers.find(([own]) => name.test(own))?.[1], unit, decimals];
-  return [...bands, number("Peak", /^peak.* force/, "N", 0), number("Contact", /^contact time/, "ms", 2)];
+  const bands = first.answer.criteria.filter((criterion) => criterion.band).map((criterion, i) => [criterion.band, ({ answer }) => answer.criteria[i].value, "dB", 1]);
+  const number = (title, name, unit, decimals) => [title, ({ answer }) => answer.numbers.find(([, , , own]) => own === name)?.[1], unit, decimals];
+  return [...bands, number("Peak", "peak", "N", 0), number("Contact", "contact_time", "ms", 2)];
 }
 
 function roomColumns([first]) {
