@@ -591,8 +591,8 @@ def test_calibration_that_is_not_stated_leaves_the_verdict_undecided(client: Tes
     }  # fmt: skip
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
     answer = measured(client, content, **query)["answer"]
-    assert answer["headline"]["result"] == answer["verdict"] == "undecided"
-    assert "uncertainty of calibration not stated" in answer["headline"]["text"]
+    assert answer["result"] == "undecided"
+    assert "uncertainty of calibration not stated" in " ".join(map(str, answer["headline"].values()))
     # The uncertainty that the headline names for 500 Hz is the largest that decides it.
     detail = answer["headline"]["detail"]
     found = re.search(r"500 Hz does not conform up to ([\d.]+) % of calibration", detail)
@@ -600,10 +600,10 @@ def test_calibration_that_is_not_stated_leaves_the_verdict_undecided(client: Tes
     verdicts = [
         measured(client, content, **query, calibration_uncertainty=factor * float(found[1]))[
             "answer"
-        ]["criteria"][4]["verdict"]
+        ]["criteria"][4]["result"]
         for factor in (0.9, 1.1)
     ]
-    assert verdicts == ["does not conform", "undecided"]
+    assert verdicts == ["does_not_conform", "undecided"]
 
 
 def test_share_of_the_plate_that_is_not_stated_leaves_the_verdict_undecided(
