@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from thud.base.arguments import check_arguments
 from thud.base.checks import require_whole
 from thud.impact.ensemble import MAX_THREADS
 from thud.recordings.config import Config, read_config
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from thud.recordings.checkpoint import Checkpoint
 
 
+@check_arguments
 def read_recording(  # noqa: PLR0913 - the keys of the configuration
     paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     *,
