@@ -17,7 +17,7 @@ module thud_run
    use thud_room_report, only: get_room_files, get_room_summary, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
    use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
-   use thud_text, only: fixed, newline
+   use thud_text, only: fixed, lower_case, newline
    implicit none (type, external)
    private
 
@@ -267,9 +267,18 @@ contains
       logical, intent(in), optional :: unchecked
       !> Allow a room without a floor (default: false).
       logical, intent(in), optional :: room_alone
+      ! Endings of recordings and studies, which the driver reads.
+      character(len=*), parameter :: other_endings = '.wav.flac.tdms.h5.hdf5.mat.uff.unv.csv.lvm.toml.'
       character(len=:), allocatable :: text
+      integer :: dot
 
-      call read_text_file(path, text, error)
+      dot = max(1, index(path, '.', back=.true.))
+      if (path(dot:dot) == '.' .and. index(other_endings, lower_case(path(dot:))//'.') > 0) then
+         error = input_error('this is no namelist file; allowed: a namelist file; thud-driver measure reads recordings,'// &
+            ' thud-driver fit, sweep and other studies read TOML')
+      else
+         call read_text_file(path, text, error)
+      end if
       if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked, &
          path(:index(path, '/', back=.true.)), room_alone)
       if (allocated(error)) error = input_error(path//': '//error%message)

@@ -103,6 +103,35 @@ def test_bad_usage_is_told(arguments: list[str], errors_of: ErrorsOf) -> None:
     assert "usage: thud-driver" in errors_of(*arguments)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "a.toml"], ("a.toml", "TOML file", "fit")),
+        (["run", "a.WAV"], ("a.WAV", "recording", "measure")),
+        (["assess", "a.csv"], ("a.csv", "recording", "measure")),
+        (["floor", "a.toml"], ("a.toml", "TOML file", "--construction")),
+        (["predict", "concrete 180"], ("concrete 180", "--construction")),
+        (["compare", "a.nml", "b.toml"], ("b.toml", "case or recording")),
+        (["export", "a.toml"], ("a.toml", "case or recording")),
+        (["measure", "a.nml"], ("a.nml", "case", "run")),
+        (["measure", "a.toml"], ("a.toml", "TOML file", "fit")),
+        (["calibrate", "a.nml"], ("a.nml", "case", "recording")),
+        *(
+            (([name, "a.nml"], ("a.nml", "TOML file", "run")))
+            for name in ("fit", "sweep", "design")
+        ),
+        (["compare", "a.nml", "--no-figures"], ("--no-figures", "option of run, measure")),
+        (["predict", "--height", "100"], ("--height", "option of measure")),
+    ],
+)
+def test_files_and_options_of_other_commands_name_these(
+    arguments: list[str], words: tuple[str, ...], errors_of: ErrorsOf
+) -> None:
+    errors = errors_of(*arguments)
+    assert all(word in errors.splitlines()[-1] for word in words)
+    assert "did you mean" not in errors
+
+
 def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out.strip() == f"thud {thud.__version__}"

@@ -247,7 +247,7 @@ def test_scalars_and_defaults() -> None:
         ({}, {"threads": 0}, naming("threads", 0, 1, 1024)),
         ({}, {"threads": 1025}, naming("threads", 1025, 1, 1024)),
         ({}, {"threads": 1.5}, naming("threads", 1.5)),
-        ({}, {"substeps": 1.5}, naming("&sampling: substeps", 1.5)),
+        ({}, {"substeps": 1.5}, naming("substeps", 1.5, "a whole number")),
         ({"density": 1.0}, {}, naming("'density'", "studies")),
         ({"bands": "third"}, {}, naming("bands")),
         ({"source": ["tyre"]}, {"source": "tyre"}, naming("'source'")),
@@ -259,7 +259,7 @@ def test_scalars_and_defaults() -> None:
         (
             {},
             {"sample_rate": "44100"},
-            naming("&sampling: sample_rate", "'44100'"),
+            naming("sample_rate", "'44100'", "a number"),
         ),
         ({}, {"duration": 10**400}, naming("&sampling: duration")),
         ({}, {"duration": 10.0, "sample_rate": 1e7}, naming("&sampling: duration", "10.0 s")),

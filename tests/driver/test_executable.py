@@ -251,6 +251,14 @@ def test_closing_shell_is_a_numerical_failure(run: Run, case_file: CaseFile) -> 
     assert re.search(naming("&drop: height", "5000.0 m"), result.stderr)
 
 
+@pytest.mark.parametrize("name", ["a.wav", "a.TDMS", "a.csv", "study.toml"])
+def test_files_of_the_driver_are_told(run: Run, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(b"\n" * 100_000)
+    result = run(name)
+    assert result.returncode == 1
+    assert re.search(naming(name, "namelist", "measure", "fit"), result.stderr)
+
+
 def test_pipe_as_input_is_told(run: Run, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     result = run("pipe")

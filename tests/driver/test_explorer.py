@@ -476,7 +476,7 @@ def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
         ),
         ({"filter_kind": "bessel", "filter_order": "4.5"}, "“Order of the filter” = 4.5 is not"),
         ({"plate_f0": "1500"}, "“Quality factor of the force plate” is missing"),
-        ({"height": "-1"}, "“Drop height, m” = -1 is not allowed; allowed: 0.001 to 100"),
+        ({"height": "-1"}, "“Drop height, m” = -1 is not allowed; allowed: 0.001 to 10 m"),
         ({"height": "high"}, "“Drop height, m” = 'high' is not a number"),
         ({"calibration": "much"}, "“Calibration”: 'much' is not a number with units"),
         ({"unit": "stone"}, "“Unit of the values” = 'stone' is not known"),

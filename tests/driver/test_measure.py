@@ -10,7 +10,8 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from datetime import date
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ import thud
 from thud import cli
 from thud.recordings import measure_drops
 from thud.recordings.budgets import AMPLITUDE_DECIBEL, average_estimates
-from thud.recordings.config import Config, checked_config, read_config
+from thud.recordings.config import Config, PlateConfig, read_config
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.signal import Signal
 from thud.report.contents import report_data
@@ -160,22 +161,33 @@ def test_bad_recordings_get_one_sentence(
 @pytest.mark.parametrize(
     ("config", "words"),
     [
-        (Config(source="tire"), naming("source", "'tire'", "'tyre'")),  # type: ignore[arg-type]
-        (Config(limits={"octave_600": (1.0, 2.0)}), naming("limits", "octave_500")),
-        (Config(limits={"mass": (3.0, 2.0)}), naming("limits: mass", "minimum < maximum")),
-        (Config(limits={"mass": 2.5}), naming("limits: mass", 2.5)),  # type: ignore[dict-item]
-        (Config(mass=-1.0), naming("mass", -1.0)),
+        ({"source": "tire"}, naming("source", "'tire'", "'tyre'")),
+        ({"limits": {"octave_600": (1.0, 2.0)}}, naming("limits", "octave_500")),
+        ({"limits": {"mass": (3.0, 2.0)}}, naming("limits: mass", "minimum < maximum")),
+        ({"limits": {"mass": 2.5}}, naming("limits: mass", 2.5)),
+        ({"mass": -1.0}, naming("mass", -1.0)),
+        ({"height": 100}, naming("height", 100, "0.001 to 10 m")),
+        ({"date": 2024}, naming("date", 2024)),
+        ({"plate": {"f0": 1100}}, naming("plate: Q", "missing")),
+        ({"plate": 1100.0}, naming("plate", 1100.0, "a table")),
+        ({"instruments": [3]}, naming("instruments", 3)),
+        ({"report": ["number"]}, naming("report", "a table")),
     ],
 )
-def test_source_and_limits_are_checked_before_anything_is_measured(
-    config: Config, words: str, monkeypatch: pytest.MonkeyPatch
+def test_configurations_are_checked_when_they_are_stated(
+    config: dict[str, Any], words: str
 ) -> None:
-    monkeypatch.delattr(measure_drops, "search_drops")
-    signal = Signal.from_array(np.ones(100), 24_000)
-    with pytest.raises(thud.InputError, match=words):
-        thud.Recording.from_signals([signal], config)
-    with pytest.raises(thud.InputError, match=words):
-        thud.read_recording(FOLDER / "drop_1.wav", config=config)
+    with pytest.raises(thud.InputError, match=words) as raised:
+        Config(**config)
+    assert "\n" not in str(raised.value)
+
+
+def test_configurations_hold_what_files_state() -> None:
+    stated = Config(
+        date=date(2024, 5, 3), plate={"f0": 1100, "Q": np.int64(25)}, mass=np.float32(2.5)
+    )  # type: ignore[arg-type]
+    assert stated == Config(date="2024-05-03", plate=PlateConfig(1100.0, 25.0), mass=2.5)
+    assert type(stated.mass) is float
 
 
 def test_recording_has_the_name_of_its_first_signal() -> None:
@@ -190,7 +202,7 @@ def test_limits_given_from_python_are_those_of_the_verdict() -> None:
     signal = recorded(thud.solve())
     limits = {"mass": (2.0, 3.0), "octave_63": (0.0, 99.0)}
     config = Config(limits=limits, mass=2.5)
-    found = replace(signal, config=checked_config(config)).assess()
+    found = replace(signal, config=config).assess()
     spans = {one.name: (one.lower, one.upper) for one in found.criteria}
     assert {name: spans[name] for name in limits} == limits
 

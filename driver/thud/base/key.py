@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from dataclasses import dataclass, fields
-from functools import wraps
-from typing import TYPE_CHECKING, Literal, ParamSpec, Self, TypeVar
+from typing import TYPE_CHECKING, Literal, Self
 
 from thud.base.checks import refuse, refuse_unknown
 from thud.base.immutable import Plain
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
-
-P = ParamSpec("P")
-R = TypeVar("R")
+    from collections.abc import Collection, Iterator
 
 Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
 
@@ -108,15 +103,3 @@ def require_keywords(label: str, keywords: Collection[str], allowed: Collection[
             )
     also = [word for name, names in keys.items() for word in (name.lower(), *names)]
     refuse_unknown(label, unknown, allowed, also)
-
-
-def check_keywords(function: Callable[P, R]) -> Callable[P, R]:
-    """Decorate a function so that it raises InputError for an unknown keyword."""
-    allowed = list(inspect.signature(function).parameters)
-
-    @wraps(function)
-    def checked(*arguments: P.args, **keywords: P.kwargs) -> R:
-        require_keywords(f"{function.__name__}()", keywords, allowed)
-        return function(*arguments, **keywords)
-
-    return checked

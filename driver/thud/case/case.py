@@ -146,7 +146,7 @@ class Case(Group, Displayed):
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
-        floor = f"on {self.floor.name}" if self.floor else ""
+        floor = f"on {getattr(self.floor, 'name', None)}" if self.floor else ""
         room = "room below" if self.room else ""
         press = "quasi-static compression" if self.compression else ""
         return f"<Case {self.name}: {', '.join(filter(None, (model, floor, modes, room, press)))}>"

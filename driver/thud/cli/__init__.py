@@ -28,6 +28,7 @@ from thud.cli.command import (
     Command,
     argument,
     exit_code,
+    file_of,
     message_of,
     output,
     print_immediately,
@@ -51,7 +52,9 @@ COMMANDS = {
     "run": Command(
         "run cases, write their results and figures",
         (
-            argument("cases", nargs="+", metavar="CASE.nml", help="namelist files"),
+            argument(
+                "cases", nargs="+", type=file_of("case"), metavar="CASE.nml", help="namelist files"
+            ),
             *output(
                 "the results; several cases have a subdirectory each (default: outputs/<case name>)"
             ),
@@ -91,6 +94,7 @@ COMMANDS = {
             argument(
                 "cases",
                 nargs="+",
+                type=file_of("case", "recording"),
                 metavar="CASE.nml|RECORD.csv",
                 help="namelist files, and recordings with columns of time, s, and force, N",
             ),
@@ -197,11 +201,23 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         match = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
-        super().error(message + (suggestion(match[1], _words()) if match else ""))
+        super().error(message + (_hint(match[1]) if match else ""))
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         to_screen = file in {None, sys.stderr} and is_terminal(sys.stderr)
         print(wrap(message) if to_screen else message, end="", file=file or sys.stderr)
+
+
+def _hint(word: str) -> str:
+    """Return the commands that have an option, or the suggestion of a similar word."""
+    owners = [
+        name
+        for name, command in COMMANDS.items()
+        if any(word in names for names, _ in command.arguments)
+    ]
+    if owners:
+        return f" ({word} is an option of {', '.join(owners)})"
+    return suggestion(word, _words())
 
 
 def _words() -> list[str]:

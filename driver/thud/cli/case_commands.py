@@ -25,6 +25,7 @@ from thud.cli.command import (
     Command,
     argument,
     exit_code,
+    file_of,
     message_of,
     output,
     results_of,
@@ -149,7 +150,7 @@ def assess_case(options: argparse.Namespace) -> int:
 ASSESS = Command(
     "assess a case over what is not known of its source",
     (
-        argument("case", metavar="CASE.nml", help="namelist file"),
+        argument("case", type=file_of("case"), metavar="CASE.nml", help="namelist file"),
         *output(
             "the verdict and the drops that train a surrogate, where an interrupted training "
             "resumes (default: outputs/<case name>_unknowns)"
@@ -286,7 +287,12 @@ def _read_source(path: str, config: str | None) -> ImpactResult:
 EXPORT = Command(
     "write the blocked force of a case or a recording for other programs",
     (
-        argument("source", metavar="CASE.nml|RECORDING", help="namelist file, or recording"),
+        argument(
+            "source",
+            type=file_of("case", "recording"),
+            metavar="CASE.nml|RECORDING",
+            help="namelist file, or recording",
+        ),
         *(
             argument(f"--{kind}", action="store_true", help=meaning)
             for kind, meaning in KINDS.items()

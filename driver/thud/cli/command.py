@@ -12,6 +12,7 @@ from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning, ThudError
 from thud.base.files import Results
 from thud.cli.screen import print_notes, print_path, print_results
+from thud.recordings.formats import FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -38,6 +39,30 @@ class Command(NamedTuple):
 def argument(*names: str, **settings: object) -> Argument:
     """Return an argument from the parameters of ``add_argument``."""
     return names, settings
+
+
+# Kinds of files by their endings, and the commands that read them.
+FILE_KINDS = {".nml": "case", ".toml": "TOML file"} | dict.fromkeys(
+    (ending for entry in FORMATS for ending in entry.suffixes), "recording"
+)
+READERS = {
+    "case": "run, assess, compare, floor and predict",
+    "TOML file": "sweep, sensitivity, design, uncertainty, surrogate and fit (or --construction)",
+    "recording": "measure",
+}
+
+
+def file_of(*kinds: str) -> Callable[[str], str]:
+    """Return the type of an argument that is a file of some kinds, which its ending shows."""
+
+    def path(text: str) -> str:
+        kind = FILE_KINDS.get(Path(text).suffix.lower())
+        if kind is None or kind in kinds:
+            return text
+        message = f"{text} is a {kind}; allowed: a {' or '.join(kinds)}; for it: {READERS[kind]}"
+        raise argparse.ArgumentTypeError(message)
+
+    return path
 
 
 def number(text: str) -> float:

@@ -20,6 +20,7 @@ from thud.cli.command import (
     QUIET,
     Command,
     argument,
+    file_of,
     number,
     output,
     results_of,
@@ -121,6 +122,12 @@ def _floor_cases(
         cases[name] = case
 
     for path in paths:
+        if not Path(path).exists():
+            refuse(
+                f"{path}: there is no such file",
+                "the path of a case; of a construction --construction NAME, see "
+                "`thud-driver floor --list`",
+            )
         case = read_case(path)
         first = first or case
         # A room alone is that of the constructions.
@@ -141,7 +148,13 @@ def _floor_cases(
 
 
 _FLOORS = (
-    argument("cases", nargs="*", metavar="CASE.nml", help="namelist files with floor and room"),
+    argument(
+        "cases",
+        nargs="*",
+        type=file_of("case"),
+        metavar="CASE.nml",
+        help="namelist files with floor and room",
+    ),
     argument(
         "--construction",
         action="append",

@@ -16,6 +16,7 @@ from thud.cli.command import (
     QUIET,
     Command,
     argument,
+    file_of,
     number,
     output,
     results_of,
@@ -109,7 +110,11 @@ MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
         argument(
-            "recordings", nargs="+", metavar="FILE", help="recordings of one or more drops each"
+            "recordings",
+            nargs="+",
+            type=file_of("recording"),
+            metavar="FILE",
+            help="recordings of one or more drops each",
         ),
         argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
         argument("--mass", type=number, metavar="KG", help="mass of the source"),
@@ -232,7 +237,12 @@ def run_calibrate(options: argparse.Namespace) -> int:
 CALIBRATE = Command(
     "calibration from a record of a known force applied to or removed from the plate, or of taps",
     (
-        argument("record", metavar="FILE", help="record of the known force or of the taps"),
+        argument(
+            "record",
+            type=file_of("recording"),
+            metavar="FILE",
+            help="record of the known force or of the taps",
+        ),
         argument(
             "--tap",
             action="store_true",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, file_of, output
 from thud.cli.screen import print_notes, print_path, print_results, print_status, shows_progress
 from thud.studies.directory import open_directory
 from thud.studies.kinds import KINDS, get_kind
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from thud.studies.kind import RunOptions
 
-_STUDY = argument("study", metavar="STUDY.toml", help="study file")
+_STUDY = argument("study", type=file_of("TOML file"), metavar="STUDY.toml", help="study file")
 _SAMPLES = (
     argument("--yes", dest="allow_large", action="store_true", help="allow any number of samples"),
     argument(

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base.arguments import check_arguments
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
@@ -104,6 +105,7 @@ class BlockedForce(DropForce):
         return [Path(name) for name in contents]
 
 
+@check_arguments
 def blocked_force(
     source: ImpactResult, *, drop: int = 1, rate: float | None = None
 ) -> BlockedForce:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from thud.base._schema import Room
+from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
@@ -310,6 +311,7 @@ class RoomPrediction(RoomLevel, Displayed):
         )
 
 
+@check_arguments
 def predict_level(
     source: ImpactResult | None = None,
     floor: FloorOptions | Construction | None = None,

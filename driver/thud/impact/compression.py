@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
+from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.display import Displayed
 from thud.base.extras import data_frame
-from thud.base.key import check_keywords
 from thud.case.case import Case, case_text, new_model
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class CompressionCurve(Displayed):
         return data_frame({"deflection_m": self.deflection, "force_N": self.force})
 
 
-@check_keywords
+@check_arguments
 def compress(
     ball: Ball | None = None,
     model: ModelName | ModelOptions = "hollow_sphere",

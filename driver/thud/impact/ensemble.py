@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base._schema import KEYS, SAMPLE_QUANTITIES, Limits
+from thud.base.arguments import check_arguments
 from thud.base.bridge import ask, text
 from thud.base.checks import (
     refuse,
@@ -20,7 +21,6 @@ from thud.base.checks import (
     require_whole,
 )
 from thud.base.immutable import freeze
-from thud.base.key import check_keywords
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key, key_owners
 from thud.impact.outcomes import Ensemble
@@ -49,7 +49,7 @@ _MAX_SAMPLES = 2**17
 _MAX_VALUES = 2**26
 
 
-@check_keywords
+@check_arguments
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
     parameters: Mapping[str, ArrayLike] | pd.DataFrame,
     case: Case | None = None,
@@ -149,7 +149,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     n_thread = 1 if _FORKED else n_thread
     length = int(cost["force_length"]) if forces else 0
     max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
-    block_size = int(np.clip(_CALL_TIME * n_thread / cost["cost"], 1, max(1, max_count)))
+    block_size = int(
+        np.clip(np.nan_to_num(_CALL_TIME * n_thread / cost["cost"]), 1, max(1, max_count))
+    )
     blocks = []
     try:
         # Raises MemoryError before the computation if the results do not fit.

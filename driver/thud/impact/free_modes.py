@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
+from thud.base.arguments import check_arguments
 from thud.base.bridge import ask, text
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
 from thud.base.files import replace_file
-from thud.base.key import check_keywords
 from thud.case.case import Case, case_text
 from thud.impact.mesh_files import require_ending, vtu_file
 
@@ -90,7 +90,7 @@ class FreeModes(Displayed):
         return [("frequency, Hz", "harmonic", "participation"), *rows]
 
 
-@check_keywords
+@check_arguments
 def free_modes(
     ball: Ball | None = None,
     count: int = Modes.count,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base._schema import LIMITS, QUANTITIES
+from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
 from thud.base.quantity import Quantity
@@ -210,6 +211,7 @@ class Verdict(Displayed):
         return [header, *rows, ("all criteria", "", "", "", self.result)]
 
 
+@check_arguments
 def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     levels: Iterable[Estimate | float],
     contact_time: Estimate | float = math.nan,

@@ -276,8 +276,10 @@ def standardized_level(
     InputError
         If a value is not finite, a time or the volume is not positive, or the lengths differ.
     """
-    values = _finite("level", np.atleast_1d(np.asarray(level)))
-    times = _finite("reverberation_time", np.atleast_1d(np.asarray(reverberation_time)))
+    values, times = (
+        _finite(name, np.atleast_1d(require_array(name, entries, (0, 1))))
+        for name, entries in (("level", level), ("reverberation_time", reverberation_time))
+    )
     if len(times) == 1:
         times = np.full(len(values), times[0])
     if len(times) != len(values):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_number
 from thud.recordings.channel import shown_path, shown_text
 from thud.recordings.force_units import (
@@ -44,6 +45,7 @@ SIGNIFICANT = 3.0
 BOUND = 1.645
 
 
+@check_arguments
 def calibrate(  # noqa: PLR0913 - the keys of the configuration
     record: Signal | str | os.PathLike[str],
     *,

@@ -16,6 +16,7 @@ from thud.level.levels import SOURCES
 from thud.recordings import dates
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.config_values import (
+    Checked,
     checked_values,
     require_keys,
     to_calibrations,
@@ -62,7 +63,7 @@ def _key(check: Callable[[object, str], object], default: object = None) -> Any:
 
 
 @dataclass(frozen=True)
-class PlateConfig:
+class PlateConfig(Checked):
     """A force plate.
 
     Attributes
@@ -93,20 +94,30 @@ class PlateConfig:
     full_scale: float | None = _key(partial(to_number, 1.0, 1e9))
     linearity: tuple[tuple[float, float], ...] = _key(to_linearity, ())
 
+    def __post_init__(self) -> None:
+        """Raise InputError if a value is not allowed, or one is missing."""
+        super().__post_init__()
+        _require_resonance(self.stated(), "plate")
+
 
 def _plate(value: object, key: str) -> PlateConfig:
     if isinstance(value, PlateConfig):
         return value
     table = checked_values(to_table(value, key), PlateConfig, f"{key}: ")
-    if {"f0", "Q", "f0_uncertainty", "share"} & set(table):
-        require_keys(table, key, "f0", "Q")
-        if "flat_limit" in table:
-            refuse(f"{key}: f0 and flat_limit are both stated", "one of them")
+    _require_resonance(table, key)
     return PlateConfig(**table)
 
 
+def _require_resonance(stated: Mapping[str, object], key: str) -> None:
+    """Raise InputError if a resonance is incomplete, or stated besides a flat response."""
+    if {"f0", "Q", "f0_uncertainty", "share"} & set(stated):
+        require_keys(stated, key, "f0", "Q")
+        if "flat_limit" in stated:
+            refuse(f"{key}: f0 and flat_limit are both stated", "one of them")
+
+
 @dataclass(frozen=True)
-class FilterConfig:
+class FilterConfig(Checked):
     """The low-pass filter of the recorder or amplifier, which will be corrected.
 
     Attributes
@@ -127,21 +138,31 @@ class FilterConfig:
     cutoff: float | None = _key(partial(to_number, 1.0, 1e9))
     cutoff_uncertainty: float | None = _key(partial(to_number, 0.0, 0.5))
 
+    def __post_init__(self) -> None:
+        """Raise InputError if a value is not allowed, or one is missing."""
+        super().__post_init__()
+        _require_filter(self.stated(), "filter")
+
 
 def _filter(value: object, key: str) -> FilterConfig:
     if isinstance(value, FilterConfig):
         return value
     table = checked_values(to_table(value, key), FilterConfig, f"{key}: ")
     require_keys(table, key, "kind")
-    if table["kind"] != "none":
-        require_keys(table, key, "order", "cutoff")
-    elif len(table) > 1:
-        refuse(f"{key}: kind = 'none' has an order or a cutoff", "kind alone, or another kind")
+    _require_filter(table, key)
     return FilterConfig(**table)
 
 
+def _require_filter(stated: Mapping[str, object], key: str) -> None:
+    """Raise InputError if a filter is incomplete, or none has an order or a cutoff."""
+    if stated.get("kind", "none") != "none":
+        require_keys(stated, key, "order", "cutoff")
+    elif set(stated) - {"kind"}:
+        refuse(f"{key}: kind = 'none' has an order or a cutoff", "kind alone, or another kind")
+
+
 @dataclass(frozen=True)
-class Instrument:
+class Instrument(Checked):
     """An instrument of the measurement and its calibration certificate.
 
     Attributes
@@ -171,7 +192,7 @@ def _instruments(value: object, key: str) -> tuple[str | Instrument, ...]:
 
 
 @dataclass(frozen=True)
-class ReportConfig:
+class ReportConfig(Checked):
     """What a report of a laboratory states besides its results (ISO/IEC 17025, 7.8).
 
     Attributes
@@ -218,7 +239,7 @@ class ReportConfig:
 
 
 @dataclass(frozen=True)
-class Properties:
+class Properties(Checked):
     """Properties of the ball that are stated, not assessed (ISO 10140-5, annex F).
 
     Attributes
@@ -239,7 +260,7 @@ class Properties:
 
 
 @dataclass(frozen=True)
-class Config:
+class Config(Checked):
     """What a laboratory states about its ball, instruments and files; None if unknown.
 
     Attributes
@@ -299,10 +320,11 @@ class Config:
     calibration_uncertainty: float | None = _key(partial(to_number, 0.0, 0.5))
     polarity: str | None = _key(partial(to_choice, POLARITIES))
     sample_rate: float | None = _key(partial(to_number, 1.0, 1e9))
-    mass: float | None = _key(partial(to_number, 0.01, 1000.0))
-    height: float | None = _key(partial(to_number, 0.001, 100.0))
-    mass_uncertainty: float | None = _key(partial(to_number, 0.0, 100.0))
-    height_uncertainty: float | None = _key(partial(to_number, 0.0, 10.0))
+    mass: float | None = _key(partial(to_number, 0.01, 1000.0, unit="kg"))
+    # Above 10 m it is likely to be stated in cm.
+    height: float | None = _key(partial(to_number, 0.001, 10.0, unit="m"))
+    mass_uncertainty: float | None = _key(partial(to_number, 0.0, 100.0, unit="kg"))
+    height_uncertainty: float | None = _key(partial(to_number, 0.0, 1.0, unit="m"))
     plate: PlateConfig | None = _key(_plate)
     filter: FilterConfig | None = _key(_filter)
     drops: str | None = _key(to_numbers)
@@ -437,11 +459,3 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     path = file.parent / mark
     read_picture(path)
     return replace(config, report=replace(config.report, accreditation_mark=str(path)))
-
-
-def checked_config(config: Config) -> Config:
-    """Return a configuration; raise InputError if a value is not allowed."""
-    checked_values(
-        {key: value for key, value in vars(config).items() if value is not None}, Config, ""
-    )
-    return config

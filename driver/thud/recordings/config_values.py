@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from datetime import date
 from typing import Any
 
@@ -25,12 +25,12 @@ from thud.recordings.force_units import Calibration, plain_number, read_chain
 MAX_TEXT = 500
 
 
-def to_number(low: float, high: float, value: object, key: str) -> float:
-    """Return a number between two limits."""
+def to_number(low: float, high: float, value: object, key: str, unit: str = "") -> float:
+    """Return a number between two limits, in a unit."""
     require_number(key, value)
     number = float(value)  # type: ignore[arg-type]
     if not low <= number <= high:
-        refuse(f"{key} = {shown(value)} is not allowed", f"{low:g} to {high:g}")
+        refuse(f"{key} = {shown(value)} is not allowed", f"{low:g} to {high:g} {unit}".rstrip())
     return number
 
 
@@ -58,8 +58,9 @@ def to_date(value: object, key: str) -> str:
     """Return a date as text in ISO 8601; empty if not stated."""
     if isinstance(value, date):
         return value.isoformat()[:10]
-    read = dates.read_date(to_line(value, key)) if value else None
-    if value and read is None:
+    text = to_line(value, key)
+    read = dates.read_date(text) if text else None
+    if text and read is None:
         refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
     return read.date().isoformat() if read else ""
 
@@ -172,6 +173,22 @@ def checked_values(table: Mapping[str, object], kind: type[Any], prefix: str) ->
     checks = {key.name: key.metadata["check"] for key in fields(kind)}
     refuse_unknown(prefix.removesuffix(": "), table, checks)
     return {key: checks[key](value, f"{prefix}{key}") for key, value in table.items()}
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Base of the tables of a configuration, whose values are checked when they are stated."""
+
+    def __post_init__(self) -> None:
+        """Replace each stated value by that of its check, or raise InputError."""
+        for name, value in checked_values(self.stated(), type(self), "").items():
+            object.__setattr__(self, name, value)
+
+    def stated(self) -> dict[str, object]:
+        """Return the values that are not the defaults."""
+        values = {key.name: getattr(self, key.name) for key in fields(self)}
+        defaults = {key.name: key.default for key in fields(self)}
+        return {k: v for k, v in values.items() if v is not None and v is not defaults[k]}
 
 
 def to_instance(kind: type[Any], value: object, key: str) -> Any:  # noqa: ANN401 - of `kind`

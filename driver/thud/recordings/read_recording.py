@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from thud.base.arguments import check_arguments
 from thud.recordings.config import Config, read_config
 from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
 
 
+@check_arguments
 def read_recording(  # noqa: PLR0913 - the keys of the configuration
     paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
     *,

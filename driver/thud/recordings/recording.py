@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base.checks import require_whole
+from thud.base.checks import require_kind, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
 from thud.case.case import Case
@@ -18,7 +18,7 @@ from thud.level.assessment import assess_levels
 from thud.level.impact_result import DropForce
 from thud.recordings.assumptions import assumed_contributions, assumption_warnings
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
-from thud.recordings.config import Config, checked_config
+from thud.recordings.config import Config
 from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.measured_drop import ESTIMATES
@@ -139,8 +139,9 @@ class Recording(Displayed):
 
         Raise InputError if a drop cannot be measured.
         """
+        require_kind("config", config, Config)
         drops, origins, uncertainty = measure_signals(
-            signals, checked_config(config), progress=progress
+            signals, config, progress=progress
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)

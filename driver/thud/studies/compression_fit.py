@@ -11,10 +11,10 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from thud.base._schema import Ball, Compression
+from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
-from thud.base.key import check_keywords
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.alternatives import PRESS_UNKNOWNS, require_unknowns
 from thud.studies.fitting.estimates import Estimates
@@ -129,7 +129,7 @@ class CompressionFit(Estimates):
         return compression({"measured": measured, "model": self.curve})
 
 
-@check_keywords
+@check_arguments
 def fit_compression(  # noqa: PLR0913 - as in `compress`
     deflection: ArrayLike,
     force: ArrayLike,

@@ -86,7 +86,7 @@ def bound_parameters(
     if isinstance(parameters, str):
         parameters = [parameters]
     if not isinstance(parameters, Mapping):
-        parameters = dict.fromkeys(parameters)
+        parameters = dict.fromkeys(map(str, parameters))
     if not parameters:
         refuse("parameters is empty", ", ".join(known_parameters(case)))
     return tuple(fitted_parameter(name, entry, case) for name, entry in parameters.items())
