@@ -206,7 +206,7 @@ def test_screen_lists_what_the_report_misses(
     assert "procedure" in line
     assert "client" not in line
     assert "number of the report" not in line
-    assert cli.main([*command, "--no-figures"]) == 0
+    assert cli.main([*command, "--no-figures", "-o", "without"]) == 0
     assert "Missing in the report" not in capsys.readouterr().out
 
 

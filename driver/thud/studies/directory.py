@@ -76,10 +76,10 @@ def open_directory(
     directory = StudyDirectory(Path(folder), study.inputs, replace)
     directory.folder.mkdir(parents=True, exist_ok=True)
     names = kind.identity_files(study)
-    listed = [n for n in kind.listed_files(study) if figures or not n.endswith(FORMATS)]
+    listed = kind.listed_files(study)
     readers = dict.fromkeys((directory.folder / name for name in names), kind.identity_in)
     begun = any(map(os.path.lexists, readers))
-    for path in (directory.folder / name for name in listed):
+    for path in (directory.folder / n for n in listed if figures or not n.endswith(FORMATS)):
         directory.require_no_input(path)
         if is_directory(path) or (path.exists() and not (begun or replace)):
             refuse_foreign(path)
