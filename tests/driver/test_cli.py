@@ -178,7 +178,6 @@ def test_figure_that_cannot_be_replaced_is_named(
     [
         (["swep", "study.toml"], "sweep"),
         (["run", "case.nml", "--chekc"], "--check"),
-        (["sweep", "study.toml", "--backend", "thread"], "threads"),
     ],
 )
 def test_misspelt_commands_and_options_are_told(

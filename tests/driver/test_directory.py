@@ -10,8 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-import tracemalloc
-from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +20,7 @@ from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.studies import blocks, fit, samples
+from thud.studies import fit, samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
 from thud.studies.sweep import KIND
@@ -49,85 +47,6 @@ parameters = { height = { low = 0.9, high = 1.1 } }
 def values(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset without the date of its making."""
     return dataset.drop_attrs(deep=False).load()
-
-
-def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = values(thud.sweep(HEIGHTS).dataset)
-    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path).dataset
-    assert (tmp_path / "a.zarr").is_dir()
-    assert values(found).identical(expected)
-    # Whatever is larger than a byte is Zarr now, and written one variable at a time.
-    monkeypatch.setattr("thud.studies.blocks.MAX_NETCDF_SIZE", 1)
-    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path).dataset
-    assert names_in(tmp_path) == ["a.zarr", "b.zarr"]
-    assert values(found).identical(expected)
-
-
-def test_zarr_is_written_in_a_memory_that_does_not_grow(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    peaks = []
-    write = Blocks._write_zarr  # noqa: SLF001
-
-    def traced(store: Blocks, paths: list[Path]) -> None:
-        tracemalloc.start()
-        write(store, paths)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-
-    monkeypatch.setattr(Blocks, "_write_zarr", traced)
-    monkeypatch.setattr(samples.SampleStudy, "block_size", 500)
-    parameters = {"height": {"low": 0.9, "high": 1.1}}
-    for count in (1000, 6000):
-        study = {"name": f"of_{count}", "format": "zarr", "parameters": parameters}
-        design = {"kind": "random", "size": count, "seed": 1}
-        found = thud.sweep({**study, "design": design}, tmp_path).dataset
-        expected = thud.sweep({**study, "design": design}).dataset
-        assert values(found).identical(values(expected))
-    # The results are six times as large.
-    assert peaks[1] < 1.5 * peaks[0]
-
-
-def test_blocks_are_compared_with_their_checksums_once_for_all_variables(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    checked = Counter[Path]()
-    written = []
-    require, grid = blocks._require_intact, blocks.grid_of  # noqa: SLF001
-    monkeypatch.setattr(
-        blocks, "_require_intact", lambda path: (checked.update([path]), require(path))
-    )
-    monkeypatch.setattr(blocks, "grid_of", lambda *some: (written.append(some), grid(*some))[1])
-    # Each variable is written by itself.
-    monkeypatch.setattr(blocks, "MAX_NETCDF_SIZE", 1)
-    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
-    assert len(written) > 2
-    # The first block also tells what there is.
-    assert set(checked.values()) <= {1, 2}
-
-
-def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "six.toml"
-    path.write_text('format = "zarr"\nparameters.height.values = [0.5, 0.6, 0.7, 0.8, 0.9, 1]')
-    assert cli.main(["sweep", str(path), "-o", str(tmp_path)]) == 0
-    assert "conforming samples" in capsys.readouterr().out
-    assert (tmp_path / "six.zarr").is_dir()
-
-
-def test_damaged_results_are_reported(tmp_path: Path) -> None:
-    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
-    whole = (tmp_path / "a.nc").read_bytes()
-    told = 0
-    for place in range(0, len(whole), 256):
-        path = tmp_path / f"{place}.nc"
-        path.write_bytes(whole[:place] + bytes([255] * 64) + whole[place + 64 :])
-        try:
-            thud.read_sweep(path)
-        except thud.InputError as error:
-            told += 1
-            assert str(path) in str(error)
-    # The last places may lie in the checksum, where nothing is lost.
-    assert told >= len(range(0, len(whole), 256)) - 1
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +121,7 @@ def test_full_disk_is_reported_and_loses_nothing(
     blocks = -(-whole.sizes["sample"] // size)
     assert blocks > 1
     block, end = (
-        len(bytes(part.to_netcdf(engine="h5netcdf"))) + 44
+        len(bytes(part.to_netcdf(engine="h5netcdf")))
         for part in (whole.isel(sample=slice(0, size)), whole)
     )
     # The disk is full for the first block already, then for the end, which is larger.
@@ -218,41 +137,6 @@ def test_full_disk_is_reported_and_loses_nothing(
         assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
         assert not list(tmp_path.rglob(".*new"))
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path).dataset).identical(values(whole))
-
-
-@pytest.mark.slow
-def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
-    whole: xr.Dataset,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    path = tmp_path / "long.toml"
-    path.write_text('format = "zarr"' + LONG)
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    write = Blocks._write_zarr  # noqa: SLF001
-
-    def without_space(store: Blocks, paths: list[Path]) -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
-        try:
-            write(store, paths)
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Blocks, "_write_zarr", without_space)
-        assert cli.main(["sweep", str(path), "-q", "-o", str(tmp_path)]) == 1
-    errors = capsys.readouterr().err
-    assert "File too large" in errors
-    assert errors.count("\n") == 1
-    assert names_in(tmp_path) == ["long.partial", "long.toml"]
-    assert thud.read_sweep(tmp_path / "long.partial").dataset.sizes["sample"] == 500
-
-    def compute_again(*_: object) -> None:
-        pytest.fail("all samples were kept")
-
-    monkeypatch.setattr("thud.studies.backends.evaluate", compute_again)
-    assert values(thud.sweep(path, tmp_path).dataset).identical(values(whole))
 
 
 def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
@@ -299,10 +183,10 @@ def test_replace_leaves_nothing_of_an_older_version(tmp_path: Path) -> None:
     path.write_text("parameters.height.values = [0.5, 1]")
     sweep = ["sweep", "-q", str(path), "-o", str(tmp_path / "here")]
     assert cli.main(sweep) == 0
-    path.write_text("format = 'zarr'\nparameters.height.values = [0.5, 1, 2]")
+    path.write_text("parameters.height.values = [0.5, 1, 2]")
     assert cli.main(sweep) == 1
     assert cli.main([*sweep, "--no-figures", "--replace"]) == 0
-    assert names_in(tmp_path / "here") == ["a.zarr"]
+    assert names_in(tmp_path / "here") == ["a.nc"]
 
 
 def test_replace_keeps_what_is_of_this_version(tmp_path: Path) -> None:
@@ -326,7 +210,7 @@ def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) ->
     assert (tmp_path / "fit.json").read_text() == "[]"
 
 
-@pytest.mark.parametrize("name", ["python.partial", "python.zarr", "python.nc"])
+@pytest.mark.parametrize("name", ["python.partial", "python.nc"])
 def test_links_in_the_place_of_results_are_not_followed(name: str, tmp_path: Path) -> None:
     out, other = tmp_path / "out", tmp_path / "other"
     out.mkdir()
@@ -339,7 +223,7 @@ def test_links_in_the_place_of_results_are_not_followed(name: str, tmp_path: Pat
     assert list(other.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["python.partial", "python.zarr", "python.nc"])
+@pytest.mark.parametrize("name", ["python.partial", "python.nc"])
 def test_directories_of_something_else_stay(name: str, tmp_path: Path) -> None:
     (tmp_path / name).mkdir()
     (tmp_path / name / "paper.txt").write_text("mine")
@@ -349,32 +233,8 @@ def test_directories_of_something_else_stay(name: str, tmp_path: Path) -> None:
     assert (tmp_path / name / "paper.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("name", ["python.partial", "python.zarr"])
-def test_directories_of_something_else_stay_beside_an_older_version(
-    name: str, tmp_path: Path
-) -> None:
-    thud.sweep({"parameters": {"height": {"values": [1]}}}, tmp_path)
-    before = (tmp_path / "python.nc").read_bytes()
-    (tmp_path / name).mkdir()
-    (tmp_path / name / "mine").write_text("mine")
-    with pytest.raises(thud.InputError, match=naming(name, "directory")):
-        thud.sweep(HEIGHTS, tmp_path, replace=True)
-    assert (tmp_path / name / "mine").read_text() == "mine"
-    assert (tmp_path / "python.nc").read_bytes() == before
-
-
-def test_input_stays_beside_an_older_version(tmp_path: Path) -> None:
-    """It is named as the next file of results, and is reached after the older one."""
-    thud.sweep({"name": "a", "parameters": {"height": {"values": [1]}}}, tmp_path)
-    path = tmp_path / "a.zarr"
-    path.write_text("parameters.height.values = [0.5]\nname = 'a'")
-    with pytest.raises(thud.InputError, match=naming("a.zarr", "input")):
-        thud.sweep(path, tmp_path, replace=True)
-    assert path.exists()
-
-
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.EACCES])
-@pytest.mark.parametrize("name", ["python.nc", "python.zarr", "python_surrogate.npz"])
+@pytest.mark.parametrize("name", ["python.nc", "python_surrogate.npz"])
 def test_results_that_cannot_be_read_for_now_stay(
     name: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -386,7 +246,7 @@ def test_results_that_cannot_be_read_for_now_stay(
             "surrogate": {"size": 64, "error": 1.0},
         }
     else:
-        run, study = thud.sweep, {**HEIGHTS, "format": "zarr" if "zarr" in name else "netcdf"}
+        run, study = thud.sweep, HEIGHTS
     run(study, tmp_path)
     inode = (tmp_path / name).stat().st_ino
 
@@ -394,7 +254,6 @@ def test_results_that_cannot_be_read_for_now_stay(
         raise OSError(number, os.strerror(number), name)
 
     with monkeypatch.context() as patch:
-        patch.setattr("xarray.open_zarr", fail)
         patch.setattr("thud.studies.blocks.read_input", fail)
         patch.setattr("thud.studies.trained_surrogate.read_input", fail)
         with pytest.raises(OSError, match=os.strerror(number)):
@@ -409,38 +268,19 @@ def test_unfinished_blocks_of_another_size_are_computed_again(tmp_path: Path) ->
         thud.read_sweep(tmp_path / "python.nc").dataset.attrs))  # fmt: skip
 
 
-def children(pid: int) -> list[int]:
-    """Return the processes that a process has started."""
-    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+@pytest.mark.parametrize("moment", ["open", "has", "keep", "join"])
+def test_two_runs_at_once_both_end_with_the_whole_results(
+    moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before this call of one run the other joins and removes all blocks."""
+    expected = thud.sweep(HEIGHTS).dataset
+    call = getattr(Blocks, moment)
 
+    def other_first(*some: object) -> object:
+        monkeypatch.setattr(Blocks, moment, call)
+        thud.sweep(HEIGHTS, tmp_path)
+        return call(*some)
 
-@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_killed_study_leaves_no_process(tmp_path: Path) -> None:
-    process = start(LONG, tmp_path, "--backend", "processes")
-    started = children(process.pid)
-    assert started
-    process.kill()
-    process.communicate(timeout=30)
-    deadline = time.monotonic() + 10
-    while any(
-        Path(f"/proc/{pid}/status").exists()
-        and "Z (zombie)" not in Path(f"/proc/{pid}/status").read_text()
-        for pid in started
-    ):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-def test_zarr_keeps_the_order(tmp_path: Path) -> None:
-    values = {"values": [1.0, 1.1]}
-    study = {
-        "parameters": {
-            "mass": {"values": [2.4, 2.5]},
-            "height": values,
-            "wall_thickness": {"values": [30, 32], "unit": "mm"},
-        }
-    }
-    expected = thud.sweep({**study, "format": "netcdf"}, tmp_path).dataset
-    found = thud.sweep({**study, "format": "zarr"}, tmp_path).dataset
-    assert list(found.variables) == list(expected.variables)
-    assert [name for name in found.coords if name != "octave"] == list(study["parameters"])
+    monkeypatch.setattr(Blocks, moment, other_first)
+    assert values(thud.sweep(HEIGHTS, tmp_path).dataset).identical(values(expected))
+    assert names_in(tmp_path) == ["python.nc"]

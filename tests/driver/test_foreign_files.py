@@ -221,7 +221,7 @@ def test_nothing_but_regular_files_is_opened(
     tries = {(path, kind) for i, path in enumerate(sorted(written)) for kind in (0, 1 + i % 3)}
     # What it may read, too.
     if "s.toml" in WRITERS[name].inputs:
-        tries |= {(path, 0) for path in ("s.nc", "s.zarr", "s.partial", "s_surrogate.npz")}
+        tries |= {(path, 0) for path in ("s.nc", "s.partial", "s_surrogate.npz")}
     for path, kind in sorted(tries):
         out.mkdir()
         kinds[kind](out / path)
@@ -238,14 +238,14 @@ def test_nothing_but_regular_files_is_opened(
     assert not (tmp_path / "nowhere").exists()
 
 
-@pytest.mark.parametrize("name", ["s.partial", "s.zarr"])
+@pytest.mark.parametrize("name", ["s.partial"])
 def test_pipe_among_checkpoints_is_not_opened(
     name: str, command: Callable[..., int], tmp_path: Path
 ) -> None:
     for path, content in WRITERS["sweep"].inputs.items():
         (tmp_path / path).write_text(str(content))
     (tmp_path / "out" / name).mkdir(parents=True)
-    for path in ("study", "block_000000000000.nc", "zarr.json"):
+    for path in ("study", "block_000000000000.nc"):
         os.mkfifo(tmp_path / "out" / name / path)
         for more in ([], ["--replace"]):
             assert command("sweep", *more) == 1

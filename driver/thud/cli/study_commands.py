@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,12 +21,7 @@ if TYPE_CHECKING:
 _STUDY = argument("study", type=file_of("TOML file"), metavar="STUDY.toml", help="study file")
 _SAMPLES = (
     argument("--yes", dest="allow_large", action="store_true", help="allow any number of samples"),
-    argument(
-        "--backend",
-        choices=("threads", "processes", "dask"),
-        help="how samples are computed; the results are the same (default: threads)",
-    ),
-    argument("--workers", type=int, metavar="N", help="threads or processes"),
+    argument("--workers", type=int, metavar="N", help="threads (default: one per processor)"),
     argument(
         "--scheduler",
         metavar="ADDRESS",
@@ -69,11 +65,10 @@ def run_study(options: argparse.Namespace) -> int:
     }
     if KINDS[options.name].has_samples:
         run_options |= {
-            "backend": options.backend,
             "workers": options.workers,
-            "scheduler": options.scheduler,
             "allow_large": options.allow_large,
         }
+    address = getattr(options, "scheduler", None)
     kind.require_runnable(study, **run_options)
     folder = Path(options.output or Path("outputs", study.name))
     if not options.quiet:
@@ -81,7 +76,12 @@ def run_study(options: argparse.Namespace) -> int:
     figures = not options.no_figures
     directory = open_directory(folder, kind, study, replace=options.replace, figures=figures)
     try:
-        result = kind.compute(study, directory, **run_options)
+        with ExitStack() as stack:
+            if address:
+                from thud.studies.backends import dask_executor
+
+                run_options["executor"] = stack.enter_context(dask_executor(address))
+            result = kind.compute(study, directory, **run_options)
     except ThudError as error:
         message = f"{options.study}: {error}"
         raise type(error)(message) from error

@@ -46,7 +46,7 @@ def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Da
     if study.surrogate:
         for name in study.surrogate.outputs:
             variables[name][-1]["surrogate_error"] = study.surrogate.error_of(name)
-    return in_order(xr.Dataset(variables, coordinates, provenance(study)))
+    return _in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 
 def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
@@ -82,8 +82,8 @@ def provenance(study: SampleStudy) -> dict[str, str]:
     }
 
 
-def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with its variables in the usual order, which Zarr does not keep."""
+def _in_order(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with its variables in the usual order."""
     results = {
         name: dataset.variables[name] for name in ALL_QUANTITIES if name in dataset.data_vars
     }

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
 
 from thud.base.checks import refuse, refuse_unknown
 from thud.studies.directory import StudyDirectory, open_directory
@@ -15,6 +15,7 @@ from thud.studies.study_result import StudyResult
 from thud.studies.trained_surrogate import get_surrogate
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
     from pathlib import Path
 
     from thud.case.case import Case
@@ -31,12 +32,11 @@ class RunOptions(TypedDict, total=False):
 
     Attributes
     ----------
-    backend : str or None
-        ``"threads"`` (the default), ``"processes"`` or ``"dask"``: all give the same results.
     workers : int or None
-        Number of threads or processes; by default one per processor.
-    scheduler : str or None
-        Address of a Dask scheduler.
+        Number of threads; by default one per processor.
+    executor : concurrent.futures.Executor or None
+        Computes the samples instead, with the same results: processes, or machines by the
+        `get_executor` of a Dask client.
     allow_large : bool
         Allow any number of samples.
     progress : bool
@@ -47,9 +47,8 @@ class RunOptions(TypedDict, total=False):
         Surrogate, or the path of its file, that predicts the samples instead of the model.
     """
 
-    backend: Literal["threads", "processes", "dask"] | None
     workers: int | None
-    scheduler: str | None
+    executor: Executor | None
     allow_large: bool
     progress: bool
     replace: bool

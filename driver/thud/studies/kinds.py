@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class KindInfo(NamedTuple):
-    """Help of the command of a kind of study, and whether it computes samples on any backend."""
+    """Help of the command of a kind of study, and whether it computes samples."""
 
     help: str
     has_samples: bool = True

@@ -1,4 +1,4 @@
-"""Kinds of studies that compute samples of drops: design, blocks, backend, dataset."""
+"""Kinds of studies that compute samples of drops: design, blocks, dataset."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud.base._schema import KEYS
-from thud.base.checks import refuse, require_choice
+from thud.base.checks import refuse
 from thud.case.case import impact_only
 from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
-from thud.studies.backends import checked_backend
+from thud.studies.backends import require_workers
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
 from thud.studies.directory import FORMATS, StudyDirectory
@@ -39,7 +39,6 @@ R = TypeVar("R", bound=StudyResult)
 
 # Maximum number of samples without `allow_large`.
 MAX_SAMPLES = 100_000
-_FILE_FORMATS = ("auto", "netcdf", "zarr")
 
 
 def _require_no_floor(case: Case) -> None:
@@ -51,7 +50,7 @@ def _require_no_floor(case: Case) -> None:
 class DropsKind(Kind[SampleStudy, R]):
     """A kind of study that computes many variations of its case."""
 
-    own_keys: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
+    own_keys: ClassVar[tuple[str, ...]] = ("design", "temperature", "surrogate")
     # Sampling designs that are allowed, the default first.
     designs: ClassVar[tuple[str, ...]]
 
@@ -68,8 +67,6 @@ class DropsKind(Kind[SampleStudy, R]):
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its sampling design."""
-        file_format = content.get("format", _FILE_FORMATS[0])
-        require_choice("format", file_format, _FILE_FORMATS)
         table = table_of(content, "temperature") if "temperature" in content else None
         temperature = read_temperature(table, study.case, study.parameters)
         design = read_design(table_of(content, "design"), self.designs, study.parameters)
@@ -80,7 +77,7 @@ class DropsKind(Kind[SampleStudy, R]):
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         common = {**vars(study), "case": case}
-        result = SampleStudy(**common, **design, temperature=temperature, format=file_format)
+        result = SampleStudy(**common, **design, temperature=temperature)
         if "surrogate" not in content:
             return result
         _require_no_floor(case)
@@ -96,13 +93,13 @@ class DropsKind(Kind[SampleStudy, R]):
         return replace(study, plan=None, surrogate=trained)
 
     def require_runnable(self, study: SampleStudy, **options: Unpack[RunOptions]) -> None:
-        """Raise InputError for too many samples or an unknown backend."""
+        """Raise InputError for too many samples or a useless number of workers."""
         if study.count > MAX_SAMPLES and not options.get("allow_large"):
             refuse(
                 self.describe(study),
                 f"up to {MAX_SAMPLES} samples, or allow_large=True (--yes)",
             )
-        checked_backend(options.get("backend"), options.get("workers"), options.get("scheduler"))
+        require_workers(options.get("workers"), options.get("executor"))
 
     def listed_files(self, study: SampleStudy) -> list[str]:
         """Return the names of the figures, and of the surrogate if one is trained."""

@@ -45,8 +45,6 @@ class SampleStudy(Study):
         Number of random samples (of base samples for ``"saltelli"``), and the seed.
     temperature : Temperature or None
         How the material depends on temperature, if the temperature is a parameter.
-    format : str
-        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for large results.
     plan : Plan or None
         How to train a surrogate that predicts the samples.
     surrogate : Surrogate or None
@@ -57,7 +55,6 @@ class SampleStudy(Study):
     size: int = 0
     seed: int = 0
     temperature: Temperature | None = None
-    format: str = "auto"
     plan: Plan | None = None
     surrogate: Surrogate | None = None
 
@@ -95,7 +92,7 @@ class SampleStudy(Study):
 
     @property
     def block_size(self) -> int:
-        """Number of samples that are computed together, the same for all backends."""
+        """Number of samples that are computed together, the same for all executors."""
         if self.plan or self.surrogate:
             return _SURROGATE_BLOCK_SIZE
         if self.design in {"grid", "list"}:

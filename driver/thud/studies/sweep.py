@@ -29,16 +29,10 @@ class Sweep(SampleResult):
     Attributes
     ----------
     dataset : Dataset
-        A grid has one dimension per parameter, other designs the dimension ``sample``. A
-        dataset in Zarr is read on demand.
+        A grid has one dimension per parameter, other designs the dimension ``sample``.
     """
 
     dataset: xr.Dataset
-
-    def __post_init__(self) -> None:
-        """Copy a dataset in memory; one in Zarr may be larger than the memory."""
-        if "source" not in self.dataset.encoding:
-            super().__post_init__()
 
     def __repr__(self) -> str:
         """Return the dimensions and how many samples conform."""
@@ -95,7 +89,7 @@ def sweep(
     output
         Directory of the results; an interrupted study is continued. None: they are not written.
     **options
-        Keywords `backend`, `workers`, `scheduler`, `allow_large`, `progress`, `replace`; see
+        Keywords `workers`, `executor`, `allow_large`, `progress`, `replace`; see
         `thud.studies.kind.RunOptions`.
 
     Returns
@@ -108,7 +102,7 @@ def sweep(
     InputError
         If the study or an option cannot be used.
     NumericalError
-        If the backend loses samples; samples that fail have a status and a reason instead.
+        If the executor loses samples; samples that fail have a status and a reason instead.
     OSError
         If the results cannot be written.
 
@@ -127,13 +121,13 @@ def read_sweep(path: str | os.PathLike[str]) -> Sweep:
     Parameters
     ----------
     path
-        A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` with the
-        finished samples of an incomplete study.
+        A file ``.nc``, or the directory ``.partial`` with the finished samples of an
+        incomplete study.
 
     Returns
     -------
     Sweep
-        The results; those of a Zarr group are read when they are needed.
+        The results.
 
     Raises
     ------
