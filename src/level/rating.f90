@@ -64,6 +64,9 @@ module thud_rating
    !> Allowed sum of the excesses over the curve, dB.
    real(wp), parameter :: max_excess = 8.0_wp
 
+   !> Limit of levels, dB, from which whole numbers are computed: infinite ones have ratings too.
+   real(wp), parameter :: max_finite_level = 1.0e6_wp
+
    !> Difference to the background below which a level is corrected, dB.
    real(wp), parameter :: clear_difference = 15.0_wp
    !> Difference to the background below which the correction is constant, dB.
@@ -112,7 +115,7 @@ contains
       !> The integer level, dB.
       integer :: rounded
 
-      rounded = floor(level + 0.5_wp)
+      rounded = floor(max(-max_finite_level, min(max_finite_level, level)) + 0.5_wp)
    end function get_rounded
 
    !> Class of an A-weighted level without standardization (KS F 2863-2).
@@ -131,11 +134,13 @@ contains
       real(wp), intent(in) :: level(:)
       !> Level of the shifted curve at 500 Hz, dB.
       integer :: rating
+      real(wp) :: excess(size(level))
       integer :: shift
 
-      ! Start where every single excess is above the allowed sum.
-      shift = floor(minval(level - inverse_a_curve) - max_excess) - 1
-      do while (sum(max(0.0_wp, level - inverse_a_curve - shift)) > max_excess)
+      excess = max(-max_finite_level, min(max_finite_level, level - inverse_a_curve))
+      ! Start where the largest excess alone is above the allowed sum: at most that many steps of 1 dB are left.
+      shift = floor(maxval(excess) - max_excess) - 1
+      do while (sum(max(0.0_wp, excess - shift)) > max_excess)
          shift = shift + 1
       end do
       rating = nint(inverse_a_curve(size(inverse_a_curve))) + shift

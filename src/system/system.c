@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdint.h>
@@ -69,6 +70,23 @@ void thud_end_process(int code)
    _exit(code);
 }
 
+// Limit of the memory of the container, bytes, in version 2 or 1 of control groups; infinite if there is none.
+static double get_container_limit(void)
+{
+   static const char *const paths[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
+   double limit = INFINITY;
+
+   for (int i = 0; i < 2; i++) {
+      FILE *file = fopen(paths[i], "re");
+
+      // Version 2 writes "max" for no limit.
+      if (file && fscanf(file, "%lf", &limit) != 1) limit = INFINITY;
+      if (file) fclose(file);
+      if (limit < INFINITY) break;
+   }
+   return limit;
+}
+
 // 1 if there is address space for that many bytes and, if `check_available` is set, the system does not report that less
 // memory is available.
 int thud_has_memory(double bytes, int check_available)
@@ -90,7 +108,7 @@ int thud_has_memory(double bytes, int check_available)
       if (sscanf(line, "SwapFree: %lf", &kilobytes) == 1 && free >= 0.0) free += 1024.0*kilobytes;
    }
    fclose(file);
-   return free < 0.0 || bytes <= free;
+   return (free < 0.0 || bytes <= free) && bytes <= get_container_limit();
 }
 
 // Handlers of the process, which `record_signal` calls too, and the number of running calls of the library.

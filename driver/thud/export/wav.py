@@ -19,8 +19,9 @@ PCM = 1
 def wav_file(samples: NDArray[np.float64], sample_rate: int, comment: str, software: str) -> bytes:
     """Return the content of a WAV file.
 
-    The samples, shape (n_sample,), are fractions of full scale, between -1 and 1. Comment and
-    software are the entries ICMT and ISFT of the INFO list, in UTF-8.
+    The samples, shape (n_sample,), are fractions of full scale, between -1 and 1; the highest
+    code is one count below 1. Comment and software are the entries ICMT and ISFT of the INFO list,
+    in UTF-8.
     """
     counts = np.minimum(np.round(samples * COUNTS), COUNTS - 1).astype("<i4")
     data = counts.view(np.uint8).reshape(-1, 4)[:, :BYTES].tobytes()
