@@ -5,7 +5,7 @@ module thud_directory_answers
    use thud_kinds, only: wp
    use thud_request, only: request_type
    use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, result_directory_type
-   use thud_system, only: name_length, path_length
+   use thud_system, only: path_length
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -19,7 +19,7 @@ contains
       type(request_type), intent(in) :: request
       !> Set if it may not.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: names(:)
+      character(len=path_length), allocatable :: names(:)
 
       call get_list(request, 'names', names)
       call check_target(new_directory(request), names, error)
@@ -68,13 +68,13 @@ contains
    subroutine get_list(request, name, texts)
       type(request_type), intent(in) :: request
       character(len=*), intent(in) :: name
-      character(len=*), allocatable, intent(out) :: texts(:)
+      character(len=path_length), allocatable, intent(out) :: texts(:)
       character(len=:), allocatable :: text
 
       allocate (texts(0))
       do while (request%has(name//'.'//to_text(size(texts) + 1)))
          call request%get_text(name//'.'//to_text(size(texts) + 1), text)
-         texts = [texts, [character(len=len(texts)) :: text]]
+         texts = [texts, [character(len=path_length) :: text]]
       end do
    end subroutine get_list
 

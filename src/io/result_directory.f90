@@ -94,7 +94,7 @@ contains
             //trim(self%command//' '//self%subject)//', or --replace (replace=True)')
          return
       end if
-      if (command /= self%command) listed = [character(len=name_length) :: ]
+      if (command /= self%command) listed = listed(:0)
       do i = 1, size(present_names)
          path = self%path//'/'//trim(present_names(i))
          do j = 1, size(self%inputs)

@@ -105,6 +105,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(text_file_type), allocatable :: files(:)
       type(result_directory_type) :: directory
+      character(len=1) :: no_names(0)
       logical :: opens
       integer :: i
 
@@ -113,7 +114,7 @@ contains
       directory = new_result_directory(outcome%directory, 'run', trim(case%name), [path], options%replace)
       opens = options%folder == ''
       if (.not. opens) directory%folder = options%folder
-      if (opens) call check_target(directory, [character(len=1) :: ], error)
+      if (opens) call check_target(directory, no_names, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)

@@ -216,9 +216,11 @@ def test_other_version_is_reported() -> None:
 def test_useless_numbers_of_workers_are_reported(workers: int) -> None:
     with pytest.raises(thud.InputError, match=naming("workers", workers, 1, 1024)):
         thud.sweep(STUDY, workers=workers)
-    with ThreadPoolExecutor(1) as executor:
-        with pytest.raises(thud.InputError, match=naming("workers", 2, "executor")):
-            thud.sweep(STUDY, workers=2, executor=executor)
+    with (
+        ThreadPoolExecutor(1) as executor,
+        pytest.raises(thud.InputError, match=naming("workers", 2, "executor")),
+    ):
+        thud.sweep(STUDY, workers=2, executor=executor)
 
 
 def test_lost_process_is_reported_and_finished_blocks_are_kept() -> None:

@@ -592,7 +592,9 @@ def test_calibration_that_is_not_stated_leaves_the_verdict_undecided(client: Tes
     content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
     answer = measured(client, content, **query)["answer"]
     assert answer["result"] == "undecided"
-    assert "uncertainty of calibration not stated" in " ".join(map(str, answer["headline"].values()))
+    assert "uncertainty of calibration not stated" in " ".join(
+        map(str, answer["headline"].values())
+    )
     # The uncertainty that the headline names for 500 Hz is the largest that decides it.
     detail = answer["headline"]["detail"]
     found = re.search(r"500 Hz does not conform up to ([\d.]+) % of calibration", detail)

@@ -21,7 +21,6 @@ from synthetic import half_sine, make_recording
 
 import thud
 from thud import cli
-from thud.recordings import measure_drops
 from thud.recordings.budgets import AMPLITUDE_DECIBEL, average_estimates
 from thud.recordings.config import Config, PlateConfig, read_config
 from thud.recordings.recorded_levels import measure_levels

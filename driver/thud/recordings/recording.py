@@ -140,9 +140,7 @@ class Recording(Displayed):
         Raise InputError if a drop cannot be measured.
         """
         require_kind("config", config, Config)
-        drops, origins, uncertainty = measure_signals(
-            signals, config, progress=progress
-        )
+        drops, origins, uncertainty = measure_signals(signals, config, progress=progress)
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)
 

@@ -111,7 +111,9 @@ def dask_executor(address: str) -> Iterator[Executor]:
     logging.disable(logging.CRITICAL)
     try:
         try:
-            client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
+            client = Client(  # type: ignore[no-untyped-call]
+                address, timeout=SCHEDULER_TIMEOUT, set_as_default=False
+            )
             client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT)
         except (OSError, ValueError, TypeError) as error:
             refuse(
@@ -120,7 +122,7 @@ def dask_executor(address: str) -> Iterator[Executor]:
                 error,
             )
         with client:
-            executor = client.get_executor()
+            executor = client.get_executor()  # type: ignore[no-untyped-call]
             try:
                 yield executor
             finally:

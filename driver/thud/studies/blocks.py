@@ -188,7 +188,7 @@ def _readable(path: Path) -> Iterator[None]:
 def _write(dataset: xr.Dataset, path: Path) -> None:
     """Write a NetCDF file atomically."""
     with uninterrupted():
-        replace_file(path, dataset.to_netcdf(engine="h5netcdf"))
+        replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
 
 
 @contextmanager
