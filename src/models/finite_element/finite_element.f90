@@ -3,13 +3,11 @@
 !> Each sampling interval holds as many equal steps as stability requires. The force of a sample is the mean over one
 !> sampling interval around it, so that the record has the impulse of the run.
 module thud_finite_element
-   use thud_ball, only: ball_type, get_density
-   use thud_constants, only: pi
+   use thud_ball, only: ball_type
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
-   use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
+   use thud_finite_element_options, only: count_work, finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
@@ -17,14 +15,13 @@ module thud_finite_element
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
-   use thud_mesh, only: get_element_counts, new_mesh
+   use thud_mesh, only: new_mesh
    use thud_motion, only: new_motion, take_snapshot
    use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_receiver, only: can_strike, get_pole_count, receiver_type
-   use thud_sampling, only: get_step_count, sampling_type
-   use thud_source_model, only: typical_contact
+   use thud_sampling, only: sampling_type
    use thud_text, only: fixed, significant, to_text
    use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
@@ -89,39 +86,18 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
-      real(wp) :: speed, interval, time, n_step, element_cost, damping
+      real(wp) :: n_step, n_padded, element_cost
 
-      ! Pressure waves through the smallest elements, at the inner surface, limit the stable step.
-      speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
-      associate (mesh => get_element_counts(ball, options%mesh))
-         interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
-            mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
-         select case (options%material%viscosity)
-         case ('none')
-            element_cost = 2.5e-8_wp
-         case ('kelvin_voigt')
-            element_cost = 3.8e-8_wp
-         case default
-            element_cost = 7.0e-8_wp
-         end select
-         ! Lanes without an element take as long.
-         element_cost = element_cost*mesh%radial_elements*n_element*ceiling(mesh%polar_elements/real(n_element, wp))
-      end associate
-      if (options%material%viscosity == 'kelvin_voigt') then
-         ! The stable step with the damping ratio of the fastest mode: dt**2 K + 2 dt C <= 4 M.
-         associate (material => options%material)
-            damping = 4*material%loss_factor/(2*pi*material%loss_frequency)/(3*material%bulk_ratio + 4) &
-               *options%step_safety/interval
-         end associate
-         interval = interval*(hypot(1.0_wp, damping) - damping)
-      end if
-      time = typical_contact
-      ! A contact is over when shear waves have crossed the ball.
-      if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))
-      time = time + options%flight_before + options%flight_after
-      if (options%bounces > 1) time = sampling%duration
-      n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
-      cost = 2.5e-3_wp + n_step*element_cost
+      call count_work(ball, options, sampling, n_step, n_padded, contact_time)
+      select case (options%material%viscosity)
+      case ('none')
+         element_cost = 2.5e-8_wp
+      case ('kelvin_voigt')
+         element_cost = 3.8e-8_wp
+      case default
+         element_cost = 7.0e-8_wp
+      end select
+      cost = 2.5e-3_wp + n_step*n_padded*element_cost
       if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 

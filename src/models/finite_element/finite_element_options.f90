@@ -3,6 +3,7 @@ module thud_finite_element_options
    use thud_ball, only: ball_type, get_density
    use thud_band, only: octave_count
    use thud_constants, only: pi
+   use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_floor_contact, only: contact_options_type, get_contact_fields
@@ -11,13 +12,13 @@ module thud_finite_element_options
    use thud_material, only: check_material, get_material_fields, material_options_type
    use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type
    use thud_new_field, only: in_group, integer_field, real_field
-   use thud_sampling, only: get_sample_count, sampling_type
-   use thud_source_model, only: source_model_type
+   use thud_sampling, only: get_sample_count, get_step_count, sampling_type
+   use thud_source_model, only: source_model_type, typical_contact
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: finite_element_options_type, get_frame_count, get_stride
+   public :: count_work, finite_element_options_type, get_frame_count, get_stride
 
    !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
@@ -37,9 +38,9 @@ module thud_finite_element_options
    !> Maximum ratio of the number of elements for the contact to the number for the wall.
    real(wp), parameter :: max_contact_ratio = 2.0_wp
 
-   !> Highest level of resolution, and maximum time of its drop on one core, s.
+   !> Highest level of resolution, and maximum number of steps times elements of its drop.
    integer, parameter :: highest_level = 3
-   real(wp), parameter :: max_cost = 3.54_wp
+   real(wp), parameter :: max_work = 5.05e7_wp
 
    !> Coefficients of friction between which a mesh may be too coarse for the stick and slip of the surface, which then
    !> changes the levels of a finer one only (docs/finite_elements.md): smaller friction is too weak, larger friction sticks.
@@ -156,19 +157,55 @@ contains
       if (level == 0) options%snapshot_interval = 0.0_wp
    end subroutine set_level
 
-   !> Highest level of resolution, such that its drop does not take too long.
+   !> Highest level of resolution, such that its drop has not too many steps and elements.
    function get_highest_level(ball, options, sampling) result(level)
       type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: level
+      real(wp) :: n_step, n_padded
 
       level = 1
       if (.not. options%chooses_resolution()) return
-      do while (level < highest_level .and. options%get_cost(ball, sampling)*refinement_ratio**(3*level) < max_cost)
+      call count_work(ball, options, sampling, n_step, n_padded)
+      do while (level < highest_level .and. n_step*n_padded*refinement_ratio**(3*level) < max_work)
          level = level + 1
       end do
    end function get_highest_level
+
+   !> Numbers of steps and of elements of a drop at one resolution.
+   subroutine count_work(ball, options, sampling, n_step, n_padded, contact_time)
+      type(ball_type), intent(in) :: ball
+      class(finite_element_options_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      !> Number of steps; number of elements with the lanes that are left empty.
+      real(wp), intent(out) :: n_step, n_padded
+      !> Expected contact time, s (default: `typical_contact`).
+      real(wp), intent(in), optional :: contact_time
+      real(wp) :: speed, interval, time, damping
+
+      ! Pressure waves through the smallest elements, at the inner surface, limit the stable step.
+      speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
+      associate (mesh => get_element_counts(ball, options%mesh))
+         interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
+            mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
+         n_padded = mesh%radial_elements*n_element*ceiling(mesh%polar_elements/real(n_element, wp))
+      end associate
+      if (options%material%viscosity == 'kelvin_voigt') then
+         ! The stable step with the damping ratio of the fastest mode: dt**2 K + 2 dt C <= 4 M.
+         associate (material => options%material)
+            damping = 4*material%loss_factor/(2*pi*material%loss_frequency)/(3*material%bulk_ratio + 4) &
+               *options%step_safety/interval
+         end associate
+         interval = interval*(hypot(1.0_wp, damping) - damping)
+      end if
+      time = typical_contact
+      ! A contact is over when shear waves have crossed the ball.
+      if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))
+      time = time + options%flight_before + options%flight_after
+      if (options%bounces > 1) time = sampling%duration
+      n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
+   end subroutine count_work
 
    !> Nodes that stick and slip, and thin walls need higher levels.
    function get_expected_level(ball, options, contact) result(level)
