@@ -102,17 +102,23 @@ contains
       if (.not. allocated(error)) call bundle%add_array('velocity', shape(velocity), velocity)
    end subroutine answer_point_velocity
 
-   !> The impact on a case's mobile floor; empty if the floor is rigid or the model does not couple with it.
+   !> The impact on a case's mobile floor, and the level in the room below, if it has one; empty if the floor is rigid or the
+   !> model does not couple with it.
    subroutine answer_floor_impact(case, bundle, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(inout) :: bundle
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
       type(force_history_type), allocatable :: on_floor
+      type(room_level_type) :: prediction
 
       call prepare_floor(case, state, error)
       if (.not. allocated(error)) call drop_on_floor(case, state, on_floor, error)
-      if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
+      if (allocated(error) .or. .not. allocated(on_floor)) return
+      call add_history(bundle, 'on_floor.', on_floor)
+      if (.not. case%has_room) return
+      call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, .true., prediction, error)
+      if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
    end subroutine answer_floor_impact
 
    !> Level in the room below, from the record `force`, N, at `sample_rate`, Hz.

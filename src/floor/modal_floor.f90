@@ -221,10 +221,13 @@ contains
    subroutine check_radiator(options, error)
       class(modal_floor_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
+      type(floor_modes_type) :: modes
 
-      if (.not. options%plate%thickness > 0.0_wp) error = input_error('&modal_floor: the level in a room needs the mass ' &
-         //'of the floor, and a plate in place of the modes above those of the file; allowed: thickness (above 0), ' &
-         //'density and wave_speed of a plate like the floor')
+      if (options%plate%thickness > 0.0_wp) return
+      call get_modes(options, modes, error)
+      if (.not. allocated(error)) error = input_error('&modal_floor: the level in a room needs the mass of the floor, and ' &
+         //'a plate in place of the modes above '//fixed(maxval(modes%omega)/(2*pi), 0)//' Hz; allowed: thickness (above ' &
+         //'0), density and wave_speed of a plate like the floor')
    end subroutine check_radiator
 
    !> The plate, which replaces the modes above the highest one.

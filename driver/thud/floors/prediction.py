@@ -353,10 +353,11 @@ def predict_level(
             f"{'floor' if floor is None else 'room'} is missing", "a floor, such as Plate, and Room"
         )
     floor_case = replace(case, modes=None, floor=floor, room=room)
-    impact = _on_floor(source, floor_case)
-    level = source.room_level
-    if level is None or (floor, room) != (case.floor, case.room):
-        force = (impact or source).mean_force()
+    impact, level = _on_floor(source, floor_case)
+    if (floor, room) == (case.floor, case.room):
+        level = source.room_level or level
+    if level is None:
+        force = (impact or source).force("floor")
         answer = ask(
             "room_level", case=case_text(floor_case), force=force, sample_rate=source.sample_rate
         )
@@ -402,15 +403,19 @@ def _source_warnings(source: ImpactResult) -> tuple[str, ...]:
     return (warning,)
 
 
-def _on_floor(source: ImpactResult, case: Case) -> FloorImpact | None:
-    """Return the impact on the floor of a case; None if only the blocked force is known."""
+def _on_floor(source: ImpactResult, case: Case) -> tuple[FloorImpact | None, RoomLevel | None]:
+    """Return the impact on the floor of a case; None if only the blocked force is known.
+
+    Also return the level in its room if the impact is computed again.
+    """
     existing = source if isinstance(source, FloorImpact) else source.on_floor
     known = source.case
     if known.model is None or (known.floor, _air(known)) == (case.floor, _air(case)):
-        return existing
+        return existing, None
     plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
-    return new_floor_impact(case, ask("floor_impact", case=case_text(plain)), blocked)
+    answer = ask("floor_impact", case=case_text(plain))
+    return new_floor_impact(case, answer, blocked), new_room_level(answer)
 
 
 def _air(case: Case) -> tuple[float, float]:
