@@ -357,7 +357,7 @@ def predict_level(
     if (floor, room) == (case.floor, case.room):
         level = source.room_level or level
     if level is None:
-        force = (impact or source).force("floor")
+        force = (impact or source).mean_force()
         answer = ask(
             "room_level", case=case_text(floor_case), force=force, sample_rate=source.sample_rate
         )
