@@ -10,13 +10,20 @@ module thud_api
    use thud_bundle, only: bundle_type, retrieve, store
    use thud_error, only: error_type
    use thud_kinds, only: int64, int8, wp
+   use thud_memory, only: require_memory
    use thud_progress, only: latest_progress
    use thud_request, only: request_type
    use thud_system, only: begin_call, end_call, interrupt_calls
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: ask, collect, end_calls, get_progress
+
+   !> Memory for each number of a request, bytes: up to 8.5 copies for levels, low-pass and peaks (measured), twice as many if
+   !> the length is padded to the next power of two. Requests with fewer numbers than `few_numbers` are not checked.
+   real(wp), parameter :: number_memory = 160.0_wp
+   integer, parameter :: few_numbers = 1000000
 
 contains
 
@@ -39,7 +46,10 @@ contains
       call begin_call()
       call use_one_blas_thread()
       allocate (bundle)
-      call get_answer(question, request_type(header, text, values), bundle, error)
+      ! The process would end where an allocation fails.
+      if (n > few_numbers) call require_memory(number_memory*n, 'the '//to_text(n)//' numbers of this call', 'fewer numbers', &
+         error)
+      if (.not. allocated(error)) call get_answer(question, request_type(header, text, values), bundle, error)
       call store(bundle, error, status, handle, n_byte, n_value)
       call restore_blas_threads()
       call end_call()
