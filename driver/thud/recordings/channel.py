@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import threading
 import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -84,11 +85,15 @@ def shown_path(path: Path) -> str:
     return os.fsencode(path).decode("utf-8", "replace")
 
 
+_FILTERS = threading.RLock()
+
+
 @contextmanager
 def guarded(path: Path, kind: str) -> Iterator[None]:
     """Convert any error of a library to InputError, and hide its warnings."""
     try:
-        with warnings.catch_warnings():
+        # The filters of warnings belong to the process: one thread at a time changes them.
+        with _FILTERS, warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
     except InputError:
