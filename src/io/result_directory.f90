@@ -22,6 +22,9 @@ module thud_result_directory
    !> Name of the file that identifies results, and the beginning of its first line.
    character(len=*), parameter :: identity = 'thud.txt', signature = 'written by thud '
 
+   !> How often a target is looked at before it is refused.
+   integer, parameter :: max_checks = 5
+
    !> A directory while its results are written.
    type :: result_directory_type
       !> Path as the user gives it.
@@ -190,10 +193,13 @@ contains
          call add_text(self, trim(names(i))//newline, error)
       end do
       call end_file(self, error)
-      if (.not. allocated(error)) then
+      do i = 1, max_checks
+         if (allocated(error)) exit
+         ! Another process may replace the target between two looks at it.
          call check_target(self, names, refusal)
-         if (allocated(refusal)) call move_alloc(refusal, error)
-      end if
+         if (.not. allocated(refusal)) exit
+         if (i == max_checks) call move_alloc(refusal, error)
+      end do
       if (.not. allocated(error)) then
          call resolve_path(self%path, target, status)
          if (status == 0) call swap_directories(self%folder, target, status)

@@ -341,4 +341,4 @@ def test_figure_that_fails_is_a_warning(
     assert all("the font is damaged" in line for line in told)
     assert not list(Path("out").glob("*.svg"))
     assert all((Path("out") / name).exists() for name in results), list(Path("out").iterdir())
-    assert list(Path("out").iterdir()) or arguments[0] == "figures"
+    assert Path("out").exists() or arguments[0] == "figures"

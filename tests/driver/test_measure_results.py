@@ -167,7 +167,7 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     recording = thud.read_recording(files, height=1.0, mass=2.5)
     drops = tuple(replace(drop, warnings=("long " * 20000,)) for drop in recording.drops)
     instruments = ("plate", Instrument("amplifier", certificate="K-1"))
-    config = replace(recording.config, laboratory="Ωmega\udcff\0", instruments=instruments)
+    config = replace(recording.config, laboratory="Ωmega", instruments=instruments)
     recording = replace(recording, drops=drops, config=config)
     recording_files.save(recording, Results(tmp_path / "out", "measure"), figures=False)
     with xr.open_dataset(tmp_path / "out/recording.nc") as found:

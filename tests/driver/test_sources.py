@@ -33,7 +33,6 @@ def test_threads_share_no_lengths_of_texts() -> None:
         "room_report.f90",
         "schema.f90",
         "screen.f90",
-        "system.f90",
         "table.f90",
     }
 

@@ -112,7 +112,8 @@ def _effective(text: bytes) -> bytes:
 def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> tuple[str, str]:
     """Run a case as the executable does, and look at all that it leaves."""
     out = Path("o")
-    found = ask("run", path=str(path), output=str(out), replace=0, progress=0)
+    out.mkdir()
+    found = ask("run", path=str(path), folder=str(out), progress=0)
     if wrong := _no_numbers("", found):
         return "NaN", wrong
     files = {one.name: one.read_bytes() for one in out.iterdir() if one.is_file()}
@@ -138,8 +139,9 @@ def _differing(files: dict[str, bytes]) -> list[str]:
     """Return the files that a run of the effective input makes otherwise."""
     Path("o/effective.nml").rename("effective.nml")
     shutil.rmtree("o")
+    Path("o").mkdir()
     try:
-        ask("run", path="effective.nml", output="o", replace=0, progress=0)
+        ask("run", path="effective.nml", folder="o", progress=0)
     finally:
         Path("effective.nml").unlink()
     again = {one.name: one.read_bytes() for one in Path("o").iterdir() if one.is_file()}
