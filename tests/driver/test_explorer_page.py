@@ -197,7 +197,13 @@ def test_does_my_recording_conform(browser: Browser, server: Served, tmp_path: P
     page.locator("#recording_plate_share").press("Tab")
     settle(page)
     sync_api.expect(asks).to_be_hidden()
-    # The mark is that of an uncertainty without that of the calibration.
+    # What is not stated leaves the result open, until it is.
+    missing = "uncertainty of calibration and resonance of the plate not stated"
+    sync_api.expect(page.locator("#verdict")).to_contain_text(missing)
+    for name in ("calibration", "plate_f0"):
+        page.locator(f"#recording_{name}_uncertainty").fill("0.1")
+        page.locator(f"#recording_{name}_uncertainty").press("Tab")
+    settle(page)
     sync_api.expect(page.locator("#verdict")).to_have_text(
         re.compile(r"Does not conform: 500 Hz 10\.\d+ ± 0\.\d+ † dB, below 10\.5")
     )
