@@ -20,8 +20,8 @@ module thud_api
 
    public :: ask, collect, end_calls, get_progress
 
-   !> Memory for each number of a request, bytes: up to 8.5 copies for levels, low-pass and peaks (measured), twice as many if
-   !> the length is padded to the next power of two. Requests with fewer numbers than `few_numbers` are not checked.
+   !> Memory for each number of a request, bytes: up to 8.5 copies for levels, low-pass and peaks (measured), twice as many
+   !> if the length is padded to the next power of two. Requests with fewer numbers than `few_numbers` are not checked.
    real(wp), parameter :: number_memory = 160.0_wp
    integer, parameter :: few_numbers = 1000000
 
@@ -47,8 +47,8 @@ contains
       call use_one_blas_thread()
       allocate (bundle)
       ! The process would end where an allocation fails.
-      if (n > few_numbers) call require_memory(number_memory*n, 'the '//to_text(n)//' numbers of this call', 'fewer numbers', &
-         error)
+      if (n > few_numbers) call require_memory(number_memory*n, 'the '//to_text(n)//' numbers of this call', &
+         'fewer numbers', error)
       if (.not. allocated(error)) call get_answer(question, request_type(header, text, values), bundle, error)
       call store(bundle, error, status, handle, n_byte, n_value)
       call restore_blas_threads()

@@ -75,7 +75,7 @@ module thud_force_history
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Snapshots of the deformed source, if the model takes any.
-      type(motion_type) :: motion
+      type(motion_type), allocatable :: motion
       !> Time of first touch in the record, s.
       real(wp) :: touch_time = 0.0_wp
       !> Time from first touch to release, s.

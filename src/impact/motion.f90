@@ -4,7 +4,7 @@ module thud_motion
    implicit none (type, external)
    private
 
-   public :: motion_type, new_motion, take_snapshot
+   public :: motion_type, start_motion, take_snapshot
 
    !> Snapshots; nodes run from the lowest point to the highest and from the inner surface to the outer.
    type :: motion_type
@@ -31,13 +31,13 @@ module thud_motion
 contains
 
    !> Allocates space for snapshots.
-   pure function new_motion(start, capacity) result(motion)
+   pure subroutine start_motion(start, capacity, motion)
       !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in) :: start(0:, 0:, :)
       !> Maximum number of snapshots.
       integer, intent(in) :: capacity
       !> The motion, without a snapshot yet.
-      type(motion_type) :: motion
+      type(motion_type), intent(out) :: motion
       integer :: n_polar, n_radial
 
       n_polar = ubound(start, 1)
@@ -46,7 +46,7 @@ contains
       allocate (motion%contact_pressure(0:n_polar, capacity), motion%contact_shear(0:n_polar, capacity))
       allocate (motion%start(0:n_polar, 0:n_radial, 2), source=start)
       allocate (motion%position(0:n_polar, 0:n_radial, 2, capacity), motion%velocity(0:n_polar, 0:n_radial, 2, capacity))
-   end function new_motion
+   end subroutine start_motion
 
    !> Adds a snapshot if there is space for it.
    pure subroutine take_snapshot(motion, time, position, velocity, contact_stress, cavity_pressure, &

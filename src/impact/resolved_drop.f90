@@ -38,6 +38,7 @@ contains
       class(source_model_type), allocatable :: prepared
       type(force_history_type) :: coarse, finer
       type(force_history_type), allocatable :: references(:)
+      type(motion_type), allocatable :: motion
       real(wp), allocatable :: min_error(:, :)
       type(error_type), allocatable :: coarse_error
       integer :: level, highest, reference
@@ -57,9 +58,9 @@ contains
       end if
       do level = 1, highest
          if (.not. allocated(coarse_error)) then
+            call move_alloc(history%motion, motion)
             coarse = history
             references(level - 1) = history
-            references(level - 1)%motion = motion_type()
          end if
          call solve_at(level, history, error)
          if (allocated(error)) then
@@ -67,6 +68,7 @@ contains
             ! The next coarser level has a result, and no finer one can be computed.
             deallocate (error)
             history = coarse
+            call move_alloc(motion, history%motion)
             is_finest = .true.
             exit
          end if

@@ -226,7 +226,7 @@ contains
 
       if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//'model_histories.csv', &
          get_model_histories_csv(history))
-      if (history%motion%n_frame == 0) return
+      if (.not. allocated(history%motion)) return
       call get_snapshots_csv(history%motion, text)
       call add_file(files, prefix//'snapshots.csv', text)
    end subroutine add_history_files

@@ -84,8 +84,8 @@ contains
             call bundle%add_array(prefix//'model_histories.'//history%model_history_name(i), n, history%model_history(:, i))
          end do
       end if
+      if (.not. allocated(history%motion)) return
       associate (motion => history%motion, n_frame => history%motion%n_frame)
-         if (n_frame == 0) return
          call bundle%add_array(prefix//'motion.time', [n_frame], motion%time)
          call bundle%add_array(prefix//'motion.start', shape(motion%start), motion%start)
          call bundle%add_array(prefix//'motion.position', [shape(motion%start), n_frame], motion%position)

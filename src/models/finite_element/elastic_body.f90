@@ -84,8 +84,8 @@ contains
    end function new_elastic_body
 
    !> Nodal forces of stress and gas.
-   pure subroutine get_internal_forces(body, position, velocity, interval, commit, force, state)
-      !> The body; its viscous tensors are updated on commit.
+   pure subroutine get_internal_forces(body, position, velocity, interval, force, state)
+      !> The body; its viscous tensors advance to the end of the step.
       type(elastic_body_type), intent(inout) :: body
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in), contiguous :: position(0:, 0:, :)
@@ -93,14 +93,12 @@ contains
       real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> Whether the viscous tensors advance to the end of the step.
-      logical, intent(in) :: commit
       !> Forces, N: the same shape as the positions.
       real(wp), intent(out), contiguous :: force(0:, 0:, :)
       !> Energies and power.
       type(body_state_type), intent(out) :: state
       real(wp), dimension(n_lane, n_component) :: f, rate, stress
-      real(wp), dimension(n_lane, n_symmetric) :: c, inverse, isochoric, trial
+      real(wp), dimension(n_lane, n_symmetric) :: c, inverse, isochoric
       real(wp), dimension(n_lane) :: jacobian, root, mean_stress, density, power, energy, loss, lowest
       type(branch_step_type) :: step(size(body%material%branch_time))
       real(wp) :: volume
@@ -115,7 +113,7 @@ contains
       f = spread([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp], 1, n_lane)
       rate = 0.0_wp
       associate (material => body%material)
-         step = new_branch_step(material%branch_modulus, material%branch_time, interval, .not. commit)
+         step = new_branch_step(material%branch_modulus, material%branch_time, interval)
          do k = 1, size(body%blocks)
             associate (block => body%blocks(k), i => body%blocks(k)%ring)
                call get_gradients(block, last, position(:, i - 1:i, 1), position(:, i - 1:i, 2), f)
@@ -127,12 +125,7 @@ contains
                call get_elastic_stress(material%shear_modulus, material%mooney_share, c, inverse, isochoric, density)
                power = 0.0_wp
                do b = 1, size(step)
-                  if (commit) then
-                     call add_branch_stress(step(b), c, inverse, body%viscous(:, :, b, k), isochoric, density, power)
-                  else
-                     trial = body%viscous(:, :, b, k)
-                     call add_branch_stress(step(b), c, inverse, trial, isochoric, density, power)
-                  end if
+                  call add_branch_stress(step(b), c, inverse, body%viscous(:, :, b, k), isochoric, density, power)
                end do
                call get_nominal_stress(block%weight, f, root, c, isochoric, mean_stress, stress)
                if (material%viscosity > 0.0_wp) call add_viscous_stress(material%viscosity, block%weight, f, rate, root, &

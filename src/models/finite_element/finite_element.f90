@@ -10,18 +10,19 @@ module thud_finite_element
    use thud_finite_element_options, only: count_work, finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
-   use thud_impact_run, only: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, &
-      new_impact_run, update_position, update_velocity
+   use thud_impact_run, only: get_energy, get_mean_height, get_mean_velocity, impact_run_type, new_impact_run, &
+      update_position, update_velocity
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
    use thud_mesh, only: new_mesh
-   use thud_motion, only: new_motion, take_snapshot
+   use thud_motion, only: start_motion, take_snapshot
    use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_receiver, only: can_strike, get_pole_count, receiver_type
    use thud_sampling, only: sampling_type
+   use thud_stable_step, only: get_stable_interval
    use thud_text, only: fixed, significant, to_text
    use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
@@ -32,9 +33,11 @@ module thud_finite_element
    !> Energy residual at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
-   !> Maximum number of runs of a drop, and the fraction of `step_safety` that each next one keeps.
-   integer, parameter :: max_attempts = 3
-   real(wp), parameter :: next_safety = 0.75_wp
+   !> Maximum number of runs of a drop; each next one has half of the step.
+   integer, parameter :: max_attempts = 4
+
+   !> Maximum number of steps in a sampling interval.
+   integer, parameter :: max_steps = 100000
 
    !> Maximum penetration into the layer on the floor, as a fraction of the wall thickness: the layer is thin.
    real(wp), parameter :: max_penetration = 0.1_wp
@@ -176,7 +179,7 @@ contains
       do attempt = 1, max_attempts
          call solve_once(ball, drop, attempted, sampling, history, error, receiver)
          if (history%energy_residual <= max_energy_residual) exit
-         attempted%step_safety = next_safety*attempted%step_safety
+         attempted%step_safety = attempted%step_safety/2
       end do
       if (attempt > 1 .and. .not. allocated(error)) call add_model_quantity(history, 'reduced_step_safety', '', &
          attempted%step_safety)
@@ -221,7 +224,10 @@ contains
          return
       end if
       run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)
-      history%motion = new_motion(run%position, get_frame_count(options, sampling))
+      if (options%snapshot_interval > 0.0_wp) then
+         allocate (history%motion)
+         call start_motion(run%position, get_frame_count(options, sampling), history%motion)
+      end if
       call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
    end subroutine solve_once
@@ -246,8 +252,7 @@ contains
       interval = 1/sampling%sample_rate
       n_step = 0
       check_stride = max(1, nint(check_interval*sampling%sample_rate))
-      stride = huge(stride)
-      if (size(history%motion%time) > 0) stride = get_stride(options, sampling)
+      stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
          if (mod(i - 1, check_stride) == 0) call check_step(run, time, options, sampling, n_sample, n_step, error)
@@ -264,8 +269,9 @@ contains
                call record_sample(run, i, touch_height, history)
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
-               if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
-                  get_contact_stress(run, interval), run%state%gas_pressure, run%floor%displacement)
+               if (allocated(history%motion) .and. mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, &
+                  run%position, run%velocity, get_contact_stress(run, interval), run%state%gas_pressure, &
+                  run%floor%displacement)
                run%node_impulse = 0.0_wp
             end if
             call add_to_means(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), &
@@ -315,7 +321,8 @@ contains
       end if
    end function get_duration_error
 
-   !> Chooses the steps of the next sampling intervals; returns an error if the run would take too long.
+   !> Chooses the steps of the next sampling intervals, never fewer than before; returns an error if the run would take too
+   !> long.
    subroutine check_step(run, time, options, sampling, n_sample, n_step, error)
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
@@ -329,11 +336,13 @@ contains
       integer, intent(inout) :: n_step
       !> Set if there would be too many steps.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: interval
+      real(wp) :: interval, wanted
 
       interval = 1/sampling%sample_rate
       call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
-      call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
+      wanted = interval/(options%step_safety*get_stable_interval(run%body%mesh%r, run%body%mesh%z, run%body%material, &
+         run%contact))
+      n_step = max(n_step, sampling%substeps, ceiling(min(wanted, 2.0_wp*max_steps)))
       associate (n_node => size(run%position)/2)
          if (n_step <= max_steps .and. real(n_step, wp)*n_sample*n_node <= max_work) return
          error = numerical_error(trim(event_prefix(time))//' stability asks for steps below '//to_text(interval/n_step) &

@@ -6,14 +6,16 @@ module thud_finite_element_options
    use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
-   use thud_floor_contact, only: contact_options_type, get_contact_fields
+   use thud_floor_contact, only: contact_options_type, get_contact_fields, new_floor_contact
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_material, only: check_material, get_material_fields, material_options_type
-   use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type
+   use thud_material, only: check_material, get_material_fields, material_options_type, material_type, &
+      new_material
+   use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type, mesh_type, new_mesh
    use thud_new_field, only: in_group, integer_field, real_field
    use thud_sampling, only: get_sample_count, get_step_count, sampling_type
    use thud_source_model, only: source_model_type, typical_contact
+   use thud_stable_step, only: get_stable_interval
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -182,23 +184,18 @@ contains
       real(wp), intent(out) :: n_step, n_padded
       !> Expected contact time, s (default: `typical_contact`).
       real(wp), intent(in), optional :: contact_time
-      real(wp) :: speed, interval, time, damping
+      type(mesh_type) :: mesh
+      type(material_type) :: material
+      type(error_type), allocatable :: error
+      real(wp) :: interval, time
 
-      ! Pressure waves through the smallest elements, at the inner surface, limit the stable step.
-      speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
-      associate (mesh => get_element_counts(ball, options%mesh))
-         interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
-            mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
-         n_padded = mesh%radial_elements*n_element*ceiling(mesh%polar_elements/real(n_element, wp))
-      end associate
-      if (options%material%viscosity == 'kelvin_voigt') then
-         ! The stable step with the damping ratio of the fastest mode: dt**2 K + 2 dt C <= 4 M.
-         associate (material => options%material)
-            damping = 4*material%loss_factor/(2*pi*material%loss_frequency)/(3*material%bulk_ratio + 4) &
-               *options%step_safety/interval
-         end associate
-         interval = interval*(hypot(1.0_wp, damping) - damping)
-      end if
+      mesh = new_mesh(ball, options%mesh)
+      n_padded = mesh%n_radial*n_element*ceiling(mesh%n_polar/real(n_element, wp))
+      ! The run reports a material that cannot be.
+      call new_material(options%material, ball, material, error)
+      interval = 1/sampling%sample_rate
+      if (.not. allocated(error)) interval = options%step_safety*get_stable_interval(mesh%r, mesh%z, material, &
+         new_floor_contact(options%contact, ball, mesh))
       time = typical_contact
       ! A contact is over when shear waves have crossed the ball.
       if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))

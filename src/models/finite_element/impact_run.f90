@@ -1,7 +1,6 @@
 !> The ball in motion: steps of explicit central differences, and the balances of momentum and energy.
 module thud_impact_run
    use thud_ball, only: ball_type
-   use thud_constants, only: pi
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
    use thud_finite_element_options, only: finite_element_options_type
    use thud_floor_contact, only: floor_contact_type, get_contact_forces, new_floor_contact, slow_by_friction, stop_at_floor
@@ -10,19 +9,11 @@ module thud_impact_run
    use thud_mesh, only: new_mesh
    use thud_moving_floor, only: advance_floor, find_floor, moving_floor_type, new_moving_floor, predict
    use thud_receiver, only: receiver_type
-   use thud_stable_step, only: find_stability_ratio, get_first_direction, max_stability_ratio
    implicit none (type, external)
    private
 
-   public :: choose_step, get_energy, get_mean_height, get_mean_velocity, impact_run_type, max_steps, update_position, &
+   public :: get_energy, get_mean_height, get_mean_velocity, impact_run_type, new_impact_run, update_position, &
       update_velocity
-   public :: new_impact_run
-
-   !> Power iterations at the start of a run, and whenever the mode is known from before.
-   integer, parameter :: first_iterations = 80, next_iterations = 3
-
-   !> Maximum number of steps in a sampling interval.
-   integer, parameter :: max_steps = 100000
 
    !> State of a run between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: impact_run_type
@@ -41,8 +32,6 @@ module thud_impact_run
       real(wp) :: total_mass = 0.0_wp
       !> Forces of stress and gas in the latest step, N.
       real(wp), allocatable :: force(:, :, :)
-      !> Estimated shape of the fastest mode, over all nodes.
-      real(wp), allocatable :: direction(:, :, :)
       !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar, 2].
       real(wp), allocatable :: floor_force(:, :)
       !> Impulse of the floor upwards in the latest step, N s.
@@ -95,53 +84,9 @@ contains
          allocate (run%inverse_mass, source=1/run%mass)
          allocate (run%force, mold=run%mass)
          run%total_mass = sum(run%body%mass)
-         allocate (run%direction(0:mesh%n_polar, 0:mesh%n_radial, 2), source=get_first_direction(run%body))
          allocate (run%floor_force(0:mesh%n_polar, 2), run%node_impulse(0:mesh%n_polar, 2), source=0.0_wp)
       end associate
    end function new_impact_run
-
-   !> Chooses a stable number of steps per sampling interval, which never decreases during a run.
-   subroutine choose_step(run, interval, safety, min_steps, n_step)
-      type(impact_run_type), intent(inout) :: run
-      !> Sampling interval, s; fraction of the stability limit to use.
-      real(wp), intent(in) :: interval, safety
-      integer, intent(in) :: min_steps
-      !> The number so far, 0 at the start; gets the new one, above `max_steps` if too many are needed.
-      integer, intent(inout) :: n_step
-      real(wp) :: stability_ratio, ratio, wave, width
-      integer :: n_iteration, iteration
-      logical :: starts
-
-      n_iteration = next_iterations
-      starts = n_step == 0
-      if (starts) then
-         n_iteration = first_iterations
-         associate (material => run%body%material, mesh => run%body%mesh)
-            wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
-            associate (inner => mesh%r(mesh%n_polar/2, 0), next => mesh%r(mesh%n_polar/2, 1))
-               width = min(next - inner, pi/real(mesh%n_polar, wp)*inner)
-            end associate
-         end associate
-         n_step = max(min_steps, ceiling(min(interval*wave/width, 2.0_wp*max_steps)))
-      end if
-      do iteration = 1, 20
-         if (n_step > max_steps) exit
-         call find_stability_ratio(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, &
-            run%direction, stability_ratio)
-         ! If there are no forces, the next step reports the reason.
-         if (stability_ratio >= huge(stability_ratio)) exit
-         ! The mode depends little on the step.
-         n_iteration = next_iterations
-         ratio = stability_ratio/(safety*max_stability_ratio)
-         ! The ratio grows with a power of the step from 1 to 2: of the numbers of steps by these two, the higher is taken.
-         if (ratio <= 1.0_wp) then
-            ! Later the number never decreases, since the estimated mode lags behind the deforming ball.
-            if (starts) n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
-            exit
-         end if
-         n_step = ceiling(n_step*min(ratio, 2.0_wp))
-      end do
-   end subroutine choose_step
 
    !> First half of a step: forces and energies at the present positions, and velocities half a step later.
    pure subroutine update_velocity(run, interval)
@@ -156,7 +101,7 @@ contains
       last = run%body%mesh%n_radial
       span = (run%last_interval + interval)/2
       starts = .not. run%last_interval > 0.0_wp
-      call get_internal_forces(run%body, run%position, run%velocity, interval, .true., run%force, run%state)
+      call get_internal_forces(run%body, run%position, run%velocity, interval, run%force, run%state)
       if (run%state%failure /= no_failure) return
       before = run%velocity(:, last, :)
       surface = run%position(:, last, :)

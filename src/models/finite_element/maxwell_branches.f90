@@ -42,18 +42,14 @@ module thud_maxwell_branches
 contains
 
    !> A step of a branch.
-   pure elemental function new_branch_step(modulus, time, interval, alternates) result(step)
+   pure elemental function new_branch_step(modulus, time, interval) result(step)
       !> Shear modulus, Pa; relaxation time, s; length of the step, s.
       real(wp), intent(in) :: modulus, time, interval
-      !> Whether the modulus is raised to that of the fastest mode, in which strains and viscous tensors change sign in each
-      !> step.
-      logical, intent(in) :: alternates
       type(branch_step_type) :: step
       real(wp) :: ratio
 
       ratio = interval/time
       step%modulus = modulus
-      if (alternates) step%modulus = modulus*(1 + tanh(ratio/2))
       step%power_factor = step%modulus/time
       if (ratio < 1.0e-3_wp) then
          ! A series, since the difference would lose digits; off by x**4/720.

@@ -225,7 +225,7 @@ contains
       type(body_state_type) :: state
       real(wp) :: pressure
 
-      call get_internal_forces(pressed%body, position, 0*position, 1.0_wp, .false., force, state)
+      call get_internal_forces(pressed%body, position, 0*position, 1.0_wp, force, state)
       failed = state%failure /= no_failure
       if (failed) return
       pressure = get_gas_pressure(pressed%cavity, get_volume(position(:, 0, 1), position(:, 0, 2)))
@@ -242,7 +242,7 @@ contains
       type(body_state_type) :: state
       real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force
 
-      call get_internal_forces(pressed%body, pressed%position, 0*pressed%position, 1.0_wp, .false., force, state)
+      call get_internal_forces(pressed%body, pressed%position, 0*pressed%position, 1.0_wp, force, state)
       energy = state%strain_energy + get_gas_energy(pressed%cavity, get_volume(pressed%position(:, 0, 1), &
          pressed%position(:, 0, 2)))
    end subroutine get_energy
