@@ -88,9 +88,8 @@ contains
    end subroutine predict_room
 
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
-   !> that of the simply supported floor without further supports, its floating plate simply supported, too: its waves are so
-   !> short that these matter little. The middle of the floor represents it if not all of it is resolved. The power through
-   !> bridges is that of infinite plates there.
+   !> that of the simply supported floor without further supports: its waves are so short that these matter little. The
+   !> middle of the floor represents it if not all of it is resolved.
    subroutine get_radiation(room, floor, state, plate, modes, bands, radiation, error)
       type(room_type), intent(in) :: room
       class(floor_model_type), intent(in) :: floor
@@ -126,8 +125,7 @@ contains
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor]
       radiation%upper_factor = [radiation%upper_factor, beyond%upper_factor]
       radiation%energy_beyond = [radiation%energy_beyond, beyond%energy_beyond]
-      radiation%conductance = [radiation%conductance, &
-         beyond%conductance + floor%get_bridge_conductance(bands(n + 1:)%center)]
+      radiation%conductance = [radiation%conductance, beyond%conductance]
    end subroutine get_radiation
 
    !> Part of a floor above a room: its ends along length and width, m.

@@ -20,7 +20,7 @@ module thud_floor_model
    !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
 
-   !> Simply supported edges without further supports and rows across ribs; of large floors the middle, as far as modes reach
+   !> Simply supported edges without further supports; of large floors the middle, as far as modes reach
    !> the highest frequency of a rating.
    character(len=*), parameter :: uncoupled_support = 'uncoupled'
 
@@ -59,7 +59,6 @@ module thud_floor_model
       procedure, pass(options) :: get_support
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
-      procedure, pass(options) :: get_bridge_conductance
       procedure, pass(options) :: has_subceiling
    end type floor_model_type
 
@@ -307,17 +306,6 @@ contains
 
       yes = .false.
    end function has_modal_conductance
-
-   !> Power into the bearing plate through the bridges of a floating plate per mean-square force, m/(N s): [n]; by default
-   !> none.
-   function get_bridge_conductance(options, frequency) result(conductance)
-      class(floor_model_type), intent(in) :: options
-      !> Frequencies, Hz: [n].
-      real(wp), intent(in) :: frequency(:)
-      real(wp) :: conductance(size(frequency))
-
-      conductance = 0.0_wp
-   end function get_bridge_conductance
 
    !> Whether a subceiling is a part of the floor; by default not.
    pure function has_subceiling(options) result(yes)

@@ -1,16 +1,14 @@
 !> A timber joist floor: sheathing on joists as ribs; its mean properties are those of an orthotropic plate.
 module thud_joist_floor
    use thud_constants, only: pi
-   use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, name_length
    use thud_floor_model, only: floor_state_type, reason_length
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, real_field
+   use thud_new_field, only: choice_field, real_field
    use thud_plate, only: plate_type
    use thud_plate_stack, only: ribs_type
    use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
    use thud_screed, only: new_orthotropic
-   use thud_text, only: to_text
    implicit none (type, external)
    private
 
@@ -18,9 +16,6 @@ module thud_joist_floor
 
    !> Ratio of the shear modulus of softwood to its modulus of elasticity (EN 338).
    real(wp), parameter :: shear_ratio = 1.0_wp/16
-
-   !> Composite action of screwed chipboard, an estimate.
-   real(wp), parameter :: default_connection = 0.1_wp
 
    !> The floor; the defaults are chipboard screwed to softwood joists.
    type, extends(rectangular_floor_type) :: joist_floor_type
@@ -32,21 +27,14 @@ module thud_joist_floor
       real(wp) :: spacing = 0.4_wp
       !> Width and height of a joist, m; its density, kg/m3; its modulus of elasticity, Pa.
       real(wp) :: joist_width = 0.06_wp, joist_height = 0.22_wp, joist_density = 420.0_wp, joist_modulus = 1.1e10_wp
-      !> Fraction of the full composite action of sheathing and joists.
-      real(wp) :: connection = default_connection
-      !> Distance of screws along a joist, m; stiffness of one against slip, N/m (0: the connection is stated), and against
-      !> lifting, N/m (0: rigid).
-      real(wp) :: screw_spacing = 0.15_wp, screw_slip = 0.0_wp, screw_stiffness = 0.0_wp
-      !> Positions of rows of blocking along the length, m, and bending stiffness of a row, N m2; 0: that of a joist alone.
-      type(list_type) :: blocking_x
-      real(wp) :: blocking_stiffness = 0.0_wp
+      !> Fraction of the full composite action of sheathing and joists: an estimate for screwed chipboard.
+      real(wp) :: connection = 0.1_wp
       !> Loss factor including that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
       !> Impact location: midway between the next two joists (`sheathing`), the next `joist`, or exactly the `position`.
       character(len=name_length) :: source_on = 'sheathing'
    contains
       procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
       procedure, pass(options) :: get_base
       procedure, pass(options) :: get_source
       procedure, pass(options) :: get_validity
@@ -74,15 +62,6 @@ contains
          real_field('joist_modulus', options%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
          real_field('connection', options%connection, '', &
          'composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
-         real_field('screw_spacing', options%screw_spacing, 'm', 'distance of the screws along a joist', '[0.01, 2]'), &
-         real_field('screw_slip', options%screw_slip, 'N/m', 'slip modulus of a screw, for the composite action by EN ' &
-         //'1995-1-1 annex B; 0: connection', '[0, 1e12]'), &
-         real_field('screw_stiffness', options%screw_stiffness, 'N/m', &
-         'stiffness of a screw against lifting of the sheathing off the joist; 0: rigid', '[0, 1e12]'), &
-         list_field('blocking_x', options%blocking_x, 'm', 'positions along the length of rows of blocking between joists', &
-         '(0, 100)'), &
-         real_field('blocking_stiffness', options%blocking_stiffness, 'N m2', &
-         'bending stiffness of a row of blocking; 0: that of a joist, without gaps', '[0, 1e12]'), &
          real_field('loss_factor', options%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          options%get_source_fields(), &
@@ -91,24 +70,6 @@ contains
          [character(len=9) :: 'sheathing', 'joist', 'position']), &
          options%get_build_up_fields(on_joists=.true.), options%get_point_fields()]
    end function get_fields
-
-   !> Checks screws and blocking, then what all rectangular floors have.
-   subroutine check(options, error)
-      class(joist_floor_type), intent(in) :: options
-      type(error_type), allocatable, intent(out) :: error
-
-      associate (positions => options%blocking_x%values(:options%blocking_x%count))
-         if (options%screw_slip > 0.0_wp .and. abs(options%connection - default_connection) > 0.0_wp) then
-            error = input_error('&joist_floor: connection and screw_slip state the composite action twice; allowed: one ' &
-               //'of them')
-         else if (any(positions >= options%length)) then
-            error = input_error('&joist_floor: blocking_x = '//to_text(maxval(positions))//' m lies outside the floor; ' &
-               //'allowed: below '//to_text(options%length)//' m')
-         else
-            call options%check_build_up(error)
-         end if
-      end associate
-   end subroutine check
 
    !> The smeared plate, and the sheathing with its joists.
    function get_base(options) result(base)
@@ -132,36 +93,8 @@ contains
          joists%inertia = joists%mass*(b**2 + h**2)/12
       end associate
       joists%loss_factor = options%loss_factor
-      joists%fastening = options%screw_stiffness/options%screw_spacing
-      base%stiffness%ribs = [joists]
-      if (options%blocking_x%count > 0) base%stiffness%ribs = [joists, get_blocking(options)]
+      allocate (base%stiffness%ribs, source=joists)
    end function get_base
-
-   !> Rows of blocking: beams across the joists, with their section, which follow the sheathing.
-   pure function get_blocking(options) result(blocking)
-      class(joist_floor_type), intent(in) :: options
-      type(ribs_type) :: blocking
-
-      allocate (blocking%position, source=options%blocking_x%values(:options%blocking_x%count))
-      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height)
-         blocking%along_width = .true.
-         blocking%bending = options%blocking_stiffness
-         if (.not. blocking%bending > 0.0_wp) blocking%bending = e*b*h**3/12
-         blocking%mass = options%joist_density*b*h
-         blocking%inertia = blocking%mass*(b**2 + h**2)/12
-      end associate
-      blocking%loss_factor = options%loss_factor
-   end function get_blocking
-
-   !> Fraction of the composite action of sheathing and joists: as stated, or that of screws (EN 1995-1-1 equation B.5).
-   pure function get_connection(options) result(connection)
-      class(joist_floor_type), intent(in) :: options
-      real(wp) :: connection
-
-      connection = options%connection
-      if (options%screw_slip > 0.0_wp) connection = 1/(1 + pi**2*options%sheathing_modulus*options%sheathing_thickness &
-         *options%spacing*options%screw_spacing/(options%screw_slip*options%length**2))
-   end function get_connection
 
    !> Positions of the joists' axes across the width, symmetric about the center, m: [n_joist].
    pure function get_positions(options) result(position)
@@ -215,7 +148,7 @@ contains
          t => options%sheathing_thickness, a => options%spacing)
          ! Axial stiffness, N, of the connected fraction of the sheathing and of a joist; distance of the joist's axis from
          ! the neutral axis, m.
-         sheathing_axial = get_connection(options)*options%sheathing_modulus*t*a
+         sheathing_axial = options%connection*options%sheathing_modulus*t*a
          joist_axial = e*b*h
          eccentricity = (h + t)/2
          joist_offset = sheathing_axial*eccentricity/(sheathing_axial + joist_axial)

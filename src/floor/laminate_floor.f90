@@ -19,10 +19,10 @@ module thud_laminate_floor
 
    !> The floor; the defaults are five layers of spruce (strength class C24).
    type, extends(rectangular_floor_type) :: laminate_floor_type
-      !> Length, along layers of 0 degrees, and width, m.
+      !> Length, along the grain of the outer layers, and width, m.
       real(wp) :: length = 5.0_wp, width = 4.0_wp
-      !> Thicknesses of the layers from the top, m, and their directions, 0 or 90 degrees: empty lists are the default.
-      type(list_type) :: layer_thickness, layer_angle
+      !> Thicknesses of the layers from the top, which alternate in direction, m; an empty list is the default.
+      type(list_type) :: layer_thickness
       !> Modulus of elasticity along and across the grain, Pa.
       real(wp) :: youngs_modulus = 1.1e10_wp, cross_modulus = 3.7e8_wp
       !> Shear modulus along the grain, and that of rolling shear, Pa.
@@ -48,12 +48,10 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', options%length, 'm', 'length of the floor, along layers of 0 degrees', '[0.5, 100]'), &
+         real_field('length', options%length, 'm', 'length of the floor, along the grain of the first layer', '[0.5, 100]'), &
          real_field('width', options%width, 'm', 'width of the floor', '[0.5, 100]'), &
          list_field('layer_thickness', options%layer_thickness, 'm', &
-         'thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &
-         list_field('layer_angle', options%layer_angle, 'deg', &
-         'directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with 0)', '[0, 90]'), &
+         'thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &
          real_field('youngs_modulus', options%youngs_modulus, 'Pa', &
          'modulus of elasticity along the grain', '[1e8, 1e12]'), &
          real_field('cross_modulus', options%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
@@ -76,23 +74,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
-      associate (thickness => options%layer_thickness, angle => options%layer_angle)
-         if (angle%count > 0 .and. angle%count /= max(thickness%count, merge(size(default_thickness), 0, &
-            thickness%count == 0))) then
-            error = input_error('&laminate_floor: layer_angle has '//to_text(angle%count)//' values and layer_thickness ' &
-               //to_text(thickness%count)//'; allowed: the same number of both')
-         else if (any(angle%values(:angle%count) > 0.0_wp .and. angle%values(:angle%count) < 90.0_wp)) then
-            error = input_error('&laminate_floor: layer_angle = '//to_text(minval(angle%values(:angle%count), &
-               angle%values(:angle%count) > 0.0_wp))//' degrees; allowed: 0 or 90')
-         end if
-      end associate
-      if (allocated(error)) return
       base = options%get_base()
       if (min(base%stiffness%along, base%stiffness%across) > 0.0_wp) then
          call options%check_build_up(error)
       else
-         error = input_error('&laminate_floor: cross_modulus = '//to_text(options%cross_modulus)//' Pa leaves layers of ' &
-            //'one direction without stiffness across it; allowed: a modulus above 0, or layer_angle with 0 and 90')
+         error = input_error('&laminate_floor: cross_modulus = '//to_text(options%cross_modulus)//' Pa leaves a single ' &
+            //'layer without stiffness across it; allowed: a modulus above 0, or more layers')
       end if
    end subroutine check
 
@@ -106,7 +93,6 @@ contains
       thickness = default_thickness
       if (options%layer_thickness%count > 0) thickness = options%layer_thickness%values(:options%layer_thickness%count)
       is_along = [(mod(i, 2) == 1, i=1, size(thickness))]
-      if (options%layer_angle%count == size(thickness)) is_along = options%layer_angle%values(:size(thickness)) < 45.0_wp
    end subroutine get_layers
 
    !> Bending and shear stiffness per width in one direction.

@@ -42,7 +42,7 @@ contains
    end function get_base
 
    !> The plate itself; its conductance, averaged over positions, is that of the infinite plate, or the power through the
-   !> layer and the bridges of a floating plate with both plates infinite.
+   !> layer of a floating plate with both plates infinite.
    subroutine get_radiator(options, state, frequency, plate, conductance, error)
       class(plate_floor_type), intent(in) :: options
       type(floor_state_type), intent(in) :: state
@@ -53,8 +53,7 @@ contains
 
       plate = options%plate
       if (options%screed%thickness > 0.0_wp) then
-         conductance = get_lower_conductance(options%get_double_plate(plate), frequency) &
-            + options%get_bridge_conductance(frequency)
+         conductance = get_lower_conductance(options%get_double_plate(plate), frequency)
       else
          conductance = 1/get_resistance(plate)
       end if

@@ -1,7 +1,6 @@
 !> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
-   use thud_double_plate, only: double_plate_type, get_plate_bridge_conductance => get_bridge_conductance
-   use thud_edge_walls, only: edge_walls_type, get_edge_wall_fields, get_wall_edge, get_wall_limit
+   use thud_double_plate, only: double_plate_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
    use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support
@@ -11,8 +10,7 @@ module thud_rectangular_floor
    use thud_plate, only: get_resistance, get_thin_limit, plate_type
    use thud_plate_stack, only: edge_type, get_resolved_part, orthotropic_type, plate_stack_type, rigid_support
    use thud_receiver, only: receiver_type
-   use thud_screed, only: get_screed_edge, get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, &
-      screed_type
+   use thud_screed, only: get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, screed_type
    use thud_subceiling, only: get_cavity_limit, get_spaced_positions, get_subceiling_fields, get_subceiling_layer, &
       get_subceiling_plate, subceiling_type
    use thud_text, only: to_text
@@ -22,7 +20,7 @@ module thud_rectangular_floor
    public :: base_floor_type, rectangular_floor_type
 
    !> Supports of the edges.
-   character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic', 'walls']
+   character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic']
 
    !> Minimum distance of the source from a rigid line, m: the radius of the contact.
    real(wp), parameter :: min_distance = 0.05_wp
@@ -60,8 +58,6 @@ module thud_rectangular_floor
       !> Springs along the edges x = 0, x = length, y = 0 and y = width, or one value for all: stiffness against deflection
       !> per length, N/m2, and against rotation, N.
       type(list_type) :: support_stiffness, support_rotation
-      !> Walls at the edges.
-      type(edge_walls_type) :: edge_walls
       !> Positions of further supports along the length (walls or beams across it) and along the width, m.
       type(list_type) :: line_x, line_y
       !> Floating plate; no thickness: none.
@@ -91,7 +87,6 @@ module thud_rectangular_floor
       procedure, pass(options) :: get_improvement
       procedure, pass(options) :: has_modal_conductance
       procedure, pass(options) :: get_double_plate
-      procedure, pass(options) :: get_bridge_conductance
       procedure, pass(options) :: has_subceiling
       procedure(get_base), deferred, pass(options) :: get_base
    end type rectangular_floor_type
@@ -136,7 +131,6 @@ contains
          //'deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)', '[0, 1e14]'), &
          list_field('support_rotation', options%support_rotation, 'N', &
          'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
-         get_edge_wall_fields(options%edge_walls), &
          list_field('line_x', options%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
          '(0, 100)'), &
          list_field('line_y', options%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
@@ -170,8 +164,6 @@ contains
       call check_edges(options%support_rotation, 'support_rotation')
       call check_positions(options%line_x, 'line_x', base%plate%length)
       call check_positions(options%line_y, 'line_y', base%plate%width)
-      call check_positions(options%screed%bridge_x, 'bridge_x', base%plate%length)
-      call check_positions(options%screed%bridge_y, 'bridge_y', base%plate%width)
       call check_distances(options%line_x, 'line_x')
       call check_distances(options%line_y, 'line_y')
       associate (source => options%get_source())
@@ -196,18 +188,12 @@ contains
       else if (is_loose() .and. options%line_x%count + options%line_y%count == 0) then
          error = input_error('&'//trim(base%group)//': support = '//trim(options%support) &
             //' without any stiffness needs supports at line_x or line_y; allowed: at least one')
-      else if (options%screed%bridge_x%count /= options%screed%bridge_y%count) then
-         error = input_error('&'//trim(base%group)//': bridge_x has '//to_text(options%screed%bridge_x%count) &
-            //' values and bridge_y '//to_text(options%screed%bridge_y%count)//'; allowed: the same number of both')
       else if (options%screed%thickness > 0.0_wp .and. options%screed%thickness < min_sheet) then
          error = input_error('&'//trim(base%group)//': screed_thickness = '//to_text(options%screed%thickness) &
             //' m; allowed: 0, or 0.0005 to 0.5 m')
       else if (options%has_subceiling() .and. options%subceiling%thickness < min_sheet) then
          error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(options%subceiling%thickness) &
             //' m; allowed: 0, or 0.0005 to 0.2 m')
-      else if (options%screed%bridge_x%count > 0 .and. options%screed%thickness <= 0.0_wp) then
-         error = input_error('&'//trim(base%group)//': bridge_x and bridge_y without a floating plate; allowed: bridges ' &
-            //'with screed_thickness > 0')
       end if
    contains
 
@@ -407,8 +393,6 @@ contains
          if (.not. is_uncoupled) then
             lower%line_x = options%line_x%values(:options%line_x%count)
             lower%line_y = options%line_y%values(:options%line_y%count)
-         else if (allocated(lower%ribs)) then
-            lower%ribs = pack(lower%ribs, .not. lower%ribs%along_width)
          end if
       end associate
       associate (plate => base%plate)
@@ -416,12 +400,7 @@ contains
          stack%width = plate%width
          if (options%screed%thickness > 0.0_wp) then
             stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base%stiffness]
-            stack%plate(1)%edge = get_screed_edge(options%screed)
             stack%layer = [get_screed_layer(options%screed)]
-            if (is_uncoupled) then
-               stack%plate(1)%edge = edge_type(rigid_support, 0.0_wp)
-               if (allocated(stack%layer(1)%point)) deallocate (stack%layer(1)%point)
-            end if
          else
             stack%plate = [base%stiffness]
             allocate (stack%layer(0))
@@ -452,7 +431,7 @@ contains
       real(wp), allocatable :: position(:)
 
       if (allocated(base%stiffness%ribs)) then
-         position = base%stiffness%ribs(1)%position
+         position = base%stiffness%ribs%position
       else
          position = get_spaced_positions(base%plate%width, options%subceiling%channel_spacing)
       end if
@@ -506,8 +485,6 @@ contains
          edge = edge_type(rigid_support, rigid_support)
        case ('free')
          edge = edge_type(0.0_wp, 0.0_wp)
-       case ('walls')
-         edge = get_wall_edge(options%edge_walls)
        case default
          edge%deflection = get_four(options%support_stiffness, rigid_support)
          edge%rotation = get_four(options%support_rotation, 0.0_wp)
@@ -561,22 +538,9 @@ contains
 
       associate (screed => options%screed)
          plates = double_plate_type(get_screed_plate(screed, lower), lower, screed%layer_stiffness, &
-            screed%layer_loss_factor, screed%bridge_x%count, screed%bridge_stiffness, options%air)
+            screed%layer_loss_factor, options%air)
       end associate
    end function get_double_plate
-
-   !> Power through bridges into the homogeneous bearing plate.
-   function get_bridge_conductance(options, frequency) result(conductance)
-      class(rectangular_floor_type), intent(in) :: options
-      real(wp), intent(in) :: frequency(:)
-      real(wp) :: conductance(size(frequency))
-      type(base_floor_type) :: base
-
-      conductance = 0.0_wp
-      if (options%screed%thickness <= 0.0_wp) return
-      base = options%get_base()
-      conductance = get_plate_bridge_conductance(options%get_double_plate(base%plate), frequency)
-   end function get_bridge_conductance
 
    !> Frequency band in which all plates are thin.
    subroutine get_validity(options, state, lowest, highest, reason)
@@ -596,7 +560,7 @@ contains
       call options%limit_by_surroundings(base%plate, highest, reason)
    end subroutine get_validity
 
-   !> Lowers a limit of validity to that of the modes, the walls at the edges, the subceiling and its cavity.
+   !> Lowers a limit of validity to that of the modes, the subceiling and its cavity.
    subroutine limit_by_surroundings(options, above, highest, reason)
       class(rectangular_floor_type), intent(in) :: options
       !> The plate above the subceiling.
@@ -604,10 +568,6 @@ contains
       real(wp), intent(inout) :: highest
       character(len=reason_length), intent(inout) :: reason
 
-      if (options%support == 'walls' .and. get_wall_limit(options%edge_walls) < highest) then
-         highest = get_wall_limit(options%edge_walls)
-         reason = 'the walls at the edges resonate, and are no mere springs'
-      end if
       associate (modes => get_mode_limit(get_stack(options, options%get_base())))
          if (modes < highest) then
             highest = modes

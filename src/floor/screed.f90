@@ -1,31 +1,24 @@
 !> A floating plate on a resilient layer, on any plate: its keys, and what it adds to a stack of plates.
 module thud_screed
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, real_field
+   use thud_new_field, only: real_field
    use thud_plate, only: get_bending_stiffness, get_surface_mass, plate_type
-   use thud_plate_stack, only: edge_type, layer_type, orthotropic_type, point_spring_type, rigid_support
+   use thud_plate_stack, only: layer_type, orthotropic_type
    implicit none (type, external)
    private
 
-   public :: get_screed_edge, get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, screed_type
+   public :: get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, screed_type
 
    !> Poisson's ratio of plates; it affects only edges that are not held.
    real(wp), parameter :: poisson = 0.2_wp
 
-   !> The floating plate; no thickness means none. The other defaults are those of a cement screed on mineral wool.
+   !> The floating plate, simply supported; no thickness means none. The other defaults are those of a cement screed on mineral wool.
    type :: screed_type
       !> Thickness, m; density, kg/m3; longitudinal wave speed, m/s; loss factor.
       real(wp) :: thickness = 0.0_wp, density = 2000.0_wp, wave_speed = 3500.0_wp, loss_factor = 0.03_wp
       !> Dynamic stiffness of the layer per unit area, N/m3, and its loss factor.
       real(wp) :: layer_stiffness = 1.0e7_wp, layer_loss_factor = 0.1_wp
-      !> Edges: `simple`, `free`, or held by a strip.
-      character(len=name_length) :: edges = 'simple'
-      !> Stiffness of the strip per length, N/m2, and its loss factor, an estimate: that of the layer.
-      real(wp) :: strip_stiffness = 1.0e6_wp, strip_loss_factor = 0.1_wp
-      !> Positions of rigid bridges to the plate below, m; stiffness of one, N/m.
-      type(list_type) :: bridge_x, bridge_y
-      real(wp) :: bridge_stiffness = 1.0e8_wp
    end type screed_type
 
 contains
@@ -44,17 +37,7 @@ contains
          real_field('screed_loss_factor', screed%loss_factor, '', 'loss factor of the floating plate', '[0, 1]'), &
          real_field('layer_stiffness', screed%layer_stiffness, 'N/m3', &
          'dynamic stiffness of the resilient layer per unit area (ISO 9052-1)', '[1e4, 1e12]'), &
-         real_field('layer_loss_factor', screed%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]'), &
-         choice_field('screed_edges', screed%edges, 'edges of the floating plate', &
-         [character(len=6) :: 'simple', 'free', 'strip']), &
-         real_field('strip_stiffness', screed%strip_stiffness, 'N/m2', &
-         'stiffness of edge strips against vertical motion per length, for strip', '[0, 1e12]'), &
-         real_field('strip_loss_factor', screed%strip_loss_factor, '', 'loss factor of these strips; default: an estimate', &
-         '[0, 1]'), &
-         list_field('bridge_x', screed%bridge_x, 'm', 'positions along the length of bridges through the layer', &
-         '(0, 100)'), &
-         list_field('bridge_y', screed%bridge_y, 'm', 'positions along the width of these bridges', '(0, 100)'), &
-         real_field('bridge_stiffness', screed%bridge_stiffness, 'N/m', 'stiffness of one bridge', '[1e3, 1e12]')]
+         real_field('layer_loss_factor', screed%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]')]
    end function get_screed_fields
 
    !> The floating plate on another plate.
@@ -83,32 +66,13 @@ contains
       thin%loss_factor = plate%loss_factor
    end function new_orthotropic
 
-   !> Support of the edges of a floating plate.
-   pure function get_screed_edge(screed) result(edge)
-      type(screed_type), intent(in) :: screed
-      type(edge_type) :: edge
-
-      select case (screed%edges)
-       case ('free')
-         edge = edge_type(0.0_wp, 0.0_wp)
-       case ('strip')
-         edge = edge_type(screed%strip_stiffness, 0.0_wp, screed%strip_loss_factor)
-       case default
-         edge = edge_type(rigid_support, 0.0_wp)
-      end select
-   end function get_screed_edge
-
    !> The layer below a floating plate.
    pure function get_screed_layer(screed) result(layer)
       type(screed_type), intent(in) :: screed
       type(layer_type) :: layer
-      integer :: i
 
       layer%stiffness = screed%layer_stiffness
       layer%loss_factor = screed%layer_loss_factor
-      if (screed%bridge_x%count == 0) return
-      layer%point = [(point_spring_type(screed%bridge_x%values(i), screed%bridge_y%values(i), screed%bridge_stiffness, &
-         screed%layer_loss_factor), i=1, screed%bridge_x%count)]
    end function get_screed_layer
 
 end module thud_screed

@@ -60,8 +60,7 @@ class JoistFloor:
 
     Joists run along x, the length; `sides` are the edges y = 0 and y = width, parallel to them. The
     bending stiffness of the sheathing is E t**3/12, whatever its Poisson ratio, which matters at
-    free edges only. `shear` makes the joists Timoshenko beams, and `screws` is the stiffness of the
-    screws against lifting per length of a joist, N/m2.
+    free edges only. `shear` makes the joists Timoshenko beams.
     """
 
     length: float = 4.0
@@ -80,7 +79,6 @@ class JoistFloor:
     shear: bool = False
     sides: tuple[Edge, Edge] = (SUPPORTED, SUPPORTED)
     joists: tuple[float, ...] | None = None
-    screws: float = math.inf
 
     @property
     def stiffness(self) -> float:
@@ -187,20 +185,6 @@ def _rib_dynamics(rib: Rib, k: Array, omega: Array, *, damped: bool) -> tuple[Ar
     return bend, twist
 
 
-def _through_screws(
-    floor: JoistFloor, bend: Array, *, damped: bool
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Return the stiffness of a joist behind its screws, and where the joist alone is negative.
-
-    The deflection of the joist is eliminated; held by its screws alone, the joist has a mode below
-    a frequency at which the second is true.
-    """
-    if math.isinf(floor.screws):
-        return bend, np.zeros(bend.shape, bool)
-    screws = floor.screws * (1 + 1j * floor.loss_factor * damped)
-    return np.asarray(screws * bend / (screws + bend)), (screws + bend).real < 0
-
-
 def _strip(
     floor: JoistFloor, width: float, k: Array, omega: Array, *, damped: bool
 ) -> tuple[Array, Array, Array]:
@@ -241,7 +225,7 @@ def _assembled(
     for rib in get_ribs(floor):
         i = 2 * int(np.argmin(abs(nodes - rib.at)))
         bend, twist = _rib_dynamics(rib, k, omega, damped=damped)
-        total[..., i, i] += _through_screws(floor, bend, damped=damped)[0]
+        total[..., i, i] += bend
         total[..., i + 1, i + 1] += twist
     held = np.zeros(2 * len(nodes), bool)
     for edge, i in zip(floor.sides, (0, 2 * len(nodes) - 2), strict=True):
@@ -262,7 +246,6 @@ def get_frequencies(floor: JoistFloor, count: int, maximum: float = 200.0) -> tu
     # No strip that is clamped at its sides resonates below `maximum`.
     widest = math.sqrt(22.3 / (2 * math.pi * maximum) * math.sqrt(floor.stiffness / floor.mass))
     nodes = get_grid(floor.width, widest, get_joists(floor))
-    ribs = get_ribs(floor)
     found = []
     for n in range(1, 200):
         k = np.array(n * np.pi / floor.length)
@@ -270,9 +253,7 @@ def get_frequencies(floor: JoistFloor, count: int, maximum: float = 200.0) -> tu
         def number_below(frequency: Array, k: Array = k) -> Array:
             omega = 2 * np.pi * frequency
             matrix, _, free = _assembled(floor, nodes, k, omega, damped=False)
-            bend = _rib_dynamics(ribs[0], k, omega, damped=False)[0] if ribs else omega
-            loose = len(ribs) * _through_screws(floor, bend, damped=False)[1]
-            return loose + (np.linalg.eigvalsh(matrix[:, free[:, None], free].real) < 0).sum(-1)
+            return (np.linalg.eigvalsh(matrix[:, free[:, None], free].real) < 0).sum(-1)
 
         below = int(number_below(np.array([maximum]))[0])
         low, high = np.zeros(below), np.full(below, maximum)
@@ -343,8 +324,7 @@ def get_mobility(
     line = 4 * floor.stiffness * (1 + 1j * floor.loss_factor) * k**3
     for rib in get_ribs(floor):
         if abs(rib.at - point[1]) < 1e-9:
-            bend = _rib_dynamics(rib, k, omega, damped=True)[0]
-            line = line + _through_screws(floor, bend, damped=True)[0]
+            line = line + _rib_dynamics(rib, k, omega, damped=True)[0]
     rest = (2 / floor.length * np.sin(k * point[0]) ** 2 / line).sum(-1)
     return np.asarray(summed + 1j * omega[:, 0] * rest)
 

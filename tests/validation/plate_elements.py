@@ -141,18 +141,6 @@ class LineSpring:
 
 
 @dataclass(frozen=True)
-class PointSpring:
-    """A spring, N/m, between a point of a plate and the ground, or the same point of another."""
-
-    x: float
-    y: float
-    stiffness: float
-    loss_factor: float = 0.0
-    plate: int = 0
-    other: int | None = None
-
-
-@dataclass(frozen=True)
 class Layer:
     """A resilient layer between the plates 0 and 1: stiffness per area, N/m3."""
 
@@ -360,12 +348,6 @@ class _Assembly:
             self.held[end] = math.isinf(edge.rotation)
         self.next_rotation += self.n_rotation(rib)
 
-    def add_point(self, point: PointSpring) -> None:
-        row = self.row(point.x, point.y, point.plate)
-        if point.other is not None:
-            row = row - self.row(point.x, point.y, point.other)
-        self.stiffness += point.stiffness * (1 + 1j * point.loss_factor) * (row.T @ row)
-
     def add_layer(self, layer: Layer) -> None:
         area = sparse.kron(self.products["x"][0, 0], self.products["y"][0, 0])
         self.stiffness += layer.stiffness * (1 + 1j * layer.loss_factor) * self.place(area, 0, 1)
@@ -378,7 +360,6 @@ def assemble(  # noqa: PLR0913 - a grid, and the kinds of components
     *,
     ribs: Sequence[Rib] = (),
     lines: Sequence[LineSpring] = (),
-    points: Sequence[PointSpring] = (),
     layer: Layer | None = None,
 ) -> System:
     """Return the matrices of plates on the grid with nodes at `x` and `y`, m."""
@@ -389,8 +370,6 @@ def assemble(  # noqa: PLR0913 - a grid, and the kinds of components
         assembly.add_rib(rib)
     for line in lines:
         assembly.add_line(line)
-    for point in points:
-        assembly.add_point(point)
     if layer:
         assembly.add_layer(layer)
     free = np.flatnonzero(~assembly.held)

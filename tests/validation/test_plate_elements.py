@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,6 @@ from plate_elements import (
     Layer,
     LineSpring,
     Plate,
-    PointSpring,
     Rib,
     assemble,
     get_grid,
@@ -196,34 +194,6 @@ def test_equal_plates_on_a_layer_move_together_or_against_each_other() -> None:
     share = 2 * stiffness / ORTHOTROPIC.mass / expected * np.isin(expected, against)
     assert share.max() > 0.5
     assert loss == pytest.approx(0.03 * (1 - share) + 0.2 * share, rel=2e-3)
-
-
-def test_point_spring_shifts_frequencies_as_the_modal_sum_says() -> None:
-    """With a spring, 1/k + sum of shape**2/(M (w_n**2 - w**2)) = 0."""
-    point, stiffness = (1.1, 0.7), 3e7
-    square, (p, q) = navier(300)
-    weight = (np.sin(p * point[0]) * np.sin(q * point[1])) ** 2
-    weight /= ORTHOTROPIC.mass * LENGTH * WIDTH / 4
-
-    def secular(value: float) -> float:
-        return float(1 / stiffness + (weight / (square - value)).sum())
-
-    ends = np.sort(square.ravel())[:6]
-    expected = [
-        brentq(secular, a * (1 + 1e-9), b * (1 - 1e-9)) for a, b in itertools.pairwise(ends)
-    ]
-    nodes = grid(0.1, point)
-    spring = PointSpring(*point, stiffness)
-    found = get_modes(assemble(*nodes, [ORTHOTROPIC], points=[spring]), 5)[0]
-    assert found == pytest.approx(np.sqrt(expected) / (2 * np.pi), rel=1e-4)
-    # Against an equal plate, half the spring acts on each side of the plane of symmetry.
-    coupled = replace(spring, stiffness=stiffness / 2, other=1)
-    system = assemble(*nodes, [ORTHOTROPIC] * 2, points=[coupled])
-    both, vectors = get_modes(system, 10)
-    order = np.argsort(np.r_[ends[:5], expected])
-    assert both == pytest.approx(np.sqrt(np.r_[ends[:5], expected][order]) / (2 * np.pi), rel=1e-4)
-    one, two = (system.get_row(*point, plate) @ vectors for plate in (0, 1))
-    assert two == pytest.approx(np.where(order < 5, one, -one), rel=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["translation", "rotation"])

@@ -84,10 +84,7 @@ RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
 RoomPositions = Literal["standard", "even"]
 RoomRequiredRating = Literal["octaves", "thirds", "standardized"]
-RectangularFloorSupport = Literal["simple", "clamped", "free", "elastic", "walls"]
-RectangularFloorEdgeWallPosition = Literal["below", "both"]
-RectangularFloorEdgeWallFarEnd = Literal["pinned", "clamped"]
-RectangularFloorScreedEdges = Literal["simple", "free", "strip"]
+RectangularFloorSupport = Literal["simple", "clamped", "free", "elastic"]
 BandSet = Literal["octave", "third"]
 
 
@@ -595,25 +592,13 @@ class RectangularFloor(Group):
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     support : str
-        Support of the edges; "simple", "clamped", "free", "elastic", "walls".
+        Support of the edges; "simple", "clamped", "free", "elastic".
     support_stiffness : sequence of float
         Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
         y at 0 and width), N/m2; 0 <= support_stiffness <= 1e+14.
     support_rotation : sequence of float
         Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
         support_rotation <= 1e+14.
-    edge_wall_thickness : float
-        Thickness of the walls at the edges, for walls, m; 0.01 <= edge_wall_thickness <= 2.
-    edge_wall_height : float
-        Height of these walls, m; 0.5 <= edge_wall_height <= 20.
-    edge_wall_density : float
-        Density of these walls, kg/m3; 10 <= edge_wall_density <= 20000.
-    edge_wall_modulus : float
-        Modulus of elasticity of these walls, Pa; 1e+07 <= edge_wall_modulus <= 1e+12.
-    edge_wall_position : str
-        Walls below the edges, or both below and above; "below", "both".
-    edge_wall_far_end : str
-        Far ends of these walls; "pinned", "clamped".
     line_x : sequence of float
         Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
     line_y : sequence of float
@@ -631,19 +616,6 @@ class RectangularFloor(Group):
         layer_stiffness <= 1e+12.
     layer_loss_factor : float
         Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
-    screed_edges : str
-        Edges of the floating plate; "simple", "free", "strip".
-    strip_stiffness : float
-        Stiffness of edge strips against vertical motion per length, for strip, N/m2; 0 <=
-        strip_stiffness <= 1e+12.
-    strip_loss_factor : float
-        Loss factor of these strips; default: an estimate; 0 <= strip_loss_factor <= 1.
-    bridge_x : sequence of float
-        Positions along the length of bridges through the layer, m; 0 < bridge_x < 100.
-    bridge_y : sequence of float
-        Positions along the width of these bridges, m; 0 < bridge_y < 100.
-    bridge_stiffness : float
-        Stiffness of one bridge, N/m; 1000 <= bridge_stiffness <= 1e+12.
     subceiling_thickness : float
         Thickness of a subceiling that radiates instead of the floor; 0: none, m; 0 <=
         subceiling_thickness <= 0.2.
@@ -681,12 +653,6 @@ class RectangularFloor(Group):
     support: RectangularFloorSupport = "simple"
     support_stiffness: Sequence[float] = ()
     support_rotation: Sequence[float] = ()
-    edge_wall_thickness: float = 0.175
-    edge_wall_height: float = 2.5
-    edge_wall_density: float = 1800.0
-    edge_wall_modulus: float = 5000000000.0
-    edge_wall_position: RectangularFloorEdgeWallPosition = "below"
-    edge_wall_far_end: RectangularFloorEdgeWallFarEnd = "pinned"
     line_x: Sequence[float] = ()
     line_y: Sequence[float] = ()
     screed_thickness: float = 0.0
@@ -695,12 +661,6 @@ class RectangularFloor(Group):
     screed_loss_factor: float = 0.03
     layer_stiffness: float = 10000000.0
     layer_loss_factor: float = 0.1
-    screed_edges: RectangularFloorScreedEdges = "simple"
-    strip_stiffness: float = 1000000.0
-    strip_loss_factor: float = 0.1
-    bridge_x: Sequence[float] = ()
-    bridge_y: Sequence[float] = ()
-    bridge_stiffness: float = 100000000.0
     subceiling_thickness: float = 0.0
     subceiling_density: float = 720.0
     subceiling_modulus: float = 2500000000.0
@@ -812,15 +772,12 @@ class LaminateFloor(RectangularFloor):
     Attributes
     ----------
     length : float
-        Length of the floor, along layers of 0 degrees, m; 0.5 <= length <= 100.
+        Length of the floor, along the grain of the first layer, m; 0.5 <= length <= 100.
     width : float
         Width of the floor, m; 0.5 <= width <= 100.
     layer_thickness : sequence of float
-        Thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm), m; 0.003 <=
-        layer_thickness <= 0.5.
-    layer_angle : sequence of float
-        Directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with
-        0), deg; 0 <= layer_angle <= 90.
+        Thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm), m; 0.003
+        <= layer_thickness <= 0.5.
     youngs_modulus : float
         Modulus of elasticity along the grain, Pa; 1e+08 <= youngs_modulus <= 1e+12.
     cross_modulus : float
@@ -847,7 +804,6 @@ class LaminateFloor(RectangularFloor):
     length: float = 5.0
     width: float = 4.0
     layer_thickness: Sequence[float] = ()
-    layer_angle: Sequence[float] = ()
     youngs_modulus: float = 11000000000.0
     cross_modulus: float = 370000000.0
     shear_modulus: float = 690000000.0
@@ -888,19 +844,6 @@ class JoistFloor(RectangularFloor):
     connection : float
         Composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B; 0 <=
         connection <= 1.
-    screw_spacing : float
-        Distance of the screws along a joist, m; 0.01 <= screw_spacing <= 2.
-    screw_slip : float
-        Slip modulus of a screw, for the composite action by EN 1995-1-1 annex B; 0: connection,
-        N/m; 0 <= screw_slip <= 1e+12.
-    screw_stiffness : float
-        Stiffness of a screw against lifting of the sheathing off the joist; 0: rigid, N/m; 0 <=
-        screw_stiffness <= 1e+12.
-    blocking_x : sequence of float
-        Positions along the length of rows of blocking between joists, m; 0 < blocking_x < 100.
-    blocking_stiffness : float
-        Bending stiffness of a row of blocking; 0: that of a joist, without gaps, N m2; 0 <=
-        blocking_stiffness <= 1e+12.
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
     source_on : str
@@ -920,11 +863,6 @@ class JoistFloor(RectangularFloor):
     joist_density: float = 420.0
     joist_modulus: float = 11000000000.0
     connection: float = 0.1
-    screw_spacing: float = 0.15
-    screw_slip: float = 0.0
-    screw_stiffness: float = 0.0
-    blocking_x: Sequence[float] = ()
-    blocking_stiffness: float = 0.0
     loss_factor: float = 0.05
     source_on: JoistFloorSourceOn = "sheathing"
 
@@ -1346,15 +1284,9 @@ KEYS = (
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic', 'walls')),
+    Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
     Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
-    Key("plate", "plate", "edge_wall_thickness", "real", "m", "thickness of the walls at the edges, for walls", (), 0.01, 2.0),
-    Key("plate", "plate", "edge_wall_height", "real", "m", "height of these walls", (), 0.5, 20.0),
-    Key("plate", "plate", "edge_wall_density", "real", "kg/m3", "density of these walls", (), 10.0, 20000.0),
-    Key("plate", "plate", "edge_wall_modulus", "real", "Pa", "modulus of elasticity of these walls", (), 10000000.0, 1000000000000.0),
-    Key("plate", "plate", "edge_wall_position", "choice", "", "walls below the edges, or both below and above", ('below', 'both')),
-    Key("plate", "plate", "edge_wall_far_end", "choice", "", "far ends of these walls", ('pinned', 'clamped')),
     Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("plate", "plate", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
@@ -1363,12 +1295,6 @@ KEYS = (
     Key("plate", "plate", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
     Key("plate", "plate", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
     Key("plate", "plate", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
-    Key("plate", "plate", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
-    Key("plate", "plate", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
-    Key("plate", "plate", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
-    Key("plate", "plate", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
-    Key("plate", "plate", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
-    Key("plate", "plate", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("plate", "plate", "subceiling_thickness", "real", "m", "thickness of a subceiling that radiates instead of the floor; 0: none", (), 0.0, 0.2),
     Key("plate", "plate", "subceiling_density", "real", "kg/m3", "density of the subceiling", (), 10.0, 20000.0),
     Key("plate", "plate", "subceiling_modulus", "real", "Pa", "modulus of elasticity of the subceiling in bending", (), 10000000.0, 1000000000000.0),
@@ -1383,10 +1309,9 @@ KEYS = (
     Key("plate", "plate", "covering_improvement", "list", "dB", "measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz", (), -30.0, 60.0),
     Key("plate", "plate", "point_x", "list", "m", "positions along the length of points whose velocity is computed", (), 0.0, 1000.0),
     Key("plate", "plate", "point_y", "list", "m", "positions of these points along the width", (), 0.0, 1000.0),
-    Key("laminate_floor", "laminate_floor", "length", "real", "m", "length of the floor, along layers of 0 degrees", (), 0.5, 100.0),
+    Key("laminate_floor", "laminate_floor", "length", "real", "m", "length of the floor, along the grain of the first layer", (), 0.5, 100.0),
     Key("laminate_floor", "laminate_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
-    Key("laminate_floor", "laminate_floor", "layer_thickness", "list", "m", "thicknesses of the layers from the top (default: 40, 20, 40, 20, 40 mm)", (), 0.003, 0.5),
-    Key("laminate_floor", "laminate_floor", "layer_angle", "list", "deg", "directions of the layers, 0 (along the length) or 90 (default: alternating, beginning with 0)", (), 0.0, 90.0),
+    Key("laminate_floor", "laminate_floor", "layer_thickness", "list", "m", "thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm)", (), 0.003, 0.5),
     Key("laminate_floor", "laminate_floor", "youngs_modulus", "real", "Pa", "modulus of elasticity along the grain", (), 100000000.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "cross_modulus", "real", "Pa", "modulus of elasticity across the grain", (), 0.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "shear_modulus", "real", "Pa", "shear modulus along the grain", (), 1000000.0, 1000000000000.0),
@@ -1397,15 +1322,9 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic', 'walls')),
+    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
     Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
-    Key("laminate_floor", "laminate_floor", "edge_wall_thickness", "real", "m", "thickness of the walls at the edges, for walls", (), 0.01, 2.0),
-    Key("laminate_floor", "laminate_floor", "edge_wall_height", "real", "m", "height of these walls", (), 0.5, 20.0),
-    Key("laminate_floor", "laminate_floor", "edge_wall_density", "real", "kg/m3", "density of these walls", (), 10.0, 20000.0),
-    Key("laminate_floor", "laminate_floor", "edge_wall_modulus", "real", "Pa", "modulus of elasticity of these walls", (), 10000000.0, 1000000000000.0),
-    Key("laminate_floor", "laminate_floor", "edge_wall_position", "choice", "", "walls below the edges, or both below and above", ('below', 'both')),
-    Key("laminate_floor", "laminate_floor", "edge_wall_far_end", "choice", "", "far ends of these walls", ('pinned', 'clamped')),
     Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("laminate_floor", "laminate_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
@@ -1414,12 +1333,6 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
-    Key("laminate_floor", "laminate_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
-    Key("laminate_floor", "laminate_floor", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
-    Key("laminate_floor", "laminate_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
-    Key("laminate_floor", "laminate_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("laminate_floor", "laminate_floor", "subceiling_thickness", "real", "m", "thickness of a subceiling that radiates instead of the floor; 0: none", (), 0.0, 0.2),
     Key("laminate_floor", "laminate_floor", "subceiling_density", "real", "kg/m3", "density of the subceiling", (), 10.0, 20000.0),
     Key("laminate_floor", "laminate_floor", "subceiling_modulus", "real", "Pa", "modulus of elasticity of the subceiling in bending", (), 10000000.0, 1000000000000.0),
@@ -1445,24 +1358,13 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "screw_spacing", "real", "m", "distance of the screws along a joist", (), 0.01, 2.0),
-    Key("joist_floor", "joist_floor", "screw_slip", "real", "N/m", "slip modulus of a screw, for the composite action by EN 1995-1-1 annex B; 0: connection", (), 0.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "screw_stiffness", "real", "N/m", "stiffness of a screw against lifting of the sheathing off the joist; 0: rigid", (), 0.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "blocking_x", "list", "m", "positions along the length of rows of blocking between joists", (), 0.0, 100.0),
-    Key("joist_floor", "joist_floor", "blocking_stiffness", "real", "N m2", "bending stiffness of a row of blocking; 0: that of a joist, without gaps", (), 0.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
-    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic', 'walls')),
+    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
     Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
-    Key("joist_floor", "joist_floor", "edge_wall_thickness", "real", "m", "thickness of the walls at the edges, for walls", (), 0.01, 2.0),
-    Key("joist_floor", "joist_floor", "edge_wall_height", "real", "m", "height of these walls", (), 0.5, 20.0),
-    Key("joist_floor", "joist_floor", "edge_wall_density", "real", "kg/m3", "density of these walls", (), 10.0, 20000.0),
-    Key("joist_floor", "joist_floor", "edge_wall_modulus", "real", "Pa", "modulus of elasticity of these walls", (), 10000000.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "edge_wall_position", "choice", "", "walls below the edges, or both below and above", ('below', 'both')),
-    Key("joist_floor", "joist_floor", "edge_wall_far_end", "choice", "", "far ends of these walls", ('pinned', 'clamped')),
     Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
     Key("joist_floor", "joist_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
@@ -1471,12 +1373,6 @@ KEYS = (
     Key("joist_floor", "joist_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer per unit area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "screed_edges", "choice", "", "edges of the floating plate", ('simple', 'free', 'strip')),
-    Key("joist_floor", "joist_floor", "strip_stiffness", "real", "N/m2", "stiffness of edge strips against vertical motion per length, for strip", (), 0.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "strip_loss_factor", "real", "", "loss factor of these strips; default: an estimate", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "bridge_x", "list", "m", "positions along the length of bridges through the layer", (), 0.0, 100.0),
-    Key("joist_floor", "joist_floor", "bridge_y", "list", "m", "positions along the width of these bridges", (), 0.0, 100.0),
-    Key("joist_floor", "joist_floor", "bridge_stiffness", "real", "N/m", "stiffness of one bridge", (), 1000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "subceiling_thickness", "real", "m", "thickness of a subceiling that radiates instead of the floor; 0: none", (), 0.0, 0.2),
     Key("joist_floor", "joist_floor", "subceiling_density", "real", "kg/m3", "density of the subceiling", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "subceiling_modulus", "real", "Pa", "modulus of elasticity of the subceiling in bending", (), 10000000.0, 1000000000000.0),

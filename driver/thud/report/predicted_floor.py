@@ -49,14 +49,7 @@ CONTRIBUTIONS = {
 }
 # Beginnings of the names of keys without effect if another key has a value.
 _WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
-    ("screed_thickness", 0.0): ("screed_", "layer_stiffness", "layer_loss_factor", "strip_"),
-    ("screed_edges", "simple"): ("strip_",),
-    ("screed_edges", "free"): ("strip_",),
-    ("bridge_x", ()): ("bridge_",),
-    **{
-        ("support", support): ("edge_wall_",)
-        for support in ("simple", "clamped", "free", "elastic")
-    },
+    ("screed_thickness", 0.0): ("screed_", "layer_stiffness", "layer_loss_factor"),
     ("subceiling_thickness", 0.0): ("subceiling_", "channel_", "cavity_"),
     ("covering_stiffness", 0.0): ("covering_",),
     ("ceiling_mass", 0.0): ("ceiling_",),
@@ -553,7 +546,6 @@ def _laminate_layers(floor: LaminateFloor) -> Iterator[tuple[str, float]]:
     if floor.added_mass:
         added = f"added mass, {floor.added_mass:g} kg/m² {_ASSUMED}"
         yield added, floor.added_mass / _GRAVEL_DENSITY
-    # By default the keys are empty, and the directions alternate.
+    # By default the key is empty.
     for i, thickness in enumerate(floor.layer_thickness or _LAMELLAS):
-        angle = floor.layer_angle[i] if floor.layer_angle else 90 * (i % 2)
-        yield f"lamella, {'across' if angle else 'along'}", thickness
+        yield f"lamella, {'across' if i % 2 else 'along'}", thickness

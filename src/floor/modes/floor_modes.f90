@@ -211,9 +211,8 @@ contains
          if (any(abs(source - point) >= epsilon(1.0_wp))) then
             continue
          else if (has_all) then
-            lacking = get_truncated_compliance(modes%stack%plate(1), &
-               get_highest_wavenumber([set%x, set%y]), &
-               get_finest_wavenumber([set%x, set%y]), length*source(1), width*source(2))
+            lacking = get_truncated_compliance(modes%stack%plate(1), get_highest_wavenumber([set%x, set%y]), &
+               get_finest_wavenumber(set%y), width*source(2))
             compliance = compliance + lacking(1)
             corner = corner*(1 - lacking(2)/compliance)
          else

@@ -8,13 +8,12 @@ module thud_function_set
    implicit none (type, external)
    private
 
-   public :: amplitudes, cosines, function_set_type, get_finest_wavenumber, get_functions, get_highest_wavenumber
+   public :: cosines, function_set_type, get_finest_wavenumber, get_functions, get_highest_wavenumber
    public :: get_overlap, get_quadrature, new_polynomials, new_splines, sines
 
    !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
-   !> rotations of simply supported plates, polynomials, amplitudes of separate members without values between them, and
-   !> splines.
-   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, amplitudes = 4, splines = 5
+   !> rotations of simply supported plates, polynomials, and splines.
+   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, splines = 4
 
    !> Minimum number of nodes of a spline.
    integer, parameter, public :: min_nodes = 4

@@ -8,7 +8,7 @@ module thud_plate_stack
    implicit none (type, external)
    private
 
-   public :: edge_type, layer_type, orthotropic_type, plate_stack_type, point_spring_type, ribs_type, rigid_support
+   public :: edge_type, layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    public :: get_counts, get_degree, get_resolved_frequency, get_resolved_part, get_twisting_ribs, has_sines, is_uncoupled
    public :: with_rigid_edges
 
@@ -36,22 +36,16 @@ module thud_plate_stack
    type :: edge_type
       !> Stiffness against deflection, N/m2, and against rotation, N, per length.
       real(wp) :: deflection = rigid_support, rotation = 0.0_wp
-      !> Loss factor of both springs.
-      real(wp) :: loss_factor = 0.0_wp
    end type edge_type
 
-   !> Equal beams below a plate, all along its length or all along its width.
+   !> Equal beams below a plate along its length.
    type :: ribs_type
       !> Positions across the ribs, m: [n_rib].
       real(wp), allocatable :: position(:)
-      !> Along the width instead of the length.
-      logical :: along_width = .false.
       !> Stiffness of one rib in bending, N m2, in shear, N (0: rigid), and in torsion, N m2.
       real(wp) :: bending = 0.0_wp, shear = 0.0_wp, torsion = 0.0_wp
       !> Mass per length, kg/m, and its moment of inertia about the axis, kg m.
       real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
-      !> Stiffness against lifting off the plate per length, N/m2, of ribs along its length; 0: rigid.
-      real(wp) :: fastening = 0.0_wp
       real(wp) :: loss_factor = 0.0_wp
    end type ribs_type
 
@@ -69,14 +63,8 @@ module thud_plate_stack
       type(edge_type) :: edge(4)
       !> Lines on which the plate rests, m: x = constant and y = constant.
       real(wp), allocatable :: line_x(:), line_y(:)
-      type(ribs_type), allocatable :: ribs(:)
+      type(ribs_type), allocatable :: ribs
    end type orthotropic_type
-
-   !> A spring between two plates.
-   type :: point_spring_type
-      !> Position, m; stiffness, N/m; loss factor.
-      real(wp) :: x = 0.0_wp, y = 0.0_wp, stiffness = 0.0_wp, loss_factor = 0.0_wp
-   end type point_spring_type
 
    !> The connection of two plates.
    type :: layer_type
@@ -85,8 +73,6 @@ module thud_plate_stack
       !> Springs along lines y = constant: positions, m, stiffness per length, N/m2, and loss factor.
       real(wp), allocatable :: line_y(:)
       real(wp) :: line_stiffness = 0.0_wp, line_loss_factor = 0.0_wp
-      !> Springs at points.
-      type(point_spring_type), allocatable :: point(:)
    end type layer_type
 
    !> Plates of equal sides, the upper one first.
@@ -177,20 +163,16 @@ contains
          real(wp), intent(inout) :: side
          logical, intent(in) :: is_length
          real(wp) :: cut
-         integer :: i, j
+         integer :: i
 
          cut = 0.05_wp*side
          side = side - 2*cut
+         if (is_length) return
          do i = 1, size(part%plate)
-            if (.not. allocated(part%plate(i)%ribs)) cycle
-            do j = 1, size(part%plate(i)%ribs)
-               associate (ribs => part%plate(i)%ribs(j))
-                  if (ribs%along_width .eqv. is_length) call move(ribs%position, cut, side)
-               end associate
-            end do
+            if (allocated(part%plate(i)%ribs)) call move(part%plate(i)%ribs%position, cut, side)
          end do
          do i = 1, size(part%layer)
-            if (allocated(part%layer(i)%line_y) .and. .not. is_length) call move(part%layer(i)%line_y, cut, side)
+            if (allocated(part%layer(i)%line_y)) call move(part%layer(i)%line_y, cut, side)
          end do
       end subroutine shorten
 
@@ -222,10 +204,9 @@ contains
       yes = .true.
       do i = 1, size(stack%plate)
          yes = yes .and. has_sines(stack%plate(i), direction)
-         if (allocated(stack%plate(i)%ribs)) yes = yes .and. all(stack%plate(i)%ribs%along_width .eqv. direction == 2)
+         if (direction == 2) yes = yes .and. .not. allocated(stack%plate(i)%ribs)
       end do
       do i = 1, size(stack%plate) - 1
-         yes = yes .and. .not. allocated(stack%layer(i)%point)
          if (direction == 2) yes = yes .and. .not. allocated(stack%layer(i)%line_y)
       end do
    end function is_uncoupled_along
@@ -236,28 +217,20 @@ contains
       !> 1: along the length, 2: along the width.
       integer, intent(in) :: direction
       logical :: yes
-      integer :: i, j
+      integer :: i
 
       yes = .true.
       do i = 1, size(stack%plate)
          associate (edges => stack%plate(i)%edge(2*direction - 1:2*direction))
             yes = yes .and. abs(edges(1)%deflection - edges(2)%deflection) <= 0.0_wp &
-               .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp &
-               .and. abs(edges(1)%loss_factor - edges(2)%loss_factor) <= 0.0_wp
+               .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp
          end associate
          if (direction == 1 .and. allocated(stack%plate(i)%line_x)) yes = yes .and. size(stack%plate(i)%line_x) == 0
          if (direction == 2 .and. allocated(stack%plate(i)%line_y)) yes = yes .and. size(stack%plate(i)%line_y) == 0
-         if (.not. allocated(stack%plate(i)%ribs)) cycle
-         do j = 1, size(stack%plate(i)%ribs)
-            associate (ribs => stack%plate(i)%ribs(j))
-               if (ribs%along_width .neqv. direction == 1) cycle
-               yes = yes .and. all(abs(ribs%position + ribs%position(size(ribs%position):1:-1) &
-                  - merge(stack%length, stack%width, direction == 1)) <= 1.0e-9_wp*stack%length)
-            end associate
-         end do
-      end do
-      do i = 1, size(stack%plate) - 1
-         yes = yes .and. .not. allocated(stack%layer(i)%point)
+         if (direction == 1 .or. .not. allocated(stack%plate(i)%ribs)) cycle
+         associate (position => stack%plate(i)%ribs%position)
+            yes = yes .and. all(abs(position + position(size(position):1:-1) - stack%width) <= 1.0e-9_wp*stack%length)
+         end associate
       end do
    end function is_symmetric
 
@@ -306,16 +279,10 @@ contains
       !> Number of functions.
       integer, intent(in) :: n
       real(wp), allocatable :: position(:)
-      integer :: i
 
       allocate (position(0))
-      if (.not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
-      do i = 1, size(plate%ribs)
-         associate (ribs => plate%ribs(i))
-            if (ribs%along_width .neqv. direction == 1) cycle
-            if (max(ribs%torsion, ribs%inertia) > 0.0_wp) position = [position, ribs%position]
-         end associate
-      end do
+      if (direction == 1 .or. .not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
+      if (max(plate%ribs%torsion, plate%ribs%inertia) > 0.0_wp) position = plate%ribs%position
       if (has_sines(plate, direction) .and. n >= max(min_sines(1)*size(position), min_sines(2))) then
         position = position(:0)
       end if

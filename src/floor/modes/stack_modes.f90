@@ -2,7 +2,7 @@
 !> rigid in shear (Mindlin) are static displacements.
 module thud_stack_modes
    use thud_constants, only: pi
-   use thud_function_set, only: amplitudes, cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
+   use thud_function_set, only: cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
    use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, get_twisting_ribs, has_sines, &
@@ -21,9 +21,6 @@ module thud_stack_modes
    type :: plate_motion_type
       type(product_type) :: deflection, rotation_x, rotation_y
       integer :: w = 0, a = 0, b = 0
-      !> Deflection of the first ribs of a plate, which are fastened by springs, and its number; 0: that of the plate.
-      type(product_type) :: lifting
-      integer :: r = 0
    end type plate_motion_type
 
 contains
@@ -63,35 +60,21 @@ contains
             call add_thin_plate(system, stack%plate(i), motion(i))
          end if
          call add_edges(system, stack%plate(i), motion(i))
-         if (has_fastening(stack%plate(i))) then
-            motion(i)%lifting = product_type(motion(i)%deflection%x, &
-               function_set_type(amplitudes, stack%width, size(stack%plate(i)%ribs(1)%position)))
-            call add_displacement(system, motion(i)%lifting, motion(i)%r)
-         end if
          call add_ribs(system, stack%plate(i), motion(i))
       end do
       system%is_bearing = .false.
       do i = 1, size(stack%plate) - 1
-         call add_layer(system, stack%layer(i), stack%plate(i), motion(i), motion(i + 1))
+         call add_layer(system, stack%layer(i), motion(i), motion(i + 1))
       end do
       limit = 0.0_wp
       if (present(lower_limit)) limit = 2*pi*lower_limit
       call solve_ritz_system(system, modes, failed, limit)
    end subroutine get_stack_modes
 
-   !> Whether springs fasten the first ribs of a plate.
-   pure function has_fastening(plate) result(yes)
-      type(orthotropic_type), intent(in) :: plate
-      logical :: yes
-
-      yes = allocated(plate%ribs)
-      if (yes) yes = plate%ribs(1)%fastening > 0.0_wp
-   end function has_fastening
-
-   !> Amplitudes of separate ribs at positions that are symmetric about the middle, as sums and differences of mirrored ones,
-   !> so that modes remain even or odd: an orthogonal matrix, [n_rib, n_rib].
-   pure function get_amplitudes(n) result(matrix)
-      !> Number of ribs.
+   !> Sums and differences of loads at positions that are symmetric about the middle, so that functions remain even or odd:
+   !> an orthogonal matrix, [n_load, n_load].
+   pure function get_even_and_odd(n) result(matrix)
+      !> Number of loads.
       integer, intent(in) :: n
       real(wp) :: matrix(n, n)
       integer :: i
@@ -102,7 +85,7 @@ contains
          matrix([i, n + 1 - i], n + 1 - i) = [sqrt(0.5_wp), -sqrt(0.5_wp)]
       end do
       if (mod(n, 2) == 1) matrix((n + 1)/2, (n + 1)/2) = 1.0_wp
-   end function get_amplitudes
+   end function get_even_and_odd
 
    !> Functions of the deflection and the rotations of a plate.
    function new_motion(stack, plate, frequency) result(motion)
@@ -180,8 +163,7 @@ contains
       call add_stiffness(system, 1, 1, bending, get_overlap(set, 2, set, 2), unit, 0.0_wp)
       call add_mass(system, 1, 1, bending, get_overlap(set, 0, set, 0), unit)
       do order = 0, 1
-         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0), &
-            [0.0_wp, 0.0_wp])
+         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0))
       end do
       call solve_ritz_system(system, modes, failed, 0.0_wp)
       if (failed) return
@@ -226,7 +208,7 @@ contains
          real(wp) :: deflection(size(value, 2), size(value, 1)), rest(size(value, 2))
          integer :: k, repetition
 
-         deflection = matmul(transpose(value), get_amplitudes(size(value, 1)))
+         deflection = matmul(transpose(value), get_even_and_odd(size(value, 1)))
          do k = 1, size(deflection, 2)
             rest = merge(0.0_wp, deflection(:, k)/max(omega, tiny(omega))**2, kept)
             do repetition = 1, 2
@@ -294,21 +276,21 @@ contains
       integer :: i
 
       do i = 1, 2
-         associate (rotation => plate%edge(2*i - 1:2*i)%rotation, loss_factor => plate%edge(2*i - 1:2*i)%loss_factor)
-            call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection, loss_factor)
+         associate (rotation => plate%edge(2*i - 1:2*i)%rotation)
+            call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection)
             if (motion%a == 0) then
-               call add_ends(system, i, motion%w, motion%deflection, 1, rotation, loss_factor)
+               call add_ends(system, i, motion%w, motion%deflection, 1, rotation)
             else if (i == 1) then
-               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation, loss_factor)
+               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation)
             else
-               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation, loss_factor)
+               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation)
             end if
          end associate
       end do
    end subroutine add_edges
 
    !> Springs along both edges across one direction.
-   subroutine add_ends(system, direction, number, shape, order, spring, loss_factor)
+   subroutine add_ends(system, direction, number, shape, order, spring)
       type(ritz_system_type), intent(inout) :: system
       !> 1: edges x = constant, 2: edges y = constant.
       integer, intent(in) :: direction
@@ -317,22 +299,22 @@ contains
       type(product_type), intent(in) :: shape
       !> Order of the derivative that the springs resist.
       integer, intent(in) :: order
-      !> Stiffness per length, and its loss factor.
-      real(wp), intent(in) :: spring(2), loss_factor(2)
+      !> Stiffness per length.
+      real(wp), intent(in) :: spring(2)
       real(wp) :: ends(2)
       integer :: i, n
 
       ends = [0.0_wp, merge(shape%x%length, shape%y%length, direction == 1)]
-      n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp .and. abs(loss_factor(1) - loss_factor(2)) <= 0.0_wp)
+      n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp)
       do i = 1, 3 - n
          if (.not. spring(i) < rigid_support) cycle
          associate (at => ends(i:i + n - 1))
             if (direction == 1) then
                call add_stiffness(system, number, number, spring(i), get_point_matrix(shape%x, at, order), &
-                  get_overlap(shape%y, 0, shape%y, 0), loss_factor(i))
+                  get_overlap(shape%y, 0, shape%y, 0), 0.0_wp)
             else
                call add_stiffness(system, number, number, spring(i), get_overlap(shape%x, 0, shape%x, 0), &
-                  get_point_matrix(shape%y, at, order), loss_factor(i))
+                  get_point_matrix(shape%y, at, order), 0.0_wp)
             end if
          end associate
       end do
@@ -352,63 +334,23 @@ contains
       end associate
    end function get_point_matrix
 
-   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection. Those that springs fasten
-   !> have a deflection of their own.
+   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection.
    subroutine add_ribs(system, plate, motion)
       type(ritz_system_type), intent(inout) :: system
       type(orthotropic_type), intent(in) :: plate
       type(plate_motion_type), intent(in) :: motion
-      integer :: i
 
       if (.not. allocated(plate%ribs)) return
-      do i = 1, size(plate%ribs)
-         associate (ribs => plate%ribs(i), w => motion%w, x => motion%deflection%x, y => motion%deflection%y)
-            if (ribs%along_width) then
-               associate (at_ribs => get_point_matrix(x, ribs%position, 0), slope => get_point_matrix(x, ribs%position, 1))
-                  call add_stiffness(system, w, w, 1.0_wp, at_ribs, get_beam_stiffness(ribs, y, motion%rotation_y%y), &
-                     ribs%loss_factor)
-                  call add_stiffness(system, w, w, ribs%torsion, slope, get_overlap(y, 1, y, 1), ribs%loss_factor)
-                  call add_mass(system, w, w, ribs%mass, at_ribs, get_overlap(y, 0, y, 0))
-                  call add_mass(system, w, w, ribs%inertia, slope, get_overlap(y, 0, y, 0))
-               end associate
-            else
-               associate (at_ribs => get_point_matrix(y, ribs%position, 0), slope => get_point_matrix(y, ribs%position, 1))
-                  call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
-                  call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
-                  if (i == 1 .and. motion%r > 0) then
-                     call add_own_motion(system, ribs, motion, at_ribs)
-                     cycle
-                  end if
-                  call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, &
-                     ribs%loss_factor)
-                  call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
-               end associate
-            end if
-         end associate
-      end do
-   end subroutine add_ribs
-
-   !> Bending and mass of ribs along the length that springs fasten to a plate.
-   subroutine add_own_motion(system, ribs, motion, at_ribs)
-      type(ritz_system_type), intent(inout) :: system
-      type(ribs_type), intent(in) :: ribs
-      type(plate_motion_type), intent(in) :: motion
-      !> Products of the plate's functions, summed over the ribs: [count, count].
-      real(wp), intent(in) :: at_ribs(:, :)
-
-      associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, r => motion%r, k => ribs%fastening, &
-         amplitude => get_amplitudes(size(ribs%position)))
-         associate (unit => matmul(transpose(amplitude), amplitude), length => get_overlap(x, 0, x, 0))
-            call add_stiffness(system, r, r, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), unit, &
+      associate (ribs => plate%ribs, w => motion%w, x => motion%deflection%x, y => motion%deflection%y)
+         associate (at_ribs => get_point_matrix(y, ribs%position, 0), slope => get_point_matrix(y, ribs%position, 1))
+            call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
+            call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
+            call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, &
                ribs%loss_factor)
-            call add_mass(system, r, r, ribs%mass, length, unit)
-            call add_stiffness(system, w, w, k, length, at_ribs, ribs%loss_factor)
-            call add_stiffness(system, r, r, k, length, unit, ribs%loss_factor)
-            call add_stiffness(system, w, r, -k, length, &
-               matmul(transpose(get_functions(y, ribs%position, 0)), amplitude), ribs%loss_factor)
+            call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
          end associate
       end associate
-   end subroutine add_own_motion
+   end subroutine add_ribs
 
    !> Stiffness of a rib over the functions of its deflection. With shear (Timoshenko), its rotation takes the values of
    !> least energy.
@@ -432,69 +374,38 @@ contains
       stiffness = ribs%shear*get_overlap(deflection, 1, deflection, 1) - matmul(transpose(coupling), followed)
    end function get_beam_stiffness
 
-   !> Springs between two plates; those along lines are at the ribs of the upper plate if it has ribs that springs fasten.
-   subroutine add_layer(system, layer, plate, upper, lower)
+   !> Springs between two plates.
+   subroutine add_layer(system, layer, upper, lower)
       type(ritz_system_type), intent(inout) :: system
       type(layer_type), intent(in) :: layer
-      !> The upper plate.
-      type(orthotropic_type), intent(in) :: plate
       type(plate_motion_type), intent(in) :: upper, lower
-      integer :: i
 
-      if (layer%stiffness > 0.0_wp) then
-         call add_between(layer%stiffness, layer%loss_factor)
-      end if
-      if (allocated(layer%line_y)) then
-         if (upper%r > 0) then
-            call add_below_ribs(get_amplitudes(size(plate%ribs(1)%position)))
-         else
-            call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
-         end if
-      end if
-      if (.not. allocated(layer%point)) return
-      do i = 1, size(layer%point)
-         associate (point => layer%point(i))
-            call add_between(point%stiffness, point%loss_factor, x=[point%x], y=[point%y])
-         end associate
-      end do
+      if (layer%stiffness > 0.0_wp) call add_between(layer%stiffness, layer%loss_factor)
+      if (allocated(layer%line_y)) call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
    contains
 
-      !> Adds springs at all positions, at lines y, or at a point.
-      subroutine add_between(stiffness, loss_factor, x, y)
+      !> Adds springs at all positions, or along lines y.
+      subroutine add_between(stiffness, loss_factor, y)
          real(wp), intent(in) :: stiffness, loss_factor
-         real(wp), intent(in), optional :: x(:), y(:)
+         real(wp), intent(in), optional :: y(:)
 
-         call add_pair(system, upper, upper, stiffness, loss_factor, x, y)
-         call add_pair(system, lower, lower, stiffness, loss_factor, x, y)
-         call add_pair(system, upper, lower, -stiffness, loss_factor, x, y)
+         call add_pair(system, upper, upper, stiffness, loss_factor, y)
+         call add_pair(system, lower, lower, stiffness, loss_factor, y)
+         call add_pair(system, upper, lower, -stiffness, loss_factor, y)
       end subroutine add_between
-
-      !> Adds the springs along lines between ribs and the lower plate.
-      subroutine add_below_ribs(amplitude)
-         !> Amplitudes of the ribs: [n_rib, n_rib].
-         real(wp), intent(in) :: amplitude(:, :)
-
-         associate (x => upper%lifting%x, k => layer%line_stiffness, eta => layer%line_loss_factor)
-            call add_pair(system, lower, lower, k, eta, y=layer%line_y)
-            call add_stiffness(system, upper%r, upper%r, k, get_overlap(x, 0, x, 0), &
-               matmul(transpose(amplitude), amplitude), eta)
-            call add_stiffness(system, upper%r, lower%w, -k, get_overlap(x, 0, lower%deflection%x, 0), &
-               matmul(transpose(amplitude), get_functions(lower%deflection%y, layer%line_y, 0)), eta)
-         end associate
-      end subroutine add_below_ribs
    end subroutine add_layer
 
    !> Stiffness of springs between the deflections of two plates, or of one plate with itself.
-   subroutine add_pair(system, first, second, stiffness, loss_factor, x, y)
+   subroutine add_pair(system, first, second, stiffness, loss_factor, y)
       type(ritz_system_type), intent(inout) :: system
       type(plate_motion_type), intent(in) :: first, second
-      !> Stiffness per area, per length or of a point, and loss factor.
+      !> Stiffness per area or per length, and loss factor.
       real(wp), intent(in) :: stiffness, loss_factor
-      !> Positions of the springs, m (default: everywhere).
-      real(wp), intent(in), optional :: x(:), y(:)
+      !> Positions of lines of springs, m (default: everywhere).
+      real(wp), intent(in), optional :: y(:)
 
       call add_stiffness(system, first%w, second%w, stiffness, &
-         get_product(first%deflection%x, second%deflection%x, x), &
+         get_overlap(first%deflection%x, 0, second%deflection%x, 0), &
          get_product(first%deflection%y, second%deflection%y, y), loss_factor)
    end subroutine add_pair
 

@@ -28,50 +28,29 @@ module thud_truncated_compliance
 contains
 
    !> The compliance at a point, and the part of it by moments of ribs, m/N: [2]. Longer waves have this part, which no short
-   !> wave carries away. With ribs in both directions, those in the other one of a pair only stiffen: it is the lesser of
-   !> both.
-   function get_truncated_compliance(plate, wavenumber, finest, x, y) result(compliance)
+   !> wave carries away.
+   function get_truncated_compliance(plate, wavenumber, finest, y) result(compliance)
       !> A plate that is rigid in shear.
       type(orthotropic_type), intent(in) :: plate
       !> Wavenumbers along length and width up to which the functions are complete, 1/m: [2].
       real(wp), intent(in) :: wavenumber(2)
-      !> Wavenumbers up to which the moments of ribs are resolved, 1/m: [2].
-      real(wp), intent(in) :: finest(2)
-      !> The point, m.
-      real(wp), intent(in) :: x, y
-      real(wp) :: compliance(2), one(2)
+      !> Wavenumber along the width up to which the moments of ribs are resolved, 1/m.
+      real(wp), intent(in) :: finest
+      !> Coordinate of the point along the width, m.
+      real(wp), intent(in) :: y
+      real(wp) :: compliance(2)
       real(wp) :: no_position(0)
-      integer :: i
 
-      if (.not. allocated(plate%ribs)) then
-         compliance = get_compliance(new_strip(plate, .false.), wavenumber, 1.0_wp, ribs_type(position=no_position), y)
-         return
-      end if
-      compliance = huge(compliance)
-      do i = 1, size(plate%ribs)
-         associate (ribs => plate%ribs(i))
-            if (ribs%along_width) then
-               one = get_compliance(new_strip(plate, .true.), wavenumber(2:1:-1), finest(1), ribs, x)
-            else
-               one = get_compliance(new_strip(plate, .false.), wavenumber, finest(2), ribs, y)
-            end if
-         end associate
-         if (one(1) < compliance(1)) compliance = one
-      end do
+      associate (strip => strip_type(plate%along, plate%coupling + 2*plate%torsion, plate%across))
+         if (allocated(plate%ribs)) then
+            compliance = get_compliance(strip, wavenumber, finest, plate%ribs, y)
+         else
+            compliance = get_compliance(strip, wavenumber, 1.0_wp, ribs_type(position=no_position), y)
+         end if
+      end associate
    end function get_truncated_compliance
 
-   !> Stiffnesses along and across ribs.
-   pure function new_strip(plate, along_width) result(strip)
-      type(orthotropic_type), intent(in) :: plate
-      !> Ribs along the width.
-      logical, intent(in) :: along_width
-      type(strip_type) :: strip
-
-      strip = strip_type(plate%along, plate%coupling + 2*plate%torsion, plate%across)
-      if (along_width) strip = strip_type(plate%across, strip%mixed, plate%along)
-   end function new_strip
-
-   !> The compliance with ribs of one direction, and the part of it by moments of ribs, m/N: [2].
+   !> The compliance with ribs, and the part of it by moments of ribs, m/N: [2].
    function get_compliance(strip, wavenumber, finest, ribs, point) result(compliance)
       type(strip_type), intent(in) :: strip
       !> Complete wavenumbers along and across the ribs, 1/m: [2].
@@ -134,7 +113,6 @@ contains
       if (n == 0) return
       beam = 1/(ribs%bending*k**4)
       if (ribs%shear > 0.0_wp) beam = beam + 1/(ribs%shear*k**2)
-      if (ribs%fastening > 0.0_wp) beam = beam + 1/ribs%fastening
       associate (between => distance(2:, 2:), from_force => distance(2:, 1))
          matrix(:n, :n) = get_deflection(strip, k, between, 0)
          matrix(:n, n + 1:) = -get_deflection(strip, k, between, 1)
