@@ -45,7 +45,7 @@ def test_results_keep_the_stated_error(case_file: CaseFile, run: Run, tmp_path: 
 
 def test_error_of_the_default_is_small_and_not_shown(case_file: CaseFile, run: Run) -> None:
     impact = thud.solve(model="modal_ball")
-    assert 0 < impact.numerical_error.level.max() < 0.1
+    assert 0 < impact.numerical_error.level.max() < 0.15
     assert impact.warnings == ()
     shown = run(case_file("&ball / &drop / &model name = 'modal_ball' /")).stdout
     assert "error at" not in shown
