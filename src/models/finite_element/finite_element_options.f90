@@ -47,8 +47,8 @@ module thud_finite_element_options
    !> The viscosity of Kelvin and Voigt prevents it.
    real(wp), parameter :: slip_friction(2) = [0.33_wp, 0.95_wp]
 
-   !> Largest changes by it from the default elements to finer ones among eight balls, dB, at the octaves that the velocity of
-   !> shear waves per radius makes those of the standard ball; the change is taken as proportional to the element size.
+   !> Largest changes by it from the default elements to finer ones among eight balls, dB, at the octaves that the velocity
+   !> of shear waves per radius makes those of the standard ball; the change is taken as proportional to the element size.
    real(wp), parameter :: slip_error(octave_count) = [0.05_wp, 0.15_wp, 0.35_wp, 2.0_wp, 2.0_wp]
    type(ball_type), parameter :: standard_ball = ball_type(youngs_modulus=2.08e6_wp)
 
