@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    # Keys of a resolution, or those that a case needs.
+    Keys = dict[str, Any] | Callable[[dict[str, Any]], dict[str, Any]]
 
 # Errors below this are not distinguished from zero, dB.
 FLOOR = 0.02
@@ -73,8 +75,8 @@ class Study:
     """Random cases of a model, and keys of a fine resolution and of one between."""
 
     draw: Callable[[random.Random], dict[str, Any]]
-    between: dict[str, Any]
-    fine: dict[str, Any]
+    between: Keys
+    fine: Keys
 
 
 def shell(chance: random.Random) -> dict[str, Any]:
@@ -96,6 +98,22 @@ def modal_ball(chance: random.Random) -> dict[str, Any]:
         "ball": source, "drop": drop(chance), "model": model, "duration": duration(source),
         "sample_rate": log_uniform(chance, 16e3, 96e3),
     }  # fmt: skip
+
+
+def modes(factor: float, rings: int, substeps: int) -> Keys:
+    """Return a resolution with modes up to a multiple of the frequency of the coarsest one."""
+
+    def keys(case: dict[str, Any]) -> dict[str, Any]:
+        source = case["ball"]
+        inner = source.outer_radius - source.wall_thickness
+        density = source.mass / (4 / 3 * math.pi * (source.outer_radius**3 - inner**3))
+        shear = math.sqrt(source.youngs_modulus / (2 * (1 + source.poisson_ratio) * density))
+        return {
+            "sample_rate": 96e3, "rings": rings, "substeps": substeps,
+            "highest_frequency": factor * max(1000.0, 2.1 * shear / source.outer_radius),
+        }  # fmt: skip
+
+    return keys
 
 
 def finite_element(chance: random.Random) -> dict[str, Any]:
@@ -156,11 +174,7 @@ STUDIES = {
     "hunt_crossley": Study(hunt_crossley, *SAMPLES),
     "two_mass": Study(two_mass, *SAMPLES),
     "measured_modes": Study(measured_modes, *SAMPLES),
-    "modal_ball": Study(
-        modal_ball,
-        {"sample_rate": 96e3, "rings": 160, "highest_frequency": 2000.0, "substeps": 2},
-        {"sample_rate": 96e3, "rings": 240, "highest_frequency": 3000.0, "substeps": 4},
-    ),
+    "modal_ball": Study(modal_ball, modes(2.8, 160, 2), modes(4, 240, 4)),
     "finite_element": Study(
         finite_element,
         {"radial_elements": 12, "polar_elements": 128},
@@ -169,8 +183,9 @@ STUDIES = {
 }
 
 
-def levels(case: dict[str, Any], keys: dict[str, Any]) -> tuple[Any, Array, Array]:
+def levels(case: dict[str, Any], keys: Keys) -> tuple[Any, Array, Array]:
     """Return the impact of a case, its levels, dB, and contact time, restitution and peak force."""
+    keys = keys(case) if callable(keys) else keys
     model = case["model"]
     options = {name: value for name, value in keys.items() if hasattr(model, name)}
     sampling = {name: value for name, value in keys.items() if name not in options}

@@ -42,19 +42,7 @@ def in_directory_with_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "study.toml").write_text(STUDY)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "fit_force",
-        pytest.param(
-            "fit_levels",
-            marks=pytest.mark.xfail(
-                reason="at its optimum the modal ball changes its resolution: a step of the levels",
-                strict=True,
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("name", ["fit_force", "fit_levels"])
 @pytest.mark.slow
 def test_studies_of_the_repository(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -43,12 +43,11 @@ def test_results_keep_the_stated_error(case_file: CaseFile, run: Run, tmp_path: 
     assert float(impact.to_xarray()["octave_500_error"]) == error.level[4]
 
 
-def test_error_of_the_default_is_small_and_not_shown(case_file: CaseFile, run: Run) -> None:
+def test_small_errors_are_not_shown(case_file: CaseFile, run: Run) -> None:
     impact = thud.solve(model="modal_ball")
-    assert 0 < impact.numerical_error.level.max() < 0.1
+    assert 0 < impact.numerical_error.level.max() < 0.15
     assert impact.warnings == ()
-    shown = run(case_file("&ball / &drop / &model name = 'modal_ball' /")).stdout
-    assert "error at" not in shown
+    assert "error at" not in run(case_file("&ball / &drop / &model /")).stdout
 
 
 def test_results_have_no_unknown_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
@@ -229,16 +228,27 @@ def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
     assert error.max() < 0.6 * np.abs(coarse.levels(force="floor") - levels).max()
 
 
-def slipping(friction: float, mesh: tuple[int, int] = (3, 24), **options: object) -> thud.Impact:
+# Slow shear waves: the surface sticks and slips an octave lower than that of the standard ball.
+LARGE = thud.Ball(
+    outer_radius=0.13, wall_thickness=0.0468, mass=7.81, youngs_modulus=1e6, poisson_ratio=0.49
+)
+
+
+def slipping(
+    friction: float,
+    mesh: tuple[int, int] = (3, 24),
+    ball: thud.Ball = thud.Ball.standard(),  # noqa: B008 - immutable
+    **options: object,
+) -> thud.Impact:
     radial, polar = mesh
     keys = {"model": "finite_element", "radial_elements": radial, "polar_elements": polar}
-    return thud.solve(thud.Ball.standard(), friction=friction, **keys, **options)  # type: ignore[arg-type]
+    return thud.solve(ball, friction=friction, **keys, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_stick_and_slip_raises_the_stated_error() -> None:
     """Meshes that are too coarse for it agree with each other."""
-    least = np.array([0.03, 0.05, 0.25, 0.6, 1.3]) * 64 / 24
+    least = np.array([0.05, 0.15, 0.35, 2.0, 2.0]) * 64 / 24
     for friction in (0.4, 0.9):
         assert (slipping(friction).numerical_error.level >= least).all()
     for friction in (0.0, 0.3, 1.0):
@@ -253,8 +263,11 @@ def test_stick_and_slip_raises_the_stated_error() -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_stated_error_covers_that_of_friction() -> None:
-    for friction in (0.2, 0.4):
-        coarse, fine = slipping(friction, (8, 64)), slipping(friction, (16, 128))
+    standard = thud.Ball.standard()
+    for friction, ball in (0.2, standard), (0.4, standard), (0.8, LARGE):
+        coarse, fine = (
+            slipping(friction, mesh, ball, duration=0.1) for mesh in ((8, 64), (16, 128))
+        )
         change = np.abs(coarse.levels(force="floor") - fine.levels(force="floor"))
         assert (change <= coarse.numerical_error.level + 0.01).all()
 

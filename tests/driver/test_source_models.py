@@ -95,13 +95,13 @@ def test_ball_that_does_not_rebound_is_refused_at_once() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("hunt_crossley", 60), ("hollow_sphere", 60), ("two_mass", 40), ("measured_modes", 60),
-     ("modal_ball", 60)],
+    [("hunt_crossley", 60), ("hollow_sphere", 60), ("two_mass", 40), ("measured_modes", 300),
+     ("modal_ball", 150)],
 )  # fmt: skip
 def test_stated_errors_cover_those_of_random_sources(
     name: str, count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At least 95 % of contact times and peaks; of levels at 500 Hz, where samples make them."""
+    """At least 95 % of each: contact times, restitutions, peaks and levels of the octaves."""
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "bench")
     sources: Any = importlib.import_module("numerical_error")
     chance = random.Random(11)  # noqa: S311 - a fixed draw
@@ -115,10 +115,10 @@ def test_stated_errors_cover_those_of_random_sources(
             continue
         _, fine_levels, fine_numbers = sources.levels(case, sources.STUDIES[name].fine)
         stated = impact.numerical_error
-        errors = np.abs([*(numbers - fine_numbers), (levels - fine_levels)[4]])
-        limits = [stated.contact_time, stated.restitution, stated.peak_force, stated.level[4]]
+        errors = np.abs([*(numbers - fine_numbers), *(levels - fine_levels)])
+        limits = [stated.contact_time, stated.restitution, stated.peak_force, *stated.level]
         # Differences of 0.02 % and 0.002 dB are those of the reference.
-        limits = np.maximum(limits, [2e-4 * numbers[0], 2e-4, 2e-4 * numbers[2], 0.002])
+        limits = np.maximum(limits, [2e-4 * numbers[0], 2e-4, 2e-4 * numbers[2], *5 * [0.002]])
         covered.append(errors <= limits)
     shares = np.mean(covered, axis=0)
-    assert (shares[: 3 if name == "modal_ball" else 4] >= 0.95).all(), shares
+    assert (shares >= 0.95).all(), shares

@@ -31,8 +31,8 @@ ERRORS = 3.0
 TRUTH = {"youngs_modulus": 1.8e6, "loss_factor": 0.2}
 START = {"youngs_modulus": 1.6e6, "loss_factor": 0.15}
 ASSUMED = thud.Case(
-    # Coarse, and its own truth.
-    model=thud.ModalBall(700.0, rings=20, damping_law="fractional"),
+    # Few rings, and its own truth.
+    model=thud.ModalBall(1400.0, rings=20, damping_law="fractional"),
     sampling=thud.Sampling(duration=0.03),
 )
 

@@ -10,8 +10,7 @@ module thud_modal_ball
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: add_model_quantity, add_to_means, continue_to_zero, force_history_type, max_residual, &
-      new_force_history
+   use thud_force_history, only: add_model_quantity, add_to_means, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
@@ -339,7 +338,7 @@ contains
       type(force_history_type), intent(inout) :: history
       !> Set if the contact outlasts the record, or if too much energy is lost in the contact.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: settling_time, before, fraction
+      real(wp) :: settling_time, before, fraction, clearance, last_clearance
       integer :: i, j, n_step, last_contact, nearest
       logical :: has_separated
 
@@ -347,6 +346,7 @@ contains
       settling_time = 0.0_wp
       if (size(modes%omega) > 0) settling_time = pi/(sqrt(modes%equilibrium_ratio)*minval(modes%omega))
       last_contact = 0
+      clearance = 0.0_wp
       has_separated = .false.
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, modes, state, i, history)
@@ -357,6 +357,8 @@ contains
             call take_step(modes, static, interval, ball%mass, state, contact, error)
             call check_interrupt(error)
             if (allocated(error)) return
+            last_clearance = clearance
+            clearance = minval(state%gap(::contact%n_dof))
             if (contact%outermost > 0) then
                last_contact = n_step
                history%impulse = history%impulse + state%force*interval
@@ -365,6 +367,9 @@ contains
                nearest = min(i + nint(fraction), size(history%floor_force))
                history%model_history(nearest, 1) = max(history%model_history(nearest, 1), &
                   ball%outer_radius*rings%radius(contact%outermost))
+            else if (n_step == last_contact + 1) then
+               ! Forces are means over a step that close the gaps at its end.
+               history%exact_contact_time = (n_step - 0.5_wp - clearance/(clearance - last_clearance))*interval
             end if
             if (contact%outermost == size(rings%radius)) then
                error = numerical_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low for this ' &
@@ -443,7 +448,6 @@ contains
       history%peak_force = maxval(history%floor_force)
       history%peak_elastic_force = history%peak_force
       history%max_deflection = maxval(history%deflection, mask=history%floor_force > 0.0_wp)
-      call continue_to_zero(history)
       ! Extrapolated back to the end of the contact.
       history%restitution = (state%velocity + state%gravity*(time - history%contact_time))/history%impact_velocity
       gain = ball%mass*(history%impact_velocity + state%velocity + state%gravity*time)

@@ -38,8 +38,11 @@ module thud_modal_ball_options
    real(wp), parameter :: margin = 1.1_wp
    integer, parameter :: added_rings = 2
 
-   !> Deflection relative to the radius above which, and Poisson's ratio below which errors are larger than the difference
-   !> of two levels.
+   !> Error of a level divided by its difference from the next coarser one: 1/(ratio**2 - 1) for the error of second order,
+   !> and half as much again for modes that enter one by one (docs/modal_ball.md).
+   real(wp), parameter :: usual_ratio = 1.5_wp
+
+   !> Deflection relative to the radius above which, and Poisson's ratio below which it is larger.
    real(wp), parameter :: wide_contact = 0.36_wp, compressible = 0.4_wp
 
    !> Numbers of modes of level 1 above which level 2 or 3 is expected, and contact radius relative to the radius of the ball
@@ -228,7 +231,7 @@ contains
       if (n_mode > many_modes(2)) level = 3
       ! Rings of thin walls that stick do not converge.
       if (options%floor_friction == 'stick' .and. ball%wall_thickness < thin_wall*ball%outer_radius) level = 3
-      if (options%get_error_ratio(ball, level, contact) > 1.0_wp) level = level + 1
+      if (options%get_error_ratio(ball, level, contact) > usual_ratio) level = level + 1
    end function get_expected_level
 
    !> Approximate number of modes up to a frequency, within about a third: waves in the cross section of the wall, and
@@ -273,7 +276,7 @@ contains
       real(wp) :: ratio
 
       ! Wide contacts and compressible walls converge more slowly.
-      ratio = 1 + 25*max(0.0_wp, history%max_deflection/ball%outer_radius - wide_contact)
+      ratio = usual_ratio + 25*max(0.0_wp, history%max_deflection/ball%outer_radius - wide_contact)
       if (ball%poisson_ratio < compressible) ratio = max(ratio, 2.5_wp)
    end function get_error_ratio
 

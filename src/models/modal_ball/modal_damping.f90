@@ -11,10 +11,6 @@ module thud_modal_damping
 
    public :: set_damping
 
-   !> Damping ratio that modes get in addition towards the highest frequency, and fraction of this frequency from which on:
-   !> where modes end, an impact would ring.
-   real(wp), parameter :: end_damping = 0.5_wp, start_of_damping = 0.6_wp
-
 contains
 
    !> Sets the Maxwell branches and the damping ratios of the modes.
@@ -42,9 +38,6 @@ contains
          damping_ratio = options%loss_factor/2
          modes%retardation_time = options%loss_factor/(2*pi*options%get_highest_frequency())
       end select
-      associate (relative => modes%omega/(2*pi*options%get_highest_frequency()))
-         damping_ratio = damping_ratio + end_damping*max(0.0_wp, (relative - start_of_damping)/(1 - start_of_damping))**2
-      end associate
    end subroutine set_damping
 
 end module thud_modal_damping

@@ -14,8 +14,8 @@ from thud.base.immutable import Plain, freeze
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
-# Relative step of the derivatives of a contact time, which jumps by up to 1e-3: from sample to
-# sample of the modal ball, or from node to node of finite elements.
+# Relative step of the derivatives of a contact time, which jumps by up to 1e-3 from node to node of
+# finite elements.
 CONTACT_STEP = 5e-2
 
 if TYPE_CHECKING:
