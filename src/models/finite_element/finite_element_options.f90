@@ -189,6 +189,9 @@ contains
       associate (mesh => get_element_counts(ball, options%mesh))
          interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
             mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
+         ! A layer on the floor moves half the mass of the outermost elements.
+         interval = interval/hypot(1.0_wp, interval/options%step_safety &
+            *sqrt(options%contact%layer_stiffness*mesh%radial_elements/(2*get_density(ball)*ball%wall_thickness)))
          n_padded = mesh%radial_elements*n_element*ceiling(mesh%polar_elements/real(n_element, wp))
       end associate
       if (options%material%viscosity == 'kelvin_voigt') then
@@ -207,7 +210,7 @@ contains
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
    end subroutine count_work
 
-   !> Nodes that stick and slip, and thin walls need higher levels.
+   !> Nodes that stick and slip, a layer on the floor, and thin walls need higher levels.
    function get_expected_level(ball, options, contact) result(level)
       type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
@@ -216,7 +219,7 @@ contains
 
       level = 1
       if (options%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
-      if (options%contact%friction > high_friction) level = highest_level
+      if (options%contact%friction > high_friction .or. options%contact%layer_stiffness > 0.0_wp) level = highest_level
    end function get_expected_level
 
    !> Whether the resolution may be chosen: the user's keys do not grow.
