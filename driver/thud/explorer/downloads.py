@@ -19,7 +19,7 @@ from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from thud.base.key import Key
 
@@ -122,10 +122,8 @@ def study(values: Values) -> Download:
     return Download(("\n".join(lines) + "\n").encode())
 
 
-def _moved_ranges(moved: object) -> dict[str, tuple[float, float]]:
+def _moved_ranges(moved: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """Return the minimum and maximum of each key whose slider was moved."""
-    if not isinstance(moved, dict):
-        refuse(f"{MOVED} = {shown(moved)} is not a table", "minimum and maximum by group.key")
     for key, ends in moved.items():
         if not isinstance(ends, list) or len(ends) != 2:  # noqa: PLR2004
             refuse(f"{MOVED}: {key} = {shown(ends)} is not a pair", "two numbers")
