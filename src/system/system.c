@@ -70,14 +70,17 @@ void thud_end_process(int code)
    _exit(code);
 }
 
-// Limit of the memory of the container, bytes, in version 2 or 1 of control groups; infinite if there is none.
-static double get_container_limit(void)
+// Limit of the memory of the container, bytes, in version 2 or 1 of control groups below a directory; infinite if there is
+// none.
+double thud_get_container_limit(const char *directory)
 {
-   static const char *const paths[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
+   static const char *const names[] = {"memory.max", "memory/memory.limit_in_bytes"};
    double limit = INFINITY;
+   char path[256];
 
    for (int i = 0; i < 2; i++) {
-      FILE *file = fopen(paths[i], "re");
+      snprintf(path, sizeof path, "%s/%s", directory, names[i]);
+      FILE *file = fopen(path, "re");
 
       // Version 2 writes "max" for no limit.
       if (file && fscanf(file, "%lf", &limit) != 1) limit = INFINITY;
@@ -108,7 +111,7 @@ int thud_has_memory(double bytes, int check_available)
       if (sscanf(line, "SwapFree: %lf", &kilobytes) == 1 && free >= 0.0) free += 1024.0*kilobytes;
    }
    fclose(file);
-   return (free < 0.0 || bytes <= free) && bytes <= get_container_limit();
+   return (free < 0.0 || bytes <= free) && bytes <= thud_get_container_limit("/sys/fs/cgroup");
 }
 
 // Handlers of the process, which `record_signal` calls too, and the number of running calls of the library.

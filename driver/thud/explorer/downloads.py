@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from thud.base.key import Key
 
@@ -33,14 +33,21 @@ SAMPLES = 256
 MOVED = "moved"
 
 
-def namelist(values: Values) -> bytes:
+class Download(NamedTuple):
+    """Content of a file; of a sound also its full scale, Pa."""
+
+    content: bytes
+    full_scale: float | None = None
+
+
+def namelist(values: Values) -> Download:
     """Return the case as a namelist file."""
     case = new_case(values)
     check_case(case)
-    return f"{case.to_namelist()}\n".encode()
+    return Download(f"{case.to_namelist()}\n".encode())
 
 
-def script(values: Values) -> bytes:
+def script(values: Values) -> Download:
     """Return a Python script that computes the case."""
     case = new_case(values)
     check_case(case)
@@ -59,7 +66,7 @@ def script(values: Values) -> bytes:
     lines += ["print(impact.assess())"]
     if case.floor and case.room:
         lines += ["print(thud.predict_level(impact))"]
-    return ("\n".join(lines) + "\n").encode()
+    return Download(("\n".join(lines) + "\n").encode())
 
 
 def _stated(group: Group) -> dict[str, object]:
@@ -68,7 +75,7 @@ def _stated(group: Group) -> dict[str, object]:
     return {name: value for name, value in vars(group).items() if value != getattr(defaults, name)}
 
 
-def force(values: Values) -> bytes:
+def force(values: Values) -> Download:
     """Return time and assessed force as comma-separated values."""
     impact = compute(new_case(values))
     table = io.StringIO()
@@ -80,15 +87,16 @@ def force(values: Values) -> bytes:
         header="time_s,force_N",
         comments="",
     )
-    return table.getvalue().encode()
+    return Download(table.getvalue().encode())
 
 
-def sound(values: Values) -> bytes:
-    """Return the sound in the room below as a WAV file, whose comment states its full scale."""
-    return listen(predict_level(compute(new_case(values)))).wav()
+def sound(values: Values) -> Download:
+    """Return the sound in the room below as a WAV file."""
+    heard = listen(predict_level(compute(new_case(values))))
+    return Download(heard.wav(), heard.full_scale)
 
 
-def study(values: Values) -> bytes:
+def study(values: Values) -> Download:
     """Return the file of a sweep over the ranges in which sliders were moved."""
     moved = _moved_ranges(values.pop(MOVED, {}))
     case = new_case(values)
@@ -111,13 +119,11 @@ def study(values: Values) -> bytes:
         count = f", count = {_count(key, low, high)}" if grid else ""
         ends = [round(low), round(high)] if key.kind == "whole" else [low, high]
         lines.append(f'"{name}" = {{ low = {ends[0]!r}, high = {ends[1]!r}{count} }}')
-    return ("\n".join(lines) + "\n").encode()
+    return Download(("\n".join(lines) + "\n").encode())
 
 
-def _moved_ranges(moved: object) -> dict[str, tuple[float, float]]:
+def _moved_ranges(moved: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """Return the minimum and maximum of each key whose slider was moved."""
-    if not isinstance(moved, dict):
-        refuse(f"{MOVED} = {shown(moved)} is not a table", "minimum and maximum by group.key")
     for key, ends in moved.items():
         if not isinstance(ends, list) or len(ends) != 2:  # noqa: PLR2004
             refuse(f"{MOVED}: {key} = {shown(ends)} is not a pair", "two numbers")
@@ -140,8 +146,8 @@ def _toml(value: object) -> str:
     return repr(value)
 
 
-# Function that returns the content, and media type, by the name of the file.
-DOWNLOADS: dict[str, tuple[Callable[[Values], bytes], str]] = {
+# Function that returns the file, and media type, by the name of the file.
+DOWNLOADS: dict[str, tuple[Callable[[Values], Download], str]] = {
     "case.nml": (namelist, "text/plain"),
     "case.py": (script, "text/x-python"),
     "force.csv": (force, "text/csv"),

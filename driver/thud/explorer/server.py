@@ -63,6 +63,8 @@ MAX_REQUESTS = 500
 IDLE_TIME = 10
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
+# Header of a downloaded sound with its full scale, Pa.
+FULL_SCALE = "x-thud-full-scale"
 # Header that is "SI" if fields and messages are to have SI units.
 UNITS = "x-thud-units"
 # Maximum pause between two chunks of a body, s, and its maximum duration: a time, s, plus that of
@@ -270,8 +272,9 @@ async def _download(request: Request) -> Response:
     if (name := request.path_params["name"]) not in DOWNLOADS:
         raise HTTPException(404, "there is no such file")
     reports = request.app.state.slow.run("download", name, await _values(request))
-    content = await _answer(request, reports)
-    return Response(content, media_type=DOWNLOADS[name][1], headers=HEADERS)
+    content, full_scale = await _answer(request, reports)
+    headers = HEADERS if full_scale is None else HEADERS | {FULL_SCALE: repr(full_scale)}
+    return Response(content, media_type=DOWNLOADS[name][1], headers=headers)
 
 
 async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None]) -> Any:  # noqa: ANN401 - of any task
@@ -380,7 +383,7 @@ async def _values(request: Request) -> dict[str, dict[str, Any]]:
 
 
 def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]:
-    """Return the values of JSON, by group and key.
+    """Return the values of JSON, by group and key: each value is plain, or a list of plain ones.
 
     Raise InputError if they name a file that the server does not offer itself.
     """
@@ -388,13 +391,21 @@ def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]
         values = json.loads(content)
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
-    if not isinstance(values, dict):
-        raise HTTPException(400, "the request does not contain groups of keys")
+    if not (isinstance(values, dict) and all(map(_is_group, values.values()))):
+        raise HTTPException(400, "the request does not contain groups of keys with plain values")
     for group, keys in _files_in(values):
         for name, path in keys.items():
             if not isinstance(path, str) or path not in request.app.state.offered:
                 refuse(f"&{group}: {name} cannot be chosen on the page", "a file that it offers")
     return values
+
+
+def _is_group(keys: object) -> bool:
+    """Whether a value of JSON is a table of plain values, and lists of them."""
+    if not isinstance(keys, dict):
+        return False
+    lists = (value if isinstance(value, list) else [value] for value in keys.values())
+    return not any(isinstance(entry, list | dict) for entries in lists for entry in entries)
 
 
 def _files_in(values: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, str]]]:

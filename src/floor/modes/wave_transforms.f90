@@ -30,7 +30,8 @@ module thud_wave_transforms
    type :: transforms_type
       !> Cosine and sine transforms along x: [n_x, n_angle, 2].
       real(wp), allocatable :: along(:, :, :)
-      !> Integrals over b of products of two transforms along y, with the weights of the angles a: [n_y, n_y, n_angle, 2].
+      !> Integrals over b of products of two transforms along y, with the weights of the angles a, of those that
+      !> `has_across`: [n_y, n_y, n_angle, 2].
       real(wp), allocatable :: across(:, :, :, :)
       !> Whether a function of x or y has a cosine and a sine transform: [n_x, 2], [n_y, 2].
       logical, allocatable :: has_along(:, :), has_across(:, :)
@@ -103,6 +104,7 @@ contains
       real(wp), intent(in) :: wavenumber
       type(transforms_type) :: transforms
       real(wp), allocatable :: angle(:), weight(:), wave(:, :, :), weighted(:, :)
+      integer, allocatable :: y(:)
       integer :: i, j, n, p
 
       ! A quadrant is enough: squares of the four parities add up. Products of two transforms are resolved.
@@ -117,11 +119,12 @@ contains
             wave = get_waves(across, wavenumber*cos(angle(i))*sin(angle))
             do p = 1, 2
                ! dkx dky/kz = k0 cos(a) da db; k0/(4 pi**2) makes it a radiation factor times an area.
-               weighted = wave(:, :, p)
+               y = pack([(j, j=1, n_y)], across%is_present(:, p))
+               weighted = wave(y, :, p)
                do j = 1, n
                   weighted(:, j) = weighted(:, j)*4*(wavenumber/(2*pi))**2*cos(angle(i))*weight(i)*weight(j)
                end do
-               transforms%across(:, :, i, p) = get_product(weighted, transpose(wave(:, :, p)))
+               transforms%across(y, y, i, p) = get_product(weighted, transpose(wave(y, :, p)))
             end do
          end do
       end associate

@@ -204,7 +204,7 @@ contains
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
    end subroutine count_work
 
-   !> Nodes that stick and slip, and thin walls need higher levels.
+   !> Nodes that stick and slip, a layer on the floor, and thin walls need higher levels.
    function get_expected_level(ball, options, contact) result(level)
       type(ball_type), intent(in) :: ball
       class(finite_element_options_type), intent(in) :: options
@@ -213,7 +213,7 @@ contains
 
       level = 1
       if (options%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
-      if (options%contact%friction > high_friction) level = highest_level
+      if (options%contact%friction > high_friction .or. options%contact%layer_stiffness > 0.0_wp) level = highest_level
    end function get_expected_level
 
    !> Whether the resolution may be chosen: the user's keys do not grow.

@@ -51,7 +51,6 @@ async function loadSound(variant) {
   const text = caseOf(variant);
   if (sounds.has(text)) return;
   const response = await ask("download/room.wav", { method: "POST", body: text });
-  const content = await response.blob();
-  const [, fullScale] = (await content.slice(0, 1000).text()).match(/full scale (\S+) Pa/);
-  sounds.set(text, { address: URL.createObjectURL(content), fullScale: Number(fullScale) });
+  const fullScale = Number(response.headers.get("X-Thud-Full-Scale"));
+  sounds.set(text, { address: URL.createObjectURL(await response.blob()), fullScale });
 }
