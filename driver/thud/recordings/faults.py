@@ -98,13 +98,14 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
             f"{'before' if first < minimum else 'after'} it",
             "background of 1 ms or more, better 100 ms, before and after the contact",
         )
-    for warning in window.warnings:
-        if warning.startswith("two impacts"):
-            refuse(
-                f"{name}: {warning}",
-                "one impact, with background before and after it; --leave-out (leave_out) with the "
-                "number of this drop, or --from and --to (begin, end) without it",
-            )
+    if second := window.second_peak:
+        refuse(
+            f"{name}: two impacts overlap: a second peak of {second.peak:.0f} N rises from "
+            f"{second.valley:.0f} N; the force does not return to the background between them, at "
+            f"{second.time:.2f} s",
+            "one impact, with background before and after it; --leave-out (leave_out) with the "
+            "number of this drop, or --from and --to (begin, end) without it",
+        )
     force = window.force
     if window.chain is not None:
         # The recorded force is repaired; its correction rings next to a fault.

@@ -93,10 +93,12 @@ def measure_signals(
             )
             windows, left_out = choose(search.windows, count + 1, config.drops, config.leave_out)
             count += len(search.windows)
-            refuse_simultaneous_channels(search.windows, searched)
-            searched.append((signal.path, search.windows))
+            # Small pulses may be what a channel picks up of another one.
+            own = [window for window in search.windows if not window.left_out]
+            refuse_simultaneous_channels(own, searched)
+            searched.append((signal.path, own))
             measured = _measure(windows, config, progress=progress)
-            notes = (*_section(config), *search.ignored, *left_out)
+            notes = (*_section(config), *map(str, (*search.ignored, *left_out)))
             records.append(Record(signal.name, signal.path, signal.checksum, measured))
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows), notes))
