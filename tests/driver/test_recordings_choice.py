@@ -76,7 +76,8 @@ def test_only_drops_are_drops(kind: str) -> None:
         landing = (window.bounces[0].start + window.bounces[0].contact[0]) / RATE
         assert landing == pytest.approx(begin + 0.72, abs=0.004)
     if kind in {"taps", "tap between bounces"}:
-        assert any("is no drop" in text for text in search.ignored)
+        assert all(pulse.number is None for pulse in search.ignored)
+        assert search.ignored
 
 
 def measured(**choice: Any) -> thud.Recording:  # noqa: ANN401
@@ -103,13 +104,32 @@ def test_drops_are_chosen_by_number_and_time() -> None:
     assert any("drop 2 at 8.50 s was left out: touched" in step for step in left.steps)
 
 
+def test_small_drop_keeps_its_number_and_is_left_out_unless_it_is_chosen() -> None:
+    time, force = three_drops(20.0, bounces=1)
+    force += half_sine(time, 3.0, 300) + half_sine(time, 14.0, 300) + half_sine(time, 17.0, 1500)
+    signal = Signal.from_array(force, RATE, "r")
+    for choice, onsets in (
+        ({}, [5.0, 8.5, 12.0, 17.0]),
+        ({"drops": "2, 6"}, [5.0, 17.0]),
+        ({"drops": "1, 5, 6"}, [3.0, 14.0, 17.0]),
+        ({"leave_out": {"3": "touched"}}, [5.0, 12.0, 17.0]),
+        ({"end": 4.0}, [3.0]),
+        ({"begin": 13.0, "end": 15.0}, [14.0]),
+    ):
+        recording = thud.Recording.from_signals([signal], Config(**choice))  # type: ignore[arg-type]
+        assert [round(drop.onset, 1) for drop in recording.drops] == onsets
+    steps = " ".join(thud.Recording.from_signals([signal], Config()).steps)
+    for number, instant in ((1, "3.00"), (5, "14.00")):
+        assert f"drop {number} at {instant} s was left out: its peak" in steps
+
+
 def test_bounce_is_no_drop_of_a_section_that_begins_before_it() -> None:
     # The first bounce of the drop at 5 s lands at 5.72 s.
     recording = measured(begin=5.4)
     assert [round(drop.onset, 1) for drop in recording.drops] == [8.5, 12.0]
     steps = " ".join(recording.steps)
     assert "searched for drops from 5.4 s to the end only" in steps
-    assert "a bounce at 5.7" in steps
+    assert "a bounce of an earlier drop at 5.7" in steps
 
 
 @pytest.mark.parametrize("instant", [2.0, 8.507])

@@ -172,7 +172,7 @@ def later(force: np.ndarray, share: float) -> np.ndarray:
         (lambda f: f / 150, "unit = 'kN'", "probably wrong"),
         (np.maximum.accumulate, "", "polarity"),
         (lambda f: np.minimum(f, 1200), "clipped", "equal"),
-        (lambda f: later(f, 0.2), "below 0.25 of the highest peak", "bounce"),
+        (lambda f: later(f, 0.2), "below 0.25 of the highest", "bounce"),
         (lambda f: f + np.roll(f, 420), "--leave-out", "clipped"),
     ],
     ids=["median", "hold", "10 N", "peak hold", "clipped", "small drop", "two impacts"],

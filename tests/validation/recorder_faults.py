@@ -59,6 +59,18 @@ def held(length: float) -> Fault:
     return fault
 
 
+def drawn(length: float) -> Fault:
+    """Draw a line over a time, s, of the contact."""
+
+    def fault(values: Array, rate: float, first: int, stop: int, rng: np.random.Generator) -> Array:
+        size = int(length * rate)
+        start = int(rng.integers(first - size // 2, stop - size // 2))
+        values[start : start + size] = np.linspace(values[start], values[start + size], size)
+        return values
+
+    return fault
+
+
 def outside_zero(
     values: Array, rate: float, first: int, stop: int, rng: np.random.Generator
 ) -> Array:
@@ -177,6 +189,7 @@ CONDITIONS = {
     "low-pass of 700 Hz": Condition(smoothed("low-pass"), stated=UNTOLD_FILTER),
     "amplifier up to 900 N": Condition(rounded_off(900.0)),
     "amplifier up to 500 N": Condition(rounded_off(500.0)),
+    "line over 3 ms": Condition(drawn(3e-3)),
 }  # fmt: skip
 
 

@@ -23,6 +23,7 @@ CAUSES = {
     "2 kHz": "noise of the background ends",
     "mean": "noise of the background ends",
     "low-pass": "noise of the background ends",
+    "line": "filled by a line",
     "amplifier": "rounds the force off|impossible|differ by",
 }
 SEEDS = range(3)

@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, shown
+from thud.recordings.drops import LeftOut
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,25 +30,28 @@ def parse_numbers(text: str, key: str) -> list[range]:
 
 def choose(
     windows: Sequence[Window], first: int, drops: str | None, leave_out: Mapping[str, str]
-) -> tuple[list[Window], tuple[str, ...]]:
-    """Return the chosen windows, and a sentence on each one that is left out.
+) -> tuple[list[Window], tuple[LeftOut, ...]]:
+    """Return the chosen windows, and those that are left out.
 
     The windows have the numbers from `first` on. `drops` are the numbers of those to be measured,
-    all if None; `leave_out` are numbers of others, with the reason.
+    all but those whose windows say why not if None; `leave_out` are numbers of others, with the
+    reason.
     """
     chosen: list[Window] = []
-    notes: list[str] = []
+    notes: list[LeftOut] = []
     excluded = [(parse_numbers(text, "leave_out"), why) for text, why in leave_out.items()]
     included = None if drops is None else parse_numbers(drops, "drops")
     for number, window in enumerate(windows, start=first):
         reason = next((why for ranges, why in excluded if _holds(ranges, number)), "")
-        if not reason and included and not _holds(included, number):
+        if not reason and included is None:
+            reason = window.left_out
+        elif not reason and included and not _holds(included, number):
             reason = f"only {drops} were chosen"
         if not reason:
             chosen.append(window)
             continue
         time = (window.start + window.contact[0]) / window.sample_rate
-        notes.append(f"drop {number} at {time:.2f} s was left out: {reason}")
+        notes.append(LeftOut(number, time, reason))
     return chosen, tuple(notes)
 
 

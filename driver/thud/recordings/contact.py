@@ -17,6 +17,7 @@ from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import MAINS, N_HARMONIC, Background, fit_background
+from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
 from thud.recordings.response import correct_force
 
 if TYPE_CHECKING:
@@ -26,16 +27,11 @@ if TYPE_CHECKING:
     from thud.recordings.noise import Cells
     from thud.recordings.response import Chain
 
-# Maximum length of the background on either side of the contact, s. A longer background lowers the
-# noise of the offset by less than 5 %.
-MAX_BACKGROUND = 0.1
 # The background is averaged over cells. Pairs: width of a cell, and distance from the contact up to
 # which this width is used, s.
 BACKGROUND_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, MAX_BACKGROUND))
 # Length of a flank in the search for the touch, s.
 FLANK = 3e-3
-# Margin between background and pulse, s.
-MARGIN = 2e-3
 # Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
 # Time from a fifth of the peak to the end of the search over that from half of it to a fifth. A

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from thud.recordings.free_oscillation import matched_energy, resonance
+from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, resonance
+from thud.recordings.noise import MAINS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 # Trial decay times to 1/e, s.
 DECAYS = np.array([0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])
-# Minimum frequency of a resonance, Hz, and its maximum as a fraction of the sample rate.
-MIN_FREQUENCY = 200.0
+# Maximum frequency of a resonance as a fraction of the sample rate.
 MAX_FREQUENCY = 0.4
 # Minimum ratio of the energy of a resonance to that of the noise. Minimum quality factor.
 MIN_ENERGY = 60.0
@@ -29,11 +29,10 @@ MIN_AMPLITUDE = 0.01
 SAME = 0.05
 AROUND = 0.3
 MIN_NEAR = 12
-# Background: degree of the drift, its time scale, s, and frequencies of hum, Hz.
+# Background: degree of the drift, its time scale, s, and columns, with those of the hum.
 DEGREE = 2
 TIME_SCALE = 0.1
-HUM = (50.0, 60.0)
-BACKGROUND = DEGREE + 1 + 2 * len(HUM)
+BACKGROUND = DEGREE + 1 + 2 * len(MAINS)
 # Length of a fit in decay times and in samples.
 DECAY_TIMES = 10.0
 MIN_LENGTH = 100
@@ -121,7 +120,7 @@ def closest_decay(
 def columns_of(rates: NDArray[np.float64], time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the columns of a background and of decaying oscillations at times, s."""
     columns = [(time / TIME_SCALE) ** power for power in range(DEGREE + 1)]
-    steady = [(frequency, -np.inf) for frequency in HUM]
+    steady = [(frequency, -np.inf) for frequency in MAINS]
     for frequency, log_decay in [*steady, *rates]:
         decaying = np.exp(-np.exp(log_decay) * time)
         phase = 2 * np.pi * frequency * time

@@ -50,10 +50,12 @@ MIN_HEIGHT = 0.03
 DURATIONS = (0.003, 0.06)
 # The search begins this long before a section, s, so that a bounce in it is not taken for a drop.
 LOOK_BACK = 1.5
-# A pulse is neither a drop nor its bounce, but a tap, a knock or a step, if its peak is below this
-# fraction of that of the highest drop, or of the previous contact; or if the medians of the forces
-# before and after it, over STEP cells each, differ by this fraction of its peak.
+# A drop is measured only if it is chosen, as it may be a tap or a knock, if its peak is below this
+# fraction of that of the highest.
 MIN_DROP = 0.25
+# A pulse is neither a drop nor its bounce if its peak is below this fraction of that of the contact
+# from which it would bounce, or of the highest (a drop from a fortieth of the height); or if the
+# medians of the forces before and after it, over STEP cells each, differ by this fraction of it.
 MIN_BOUNCE = 0.15
 MAX_CHANGE = 0.3
 STEP = 100
@@ -70,6 +72,30 @@ BEFORE = 0.25
 AFTER = 0.5
 # Minimum rate, Hz: twice the upper edge of the octave of 500 Hz, with a margin for a filter.
 MIN_RATE = 2_000.0
+
+
+@dataclass(frozen=True)
+class SecondPeak:
+    """A second peak in a pulse, N, the force between both, N, and the time of the first one, s."""
+
+    peak: float
+    valley: float
+    time: float
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A pulse that is not measured: its number if it is a drop, its time, s, and why."""
+
+    number: int | None
+    time: float
+    reason: str
+
+    def __str__(self) -> str:
+        """Return a sentence."""
+        if self.number is None:
+            return f"{self.reason} at {self.time:.2f} s is no drop and has no number"
+        return f"drop {self.number} at {self.time:.2f} s was left out: {self.reason}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +116,10 @@ class Window:
         Windows of the bounces after the drop.
     warnings : tuple of str
         Possible faults of the pulse as a whole.
+    second_peak : SecondPeak or None
+        A second impact in the pulse.
+    left_out : str
+        Why the drop is measured only if it is chosen; empty if it is not.
     chain : Chain or None
         Instruments whose responses were corrected in the signal.
     quantization : Quantization
@@ -103,6 +133,8 @@ class Window:
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
     warnings: tuple[str, ...] = ()
+    second_peak: SecondPeak | None = None
+    left_out: str = ""
     chain: Chain | None = None
     quantization: Quantization = field(default_factory=Quantization)
 
@@ -125,16 +157,18 @@ class _Pulse:
     stop: int
     peak: float
     is_step: bool
+    second_peak: SecondPeak | None
     bounces: list[_Pulse] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    left_out: str = ""
 
 
 @dataclass(frozen=True)
 class Search:
-    """Windows of the drops in a signal, in order, and a sentence on each pulse that is no drop."""
+    """Windows of the drops in a signal, in order, and the pulses that are no drops."""
 
     windows: list[Window]
-    ignored: tuple[str, ...]
+    ignored: tuple[LeftOut, ...]
 
 
 def search_drops(
@@ -169,10 +203,10 @@ def search_drops(
         ]
     highest = max((p.peak for p in pulses), default=0.0)
     pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
-    drops, ignored = _assign_bounces(pulses, rate)
+    drops, ignored = _assign_bounces(pulses, section, rate)
     before = [pulse for drop in drops if drop.start < section for pulse in (drop, *drop.bounces)]
     ignored += [
-        f"a bounce at {pulse.start / rate:.2f} s of an earlier drop"
+        LeftOut(None, pulse.start / rate, "a bounce of an earlier drop")
         for pulse in before
         if section <= pulse.start
     ]
@@ -180,7 +214,7 @@ def search_drops(
     if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
     windows = list(_windows(signal, drops, pulses, section, stop_sample))
-    return Search(windows, tuple(f"{text} is no drop and has no number" for text in ignored))
+    return Search(windows, tuple(ignored))
 
 
 def _pieces(
@@ -271,8 +305,9 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         peak = float(corrected[top])
         start = max(_find_edge(corrected, low, -1, FOOT * peak) - MARGIN, earliest)
         stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
-        warning = _double_peak_warning(corrected[max(group[0], earliest) : group[-1] + 1])
-        warning = warning and f"{warning}, at {(first + top * width) / rate:.2f} s"
+        second_peak = _second_peak(
+            corrected[max(group[0], earliest) : group[-1] + 1], (first + top * width) / rate
+        )
         span = first + start * width, first + stop * width
         # A second impact next to this one is shorter than half of STEP.
         sides = (
@@ -281,7 +316,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         )
         change = [float(np.median(side)) if side.size else 0.0 for side in sides]
         is_step = abs(change[1] - change[0]) > MAX_CHANGE * peak
-        pulses.append(_Pulse(*span, peak, is_step, warnings=[warning] if warning else []))
+        pulses.append(_Pulse(*span, peak, is_step, second_peak))
     return pulses
 
 
@@ -298,54 +333,53 @@ def _find_edge(envelope: NDArray[np.float64], start: int, direction: int, thresh
     return edge
 
 
-def _double_peak_warning(envelope: NDArray[np.float64]) -> str:
-    """Return a warning if a deep valley separates two peaks of a pulse, else an empty string."""
+def _second_peak(envelope: NDArray[np.float64], time: float) -> SecondPeak | None:
+    """Return the second of two peaks of a pulse that a deep valley separates, if there is one."""
     top = int(np.argmax(envelope))
     for side in (envelope[top:], envelope[: top + 1][::-1]):
         lowest = np.minimum.accumulate(side)
         k = int(np.argmax(side - lowest))
         if lowest[k] < VALLEY * side[k] and side[k] > VALLEY * envelope[top]:
-            return (
-                f"two impacts overlap: a second peak of {side[k]:.0f} N rises from "
-                f"{lowest[k]:.0f} N; the force does not return to the background between them"
-            )
-    return ""
+            return SecondPeak(float(side[k]), float(lowest[k]), time)
+    return None
 
 
-def _assign_bounces(pulses: list[_Pulse], rate: float) -> tuple[list[_Pulse], list[str]]:
-    """Return the drops with their bounces, and a sentence on each pulse that is neither."""
+def _assign_bounces(
+    pulses: list[_Pulse], section: int, rate: float
+) -> tuple[list[_Pulse], list[LeftOut]]:
+    """Return the drops with their bounces, and the pulses that are neither.
+
+    Drops below MIN_DROP times the highest pulse from the sample `section` on are left out, with
+    their numbers.
+    """
     drops: list[_Pulse] = []
-    ignored: list[str] = []
+    ignored: list[LeftOut] = []
     flight = MAX_FLIGHT
     before: _Pulse | None = None
-    highest = max((pulse.peak for pulse in pulses if not pulse.is_step), default=0.0)
+    highest = max((p.peak for p in pulses if not p.is_step and p.start >= section), default=0.0)
     for pulse in pulses:
         gap = np.inf if before is None else (pulse.start - before.stop) / rate
-        bounced = (
-            before is not None
-            and gap < 1.02 * flight
-            and pulse.peak < NEW_DROP * before.peak
-            and gap > MIN_FLIGHT
-        )
-        lowest = MIN_BOUNCE * before.peak if bounced and before else MIN_DROP * highest
+        in_flight = before is not None and MIN_FLIGHT < gap < 1.02 * flight
+        ratio = pulse.peak / before.peak if before else np.inf
+        bounced = in_flight and ratio < NEW_DROP
+        lowest = MIN_BOUNCE * (before.peak if bounced and before else highest)
         if pulse.is_step or pulse.peak < lowest:
-            text = f"a pulse of {pulse.peak:.0f} N at {pulse.start / rate:.2f} s"
-            if not (pulse.is_step or bounced):
-                text += (
-                    f", below {MIN_DROP:g} of the highest peak (a section from --from to --to, "
-                    "without the higher ones, measures it),"
-                )
-            ignored.append(text)
+            ignored.append(LeftOut(None, pulse.start / rate, f"a pulse of {pulse.peak:.0f} N"))
             continue
         if bounced:
             drops[-1].bounces.append(pulse)
             flight = gap
         else:
-            if before is not None and MIN_FLIGHT < gap < 1.02 * flight:
+            if pulse.peak < MIN_DROP * highest:
+                pulse.left_out = (
+                    f"its peak of {pulse.peak:.0f} N is below {MIN_DROP:g} of the highest; choose "
+                    "its number (--drops, drops) if it is a drop"
+                )
+            elif before is not None and in_flight and not before.left_out:
                 pulse.warnings.append(
                     f"the pulse begins {gap:.2f} s after the one before it, as a bounce would, and "
-                    f"has {pulse.peak / before.peak:.2f} times its peak: if it is its bounce, the "
-                    "amplifier rounds the force off, and all levels are wrong"
+                    f"has {ratio:.2f} times its peak: if it is its bounce, the amplifier rounds "
+                    "the force off, and all levels are wrong"
                 )
             drops.append(pulse)
             flight = MAX_FLIGHT
@@ -372,7 +406,10 @@ def _windows(
         high = min(high, pulse.stop + round(AFTER * signal.sample_rate), stop_sample)
         low, high = min(low, pulse.start), max(high, min(pulse.stop, stop_sample))
         contact = (pulse.start - low, min(pulse.stop, stop_sample) - low)
-        return Window(name, signal, low, high, contact, (), tuple(pulse.warnings))
+        return Window(
+            name, signal, low, high, contact, (), tuple(pulse.warnings), pulse.second_peak,
+            pulse.left_out,
+        )  # fmt: skip
 
     for k, drop in enumerate(drops, start=1):
         name = signal.name if len(drops) == 1 else f"{signal.name}, drop {k}"

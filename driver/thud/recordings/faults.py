@@ -48,8 +48,6 @@ MIN_JUMP = 0.04
 MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
-# Samples are also held if chance would give so many equal ones less often than this in a contact.
-MAX_CHANCE = 1e-6
 # Maximum total length of dropouts and spikes that are repaired, s.
 MAX_REPAIRED = 1e-3
 # A spike of one or two samples deviates from the cubic through samples 2 and 3 away (by the
@@ -72,14 +70,16 @@ SPIKE_MARGIN = 0.12
 CONTACT_MARGIN = 3e-3
 # Minimum number of different values of a contact over the period of a bit that may be missing.
 MIN_VISITS = 4
-# Fraction of equal neighbors in noise of more than a quantization step, and fraction of a constant
-# background from which it is no dropout.
-MAX_EQUAL = 0.4
+# Samples are held, filled or gated where they deviate from a cubic for MIN_BACKGROUND by less than
+# this fraction of the noise: by chance so does one of 10 000. A background that is so to this
+# fraction is no dropout.
+MAX_QUIET = 1e-4
 MAX_CONSTANT = 0.5
-# Distance of the lines through four samples on either side, their mean at the middle; distance from
-# first touch and release, s, where forces have kinks and jumps, and minimum ratio to the distances
-# around it.
-JUMP = np.array([-0.2, 0.1, 0.4, 0.7, -0.7, -0.4, -0.1, 0.2])
+# Value and slope are compared between the lines through the samples of this time, s, or four at
+# least, on either side. Its curvature changes the slope of a force of 600 Hz by less than that of
+# a kink, which is a jump by MIN_JUMP_RATIO times the largest change around it. First touch and
+# release, where forces have kinks and jumps, are at least JUMP_MARGIN, s, away.
+JUMP_TIME = 2.5e-4
 JUMP_MARGIN = 5e-4
 MIN_JUMP_RATIO = 3.0
 
@@ -98,13 +98,14 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
             f"{'before' if first < minimum else 'after'} it",
             "background of 1 ms or more, better 100 ms, before and after the contact",
         )
-    for warning in window.warnings:
-        if warning.startswith("two impacts"):
-            refuse(
-                f"{name}: {warning}",
-                "one impact, with background before and after it; --leave-out (leave_out) with the "
-                "number of this drop, or --from and --to (begin, end) without it",
-            )
+    if second := window.second_peak:
+        refuse(
+            f"{name}: two impacts overlap: a second peak of {second.peak:.0f} N rises from "
+            f"{second.valley:.0f} N; the force does not return to the background between them, at "
+            f"{second.time:.2f} s",
+            "one impact, with background before and after it; --leave-out (leave_out) with the "
+            "number of this drop, or --from and --to (begin, end) without it",
+        )
     force = window.force
     if window.chain is not None:
         # The recorded force is repaired; its correction rings next to a fault.
@@ -237,14 +238,12 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...
     """
     rate, (first, stop) = window.sample_rate, window.contact
     contact, step = force[first:stop], window.quantization.step
-    if not _deviation(contact) > max(step, MIN_NOISE * float(np.ptp(contact))):
+    noise = _deviation(contact)
+    if not noise > max(step, MIN_NOISE * float(np.ptp(contact))):
         return ()
-    starts, lengths = _runs(force)
-    short = lengths[lengths <= MIN_BACKGROUND * rate]
-    # As many neighbors are equal by quantization or by a median filter.
-    equal = max(MAX_EQUAL if step else 0.01, 1 - len(short) / max(short.sum(), 1))
-    least = math.log(len(force) / MAX_CHANCE) / -math.log(min(equal, 0.99))
-    constant = lengths > max(least, MIN_BACKGROUND * rate)
+    is_noisy = np.abs(np.convolve(force, DIFFERENCE, mode="same")) > MAX_QUIET * noise
+    starts, lengths = _runs(is_noisy.astype(float))
+    constant = ~is_noisy[starts] & (lengths > max(MIN_BACKGROUND * rate, len(DIFFERENCE)))
     if not constant.any():
         return ()
     starts, stops = starts[constant], (starts + lengths)[constant]
@@ -253,8 +252,8 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...
     outside = len(force) - (stop - first)
     if inside.any() and total < MAX_CONSTANT * 1e3 * outside / rate:
         refuse(
-            f"{window.name}: the force is held for {total:.3g} ms at the contact while the samples "
-            "around it are noisy",
+            f"{window.name}: the force is held, or filled by a line, for {total:.3g} ms at the "
+            "contact while the samples around it are noisy",
             "a recording without lost samples",
         )
     warning = (
@@ -266,32 +265,35 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...
 
 
 def check_jumps(contact: Contact) -> tuple[str, ...]:
-    """Return a warning if the force jumps within a contact, away from first touch and release.
+    """Return a warning if the force or its slope jumps within a contact, away from its ends.
 
-    A jump is the distance between the lines through the four samples before and after it.
+    A jump is the distance between the lines through the samples before and after it, at the middle
+    or, by their slopes, at their length from it.
     """
     rate, force = contact.sample_rate, contact.gated
-    jump = np.abs(np.convolve(force, JUMP, mode="valid"))
+    count = max(4, round(JUMP_TIME * rate))
+    center = (np.arange(count) - (count - 1) / 2) / count
+    slope = center / (center @ center)
+    line = 1 / count + slope / 2
     # The jump at an index is between the samples half the kernel behind it.
-    margin = JUMP_MARGIN * rate + CLEAN[1]
-    start = contact.gate[0] + len(JUMP) // 2
+    margin = JUMP_MARGIN * rate + 3 * count
+    start = contact.gate[0] + count
     first = max(int(contact.touch.value * rate + margin) - start, 0)
     stop = int(contact.release.value * rate - margin) - start
-    if stop <= first:
-        return ()
-    limit = np.maximum(
-        MIN_JUMP_RATIO * _largest_around(jump),
-        max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step),
-    )
-    found = np.flatnonzero(jump[first:stop] > limit[first:stop]) + first
-    if not found.size:
-        return ()
-    size = float(jump[found].max())
-    warning = (
-        f"the force jumps by {size:.3g} N within the contact: packets or samples are lost or "
-        "exchanged, or a contact is loose; levels and contact time may be wrong"
-    )
-    return (warning,)
+    least = max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step)
+    for name, before, after in (("", line, line[::-1]), ("slope of the ", slope, slope)):
+        jump = np.abs(np.correlate(force, np.concatenate([before, -after]), mode="valid"))
+        limit = np.maximum(MIN_JUMP_RATIO * _largest_around(jump, count + 1, 3 * count), least)
+        found = (jump > limit)[first : max(stop, first)]
+        if found.any():
+            size = float(jump[first:stop][found].max())
+            warning = (
+                f"the {name}force jumps by {size:.3g} N within the contact: packets or samples "
+                "are lost, filled or exchanged, or a contact is loose; levels and contact time may "
+                "be wrong"
+            )
+            return (warning,)
+    return ()
 
 
 def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
@@ -330,9 +332,8 @@ def _deviation(force: NDArray[np.float64]) -> float:
     return 1.4826 * float(np.median(np.abs(deviation))) / math.sqrt(float(DIFFERENCE @ DIFFERENCE))
 
 
-def _largest_around(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest of the values CLEAN samples before and after each one."""
-    near, far = CLEAN
+def _largest_around(values: NDArray[np.float64], near: int, far: int) -> NDArray[np.float64]:
+    """Return the largest of the values from near to far samples before and after each one."""
     extended = np.pad(values, far, mode="edge")
     largest = sliding_window_view(extended, far - near + 1).max(axis=1)
     return np.asarray(np.maximum(largest[: len(values)], largest[-len(values) :]))
@@ -366,28 +367,8 @@ def _find_dropouts(
     is_background = np.abs(pulse[starts]) < limit / 2
     jumps = (before > limit).astype(int) + (after > limit)
     frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    quiet = np.diff(force[: max(first - 2 * margin, 1)]) == 0
-    held = _is_held(pulse, lengths, window.quantization.step, peak, quiet) & ~is_background
-    lost[first:stop] = np.repeat(zero | frozen | held, lengths)
+    lost[first:stop] = np.repeat(zero | frozen, lengths)
     return lost
-
-
-def _is_held(
-    force: NDArray[np.float64],
-    lengths: NDArray[np.intp],
-    step: float,
-    peak: float,
-    quiet: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
-    """Return whether runs of equal samples are too long for the noise and the step, N.
-
-    `quiet` is whether neighbors in the background are equal, as many are behind a median filter.
-    """
-    equal = max(1 - len(lengths) / len(force), 1 / len(force))
-    equal = max(equal, float(quiet.mean()) if quiet.size else 0.0)
-    # Without noise, the force may stay within a step.
-    has_noise = _deviation(force) > max(step / 2, MIN_NOISE * peak)
-    return has_noise & (len(force) * equal ** (lengths - 1.0) < MAX_CHANCE)
 
 
 def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDArray[np.bool_]:
@@ -404,7 +385,7 @@ def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDA
     least = max(
         MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
     )
-    limit = np.maximum(MIN_SPIKE_RATIO * _largest_around(from_cubic), least)
+    limit = np.maximum(MIN_SPIKE_RATIO * _largest_around(from_cubic, *CLEAN), least)
     spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
     return spikes
 

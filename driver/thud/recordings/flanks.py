@@ -181,21 +181,18 @@ class Posterior:
             probability = kind_probability
         probability /= probability.sum()
         jump_probability = probability @ (delay == 0)
+        # By the spacing of the candidate times.
+        spacing = float((self.time[1] - self.time[0]) ** 2 / 12)
         results = []
         for value, variance, error in (
-            (touch, self._time_variance, TOUCH_ERRORS[self.release]),
-            (touch + 1e-3 * delay, self._time_variance * jump_probability, ERRORS[kind]),
+            (touch, spacing, TOUCH_ERRORS[self.release]),
+            (touch + 1e-3 * delay, spacing * jump_probability, ERRORS[kind]),
         ):
             mean = float(probability @ value)
             results.append(
                 (mean, float(np.sqrt(probability @ ((value - mean) ** 2 + error**2) + variance)))
             )
         return results[0], results[1]
-
-    @property
-    def _time_variance(self) -> float:
-        """Variance of a time due to the spacing of the candidate times, s2."""
-        return float((self.time[1] - self.time[0]) ** 2 / 12)
 
     def _force_draws(self, kind: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return draws of the averaged force as a fraction of the peak: [n_draw, n_delay]."""

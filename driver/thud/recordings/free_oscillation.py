@@ -11,6 +11,9 @@ from scipy.fft import next_fast_len
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+# Minimum frequency of a resonance of a plate, Hz.
+MIN_FREQUENCY = 200.0
+
 
 def resonance(frequency: float, decay_time: float) -> tuple[float, float]:
     """Return the resonance, Hz, and the quality factor of a mode from its free oscillation.

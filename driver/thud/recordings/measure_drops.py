@@ -27,7 +27,7 @@ from thud.recordings.same_drops import (
 from thud.recordings.tones import remove_tones
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
     from thud.recordings.config import Config
     from thud.recordings.drops import Window
@@ -57,14 +57,6 @@ class Origin:
         return replace(origin, steps=(*origin.steps, *notes))
 
 
-def _section(config: Config) -> tuple[str, ...]:
-    """Return a sentence on the section that was searched for drops, if it is not the whole file."""
-    if config.begin is None and config.end is None:
-        return ()
-    end = "the end" if config.end is None else f"{config.end:g} s"
-    return (f"searched for drops from {config.begin or 0:g} s to {end} only",)
-
-
 def measure_signals(
     signals: Iterable[Signal],
     config: Config,
@@ -82,6 +74,10 @@ def measure_signals(
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     count = 0
+    section: tuple[str, ...] = ()
+    if not (config.begin is None and config.end is None):
+        end = "the end" if config.end is None else f"{config.end:g} s"
+        section = (f"searched for drops from {config.begin or 0:g} s to {end} only",)
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
         for signal in signals:
@@ -93,10 +89,13 @@ def measure_signals(
             )
             windows, left_out = choose(search.windows, count + 1, config.drops, config.leave_out)
             count += len(search.windows)
-            refuse_simultaneous_channels(search.windows, searched)
-            searched.append((signal.path, search.windows))
-            measured = _measure(windows, config, progress=progress)
-            notes = (*_section(config), *search.ignored, *left_out)
+            # Small pulses may be what a channel picks up of another one.
+            own = [window for window in search.windows if not window.left_out]
+            refuse_simultaneous_channels(own, searched)
+            searched.append((signal.path, own))
+            bar = tqdm(windows, unit="drop", desc=signal.name, disable=not progress, leave=False)
+            measured = tuple(measure_window(window, config) for window in bar)
+            notes = (*section, *map(str, (*search.ignored, *left_out)))
             records.append(Record(signal.name, signal.path, signal.checksum, measured))
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows), notes))
@@ -108,13 +107,6 @@ def measure_signals(
     uncertainty = max(known) if len(known) == len(uncertainties) else None
     drops = tuple(drop for record in records for drop in record.drops)
     return drops, tuple(origins), uncertainty
-
-
-def _measure(windows: Sequence[Window], config: Config, *, progress: bool) -> tuple[Drop, ...]:
-    """Return the drops in the windows of one signal."""
-    name = windows[0].signal.name if windows else ""
-    bar = tqdm(windows, unit="drop", desc=name, disable=not progress, leave=False)
-    return tuple(measure_window(window, config) for window in bar)
 
 
 def measure_window(window: Window, config: Config) -> Drop:

@@ -74,6 +74,12 @@ class Recording(Displayed):
     origins: tuple[Origin, ...]
     config: Config = field(default_factory=Config)
     calibration_uncertainty: float | None = None
+    _averages: dict[tuple[str, str], AverageLevels] = field(
+        default_factory=dict, init=False, repr=False
+    )
+    _level_estimates: dict[str, tuple[Estimate, ...]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def __repr__(self) -> str:
         """Return the main numbers of the recording, without its samples."""
@@ -329,10 +335,6 @@ class Recording(Displayed):
             self._averages[bands, method] = average_levels(levels)
         return self._averages[bands, method]
 
-    @cached_property
-    def _averages(self) -> dict[tuple[str, str], AverageLevels]:
-        return {}
-
     def levels(
         self,
         bands: BandSet = "octave",
@@ -376,10 +378,6 @@ class Recording(Displayed):
                 self.not_stated,
             )
         return self._level_estimates[bands]
-
-    @cached_property
-    def _level_estimates(self) -> dict[str, tuple[Estimate, ...]]:
-        return {}
 
     def assess(
         self,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import least_squares
 
-from thud.recordings.free_oscillation import matched_energy, resonance
+from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, resonance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,9 +23,7 @@ DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
 # Pause after the gate, in which soft releases end, and minimum length of the signal after it, s.
 PAUSE = 1e-3
 MIN_LENGTH = 4e-3
-# Minimum frequency, Hz, and maximum frequency as a fraction of the sample rate: filters ring near
-# half the rate.
-MIN_FREQUENCY = 200.0
+# Maximum frequency as a fraction of the sample rate: filters ring near half the rate.
 MAX_FREQUENCY = 0.3
 # Minimum ratio to the energy of noise: noise exceeds it at one of about 6000 points once in 1e7.
 MIN_ENERGY = 25.0

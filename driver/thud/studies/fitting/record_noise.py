@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from thud.base.immutable import freeze
-from thud.recordings.contact import MAX_BACKGROUND, cells_between
+from thud.recordings.contact import cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.noise import (
     DRIFT,
@@ -25,6 +25,7 @@ from thud.recordings.noise import (
     fit_background,
     unit_covariances,
 )
+from thud.recordings.quantization import MAX_BACKGROUND
 from thud.studies.fitting.inference import UNLIKELY
 
 if TYPE_CHECKING:
