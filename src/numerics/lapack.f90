@@ -5,7 +5,7 @@ module thud_lapack
    private
 
    public :: dgbsv, dgeev, dgels, dgemm, dgetf2, dgetrs, dposv, dpotrf, dstevr
-   public :: dsygv, dsygvd, dsygvx, dtrsm
+   public :: dsygv, dsygvd, dsygvx, dtrsm, zgeev
 
    interface
       !> Eigenvalues of a general matrix.
@@ -155,6 +155,18 @@ module thud_lapack
          real(wp), intent(in) :: a(lda, *)
          real(wp), intent(inout) :: b(ldb, *)
       end subroutine dtrsm
+
+      !> Eigenvalues and vectors of a complex matrix.
+      pure subroutine zgeev(jobvl, jobvr, n, a, lda, w, vl, ldvl, vr, ldvr, work, lwork, rwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         complex(wp), intent(inout) :: a(lda, *)
+         complex(wp), intent(out) :: w(*), vl(ldvl, *), vr(ldvr, *), work(*)
+         real(wp), intent(out) :: rwork(*)
+         integer, intent(out) :: info
+      end subroutine zgeev
    end interface
 
 end module thud_lapack

@@ -3,7 +3,7 @@ module thud_coupled_modes
    use thud_floor_modes, only: floor_modes_type
    use thud_function_set, only: get_overlap
    use thud_kinds, only: wp
-   use thud_mode_mixing, only: get_part, is_identity, mixing_type
+   use thud_mode_mixing, only: is_identity, mixing_type
    use thud_plate_shapes, only: block_shapes_type, get_integrals, get_merged, get_shapes, overlap_type, shapes_type
    use thud_ritz_system, only: product_type
    implicit none (type, external)
@@ -96,7 +96,7 @@ contains
             these%mode = [([(j, j=last(members(k) - 1) + 1, last(members(k)))], k=1, size(members))]
             these%radiator = get_merged(radiator, members)
             these%drive = get_integrals(get_merged(struck, members), struck, part%struck)/part%area
-            these%mixing = get_part(mixing, these%mode)
+            these%mixing%block = mixing%block(members)
             these%velocity = get_integrals(get_merged(bearing, members), bearing, overlap_type())
             these%above = these%velocity
             if (allocated(part%bearing%x)) these%above = get_integrals(get_merged(bearing, members), bearing, &

@@ -1,7 +1,7 @@
 !> Modes of a floor with their losses, and its mobility from them.
 module thud_floor_modes
    use thud_constants, only: pi
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type, input_error, numerical_error
    use thud_function_set, only: get_finest_wavenumber, get_highest_wavenumber
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
@@ -77,7 +77,10 @@ contains
       modes%sum_limit = 2*pi*resolved
       modes%limit = 2*pi*min(mode_limit, resolved/resolution)
       do i = 1, size(modes%modes%block)
-         call add_bearing_losses(modes%modes%block(i), bearing, air, modes%limit)
+         call add_bearing_losses(modes%modes%block(i), bearing, air, modes%limit, failed)
+         if (.not. failed) cycle
+         error = numerical_error('&'//group//': the losses of modes cannot be separated; allowed: other loss factors')
+         return
       end do
       associate (block => modes%modes%block)
          modes%omega = [(block(i)%omega, i=1, size(block))]
@@ -106,17 +109,20 @@ contains
    end function get_mode_limit
 
    !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
-   subroutine add_bearing_losses(block, bearing, air, limit)
+   subroutine add_bearing_losses(block, bearing, air, limit, failed)
       type(mode_block_type), intent(inout) :: block
       !> The bearing plate, with its total losses.
       type(plate_type), intent(in) :: bearing
       type(air_type), intent(in) :: air
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: limit
+      !> The modes cannot be mixed.
+      logical, intent(out) :: failed
       real(wp) :: added(size(block%omega))
       complex(wp), allocatable :: matrix(:, :)
       integer :: i, j, n
 
+      failed = .false.
       added = get_total_loss(bearing, air, max(block%omega/(2*pi), 1.0_wp)) - bearing%loss_factor
       n = count(block%omega < limit)
       if (n > 1 .and. (allocated(block%damping) .or. allocated(block%bearing))) then
@@ -137,8 +143,8 @@ contains
          do i = n + 1, size(block%omega)
             block%mixing(i, i) = 1.0_wp
          end do
-         call diagonalize(matrix, block%mixing(:n, :n))
-         block%pole(:n) = [(matrix(i, i), i=1, n)]
+         call diagonalize(matrix, block%pole(:n), block%mixing(:n, :n), failed)
+         if (failed) return
       end if
       if (allocated(block%damping)) deallocate (block%damping)
       if (allocated(block%bearing)) deallocate (block%bearing)

@@ -12,7 +12,7 @@ module thud_modal_radiation
    use thud_coupled_modes, only: coupled_modes_type, get_coupled_modes, get_diagonal, new_part, part_type
    use thud_floor_modes, only: floor_modes_type, get_poles
    use thud_kinds, only: wp
-   use thud_mode_mixing, only: get_mixed, get_mixing, get_unmixed, is_identity, mixing_type
+   use thud_mode_mixing, only: get_mixed, get_mixing, get_row, get_unmixed, is_identity, mixing_type
    use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
    use thud_plate_shapes, only: get_coefficients, get_shapes, get_squares, get_weighted, shapes_type
    use thud_ritz_system, only: get_mode_values
@@ -246,13 +246,13 @@ contains
       pure function get_square(number) result(square)
          integer, intent(in) :: number
          real(wp) :: square
-         integer :: k
+         complex(wp), allocatable :: weight(:)
+         integer :: k, first
 
-         associate (entry => [(k, k=mixing%first(number), mixing%first(number + 1) - 1)])
-            associate (of => mixing%column(entry))
-               square = real(sum([(mixing%weight(entry(k))*sum(get_cross_integrals(of(k), of)*conjg(mixing%weight(entry)) &
-                  *matmul(conjg(gain(of, :)), gain(of(k), :))), k=1, size(of))]), wp)
-            end associate
+         call get_row(mixing, number, first, weight)
+         associate (of => [(k, k=first, first + size(weight) - 1)])
+            square = real(sum([(weight(k)*sum(get_cross_integrals(of(k), of)*conjg(weight) &
+               *matmul(conjg(gain(of, :)), gain(of(k), :))), k=1, size(weight))]), wp)
          end associate
       end function get_square
 
@@ -261,13 +261,16 @@ contains
          integer, intent(in) :: number
          real(wp) :: product(size(pole))
          complex(wp) :: unmixed(size(pole), 1)
-         integer :: i, k, l
+         complex(wp), allocatable :: weight(:)
+         integer :: i, k, first
 
+         call get_row(mixing, number, first, weight)
          unmixed = 0.0_wp
-         do k = mixing%first(number), mixing%first(number + 1) - 1
-            l = mixing%column(k)
-            unmixed(:, 1) = unmixed(:, 1) + conjg(mixing%weight(k)*get_cross_integrals(l, [(i, i=1, size(pole))])) &
-               *matmul(gain, conjg(gain(l, :)))
+         do k = 1, size(weight)
+            associate (l => first + k - 1)
+               unmixed(:, 1) = unmixed(:, 1) + conjg(weight(k)*get_cross_integrals(l, [(i, i=1, size(pole))])) &
+                  *matmul(gain, conjg(gain(l, :)))
+            end associate
          end do
          product = real(reshape(get_mixed(mixing, unmixed), [size(pole)]), wp)
       end function get_products

@@ -5,183 +5,117 @@
 !> forces f at an angular frequency omega is W (pole - omega**2)**(-1) transpose(W) f.
 module thud_mode_mixing
    use thud_kinds, only: wp
+   use thud_lapack, only: zgeev
    use thud_ritz_system, only: get_ranges, modes_type
    implicit none (type, external)
    private
 
-   public :: diagonalize, get_mixed, get_mixing, get_part, get_unmixed, is_identity, mixing_type
+   public :: diagonalize, get_mixed, get_mixing, get_row, get_unmixed, is_identity, mixing_type
 
-   !> Terms off the diagonal that are smaller than this fraction of the difference of their poles mix no modes.
-   real(wp), parameter :: smallest_angle = 2.0e-3_wp
+   !> Relative difference that squared frequencies are given, so that no two poles coincide: two poles that do by their
+   !> losses have one shape, and W does not exist.
+   real(wp), parameter :: separation = 1.0e-9_wp
 
-   !> Terms that are smaller than this fraction of the poles are rounding.
-   real(wp), parameter :: rounding = 1.0e-9_wp
+   !> The matrix W of the modes of one block.
+   type :: mixing_block_type
+      !> Number of modes.
+      integer :: count = 0
+      !> The matrix: [count, count]; not allocated if each mode stands for itself.
+      complex(wp), allocatable :: weight(:, :)
+   end type mixing_block_type
 
-   !> Smallest difference of the squares of a rotation whose poles coincide, and the change of the terms that keeps it.
-   real(wp), parameter :: smallest_root = 1.0e-6_wp, shift = 1.0e-3_wp
-
-   !> Maximum number of rotations of each pair; a few are enough.
-   integer, parameter :: max_sweeps = 20
-
-   !> Entries of W below this are left out.
-   real(wp), parameter :: smallest_weight = 1.0e-3_wp
-
-   !> The matrix W of some modes, by rows.
+   !> The matrix W of some modes, block after block.
    type :: mixing_type
-      !> Position of the first entry of each row, and of the one after the last: [n_mode + 1].
-      integer, allocatable :: first(:)
-      !> Columns and values of the entries.
-      integer, allocatable :: column(:)
-      complex(wp), allocatable :: weight(:)
+      type(mixing_block_type), allocatable :: block(:)
    end type mixing_type
 
 contains
 
-   !> Diagonalizes a complex symmetric matrix by rotations (Jacobi), up to terms that matter little.
-   subroutine diagonalize(matrix, vectors)
-      !> The matrix, then the poles on its diagonal: [n, n].
-      complex(wp), intent(inout) :: matrix(:, :)
+   !> Diagonalizes a complex symmetric matrix.
+   subroutine diagonalize(matrix, pole, vectors, failed)
+      !> The matrix: [n, n].
+      complex(wp), intent(in) :: matrix(:, :)
+      !> The poles, by their real parts: [n].
+      complex(wp), intent(out) :: pole(:)
       !> The matrix W: [n, n].
       complex(wp), intent(out) :: vectors(:, :)
-      logical :: is_done
-      integer :: i, j, sweep
+      !> The iteration did not converge.
+      logical, intent(out) :: failed
+      complex(wp) :: separated(size(pole), size(pole)), none(1, 1), work(33*size(pole))
+      real(wp) :: real_work(2*size(pole))
+      integer :: i, j, n, info
 
-      vectors = 0.0_wp
-      do i = 1, size(matrix, 1)
-         vectors(i, i) = 1.0_wp
+      n = size(pole)
+      separated = matrix
+      do i = 1, n
+         separated(i, i) = matrix(i, i)*(1 + separation*i/n)
       end do
-      do sweep = 1, max_sweeps
-         is_done = .true.
-         do j = 2, size(matrix, 1)
-            do i = 1, j - 1
-               associate (term => abs(matrix(i, j)))
-                  if (term <= smallest_angle*abs(matrix(i, i) - matrix(j, j))) cycle
-                  if (term <= rounding*(abs(matrix(i, i)) + abs(matrix(j, j)))) cycle
-               end associate
-               is_done = .false.
-               call rotate(i, j)
-            end do
-         end do
-         if (is_done) exit
+      call zgeev('N', 'V', n, separated, n, pole, none, 1, vectors, n, work, size(work), real_work, info)
+      failed = info /= 0
+      if (failed) return
+      ! In the order of the modes, which ascends.
+      do i = 1, n
+         j = i - 1 + minloc(pole(i:)%re, dim=1)
+         pole([i, j]) = pole([j, i])
+         vectors(:, [i, j]) = vectors(:, [j, i])
+         vectors(:, i) = vectors(:, i)/sqrt(sum(vectors(:, i)**2))
       end do
-   contains
-
-      !> Removes the term of a pair.
-      subroutine rotate(i, j)
-         integer, intent(in) :: i, j
-         complex(wp) :: ratio, root, tangent, cosine
-         complex(wp) :: column(size(matrix, 1))
-
-         ratio = (matrix(j, j) - matrix(i, i))/(2*matrix(i, j))
-         if (abs(ratio**2 + 1) < smallest_root) then
-            ! Two poles that coincide have one shape; a small change separates them.
-            matrix(j, j) = matrix(j, j) + 2*shift*matrix(i, j)
-            ratio = ratio + shift
-         end if
-         root = sqrt(ratio**2 + 1)
-         if (abs(ratio - root) > abs(ratio + root)) root = -root
-         tangent = 1/(ratio + root)
-         cosine = 1/sqrt(tangent**2 + 1)
-         associate (sine => tangent*cosine)
-            column = matrix(:, i)
-            matrix(:, i) = cosine*column - sine*matrix(:, j)
-            matrix(:, j) = cosine*matrix(:, j) + sine*column
-            column = matrix(i, :)
-            matrix(i, :) = cosine*column - sine*matrix(j, :)
-            matrix(j, :) = cosine*matrix(j, :) + sine*column
-            column = vectors(:, i)
-            vectors(:, i) = cosine*column - sine*vectors(:, j)
-            vectors(:, j) = cosine*vectors(:, j) + sine*column
-         end associate
-         matrix(i, j) = 0.0_wp
-         matrix(j, i) = 0.0_wp
-      end subroutine rotate
    end subroutine diagonalize
 
    !> Mixing of some modes.
-   function get_mixing(modes, kept) result(mixing)
+   pure function get_mixing(modes, kept) result(mixing)
       type(modes_type), intent(in) :: modes
       !> Numbers of the modes as in `get_ranges`: [n_mode].
       integer, intent(in) :: kept(:)
       type(mixing_type) :: mixing
       integer :: range(2, size(modes%block))
-      integer, allocatable :: column(:)
-      complex(wp), allocatable :: weight(:)
-      integer :: i, j, k, before, last
+      integer :: i, n
 
       range = get_ranges(modes, kept)
-      last = 0
+      allocate (mixing%block(count(range(2, :) > 0)))
+      n = 0
       do i = 1, size(modes%block)
-         associate (n => range(2, i) - range(1, i) + 1)
-            last = last + merge(n**2, n, allocated(modes%block(i)%mixing))
+         if (range(2, i) == 0) cycle
+         n = n + 1
+         associate (first => range(1, i), last => range(2, i))
+            mixing%block(n)%count = last - first + 1
+            if (allocated(modes%block(i)%mixing)) mixing%block(n)%weight = modes%block(i)%mixing(first:last, first:last)
          end associate
       end do
-      allocate (mixing%first(size(kept) + 1), column(last), weight(last))
-      before = 0
-      last = 0
-      do i = 1, size(modes%block)
-         if (range(2, i) < range(1, i)) cycle
-         associate (block => modes%block(i), n => range(2, i) - range(1, i) + 1)
-            do j = 1, n
-               mixing%first(before + j) = last + 1
-               if (.not. allocated(block%mixing)) then
-                  call add_entry(before + j, (1.0_wp, 0.0_wp))
-                  cycle
-               end if
-               do k = 1, n
-                  associate (entry => block%mixing(range(1, i) + j - 1, range(1, i) + k - 1))
-                     if (abs(entry) > smallest_weight) call add_entry(before + k, entry)
-                  end associate
-               end do
-            end do
-            before = before + n
-         end associate
-      end do
-      mixing%first(before + 1) = last + 1
-      mixing%column = column(:last)
-      mixing%weight = weight(:last)
-   contains
-
-      !> Adds an entry to the present row.
-      subroutine add_entry(at, value)
-         integer, intent(in) :: at
-         complex(wp), intent(in) :: value
-
-         last = last + 1
-         column(last) = at
-         weight(last) = value
-      end subroutine add_entry
    end function get_mixing
 
-   !> Mixing of some of the modes, without the others.
-   pure function get_part(mixing, numbers) result(part)
+   !> A row of W within the block of its mode.
+   pure subroutine get_row(mixing, number, first, weight)
       type(mixing_type), intent(in) :: mixing
-      !> Numbers of the modes: [n].
-      integer, intent(in) :: numbers(:)
-      type(mixing_type) :: part
-      integer :: at(size(mixing%first) - 1)
-      integer :: i, k
+      !> Number of the mode.
+      integer, intent(in) :: number
+      !> Number of the first mode of the block, or of the mode if it stands for itself.
+      integer, intent(out) :: first
+      !> The row from there on: [count].
+      complex(wp), allocatable, intent(out) :: weight(:)
+      integer :: i
 
-      at = 0
-      at(numbers) = [(i, i=1, size(numbers))]
-      allocate (part%first(size(numbers) + 1), part%column(0), part%weight(0))
-      part%first(1) = 1
-      do i = 1, size(numbers)
-         associate (entries => pack([(k, k=mixing%first(numbers(i)), mixing%first(numbers(i) + 1) - 1)], &
-            at(mixing%column(mixing%first(numbers(i)):mixing%first(numbers(i) + 1) - 1)) > 0))
-            part%column = [part%column, at(mixing%column(entries))]
-            part%weight = [part%weight, mixing%weight(entries)]
-         end associate
-         part%first(i + 1) = size(part%column) + 1
+      first = 1
+      i = 1
+      do while (number >= first + mixing%block(i)%count)
+         first = first + mixing%block(i)%count
+         i = i + 1
       end do
-   end function get_part
+      if (allocated(mixing%block(i)%weight)) then
+         weight = mixing%block(i)%weight(number - first + 1, :)
+      else
+         first = number
+         weight = [(1.0_wp, 0.0_wp)]
+      end if
+   end subroutine get_row
 
    !> Whether each mode stands for itself.
    pure function is_identity(mixing) result(yes)
       type(mixing_type), intent(in) :: mixing
       logical :: yes
+      integer :: i
 
-      yes = size(mixing%column) == size(mixing%first) - 1
+      yes = .not. any([(allocated(mixing%block(i)%weight), i=1, size(mixing%block))])
    end function is_identity
 
    !> W times a matrix: [n_mode, n].
@@ -189,18 +123,15 @@ contains
       type(mixing_type), intent(in) :: mixing
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: mixed(size(values, 1), size(values, 2))
-      ! Columns together, for contiguous sums.
-      complex(wp), dimension(size(values, 2), size(values, 1)) :: row
-      complex(wp) :: total(size(values, 2))
-      integer :: i, k
+      integer :: i, before
 
-      row = transpose(values)
-      do i = 1, size(values, 1)
-         total = 0.0_wp
-         do k = mixing%first(i), mixing%first(i + 1) - 1
-            total = total + mixing%weight(k)*row(:, mixing%column(k))
-         end do
-         mixed(i, :) = total
+      mixed = values
+      before = 0
+      do i = 1, size(mixing%block)
+         associate (block => mixing%block(i), first => before + 1, last => before + mixing%block(i)%count)
+            if (allocated(block%weight)) mixed(first:last, :) = matmul(block%weight, values(first:last, :))
+         end associate
+         before = before + mixing%block(i)%count
       end do
    end function get_mixed
 
@@ -209,18 +140,16 @@ contains
       type(mixing_type), intent(in) :: mixing
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: unmixed(size(values, 1), size(values, 2))
-      ! Columns together, for contiguous sums.
-      complex(wp), dimension(size(values, 2), size(values, 1)) :: row, total
-      integer :: i, k
+      integer :: i, before
 
-      row = transpose(values)
-      total = 0.0_wp
-      do i = 1, size(values, 1)
-         do k = mixing%first(i), mixing%first(i + 1) - 1
-            total(:, mixing%column(k)) = total(:, mixing%column(k)) + mixing%weight(k)*row(:, i)
-         end do
+      unmixed = values
+      before = 0
+      do i = 1, size(mixing%block)
+         associate (block => mixing%block(i), first => before + 1, last => before + mixing%block(i)%count)
+            if (allocated(block%weight)) unmixed(first:last, :) = matmul(transpose(block%weight), values(first:last, :))
+         end associate
+         before = before + mixing%block(i)%count
       end do
-      unmixed = transpose(total)
    end function get_unmixed
 
 end module thud_mode_mixing
