@@ -37,7 +37,7 @@ OTHERS: dict[str, dict[str, Any]] = {
         "heat_capacity_ratio": 1.3,
     },
     "drop": {"height": 0.9, "gravity": 9.7},
-    "sampling": {"sample_rate": 48000.0, "duration": 0.06, "substeps": 3},
+    "sampling": {"sample_rate": 48000.0, "duration": 0.06, "substeps": 8},
 }  # fmt: skip
 
 

@@ -371,7 +371,7 @@ def test_blocks_take_about_a_quarter_of_a_second() -> None:
     # Of elements a whole number of drops that take some tenths of a second each.
     viscous = {"model": "finite_element", "viscosity": "kelvin_voigt"}
     for fixed in ({}, {"model": "modal_ball"}, viscous):
-        assert seconds(**fixed) == pytest.approx(0.25, rel=0.2)
+        assert seconds(**fixed) == pytest.approx(0.25, rel=0.35)
     assert seconds(model="finite_element", polar_elements=256) > 0.25
 
 
