@@ -15,7 +15,6 @@ from thud.level.assessment import VERDICTS
 from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
 from thud.studies.bundled_surrogate import reason_without_defaults
-from thud.studies.model_verdict import OUTCOMES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,17 +25,9 @@ if TYPE_CHECKING:
     from thud.level.assessment import Criterion, Verdict
     from thud.studies.model_verdict import ModelCriterion, ModelVerdict
 
-# Code of the result of a verdict, of a model or of a requirement; the page reads no words.
-RESULTS = {
-    VERDICTS[0]: "conforms",
-    VERDICTS[1]: "does_not_conform",
-    OUTCOMES[2]: "undecided",
-    "met": "conforms",
-    "not met": "does_not_conform",
-    VERDICTS[2]: "undecided",
-}
-# Words of the codes.
-WORDS = dict(zip(("conforms", "does_not_conform", "undecided"), VERDICTS, strict=True))
+# Code of the result of a verdict or of a requirement; the page reads no words.
+RESULTS = {verdict: verdict.replace(" ", "_") for verdict in VERDICTS}
+RESULTS |= {"met": RESULTS[VERDICTS[0]], "not met": RESULTS[VERDICTS[1]]}
 # Bands of the ratings of a room.
 BANDS: dict[RoomRequiredRating, str] = {
     "octaves": "octaves",
@@ -100,7 +91,7 @@ def recording_headline(
     if not is_stated:
         parts.append("The source is not stated: these limits are assumed.")
     detail = " ".join(filter(None, parts))
-    return _headline(verdict, WORDS[result], detail, shown)
+    return _headline(verdict, verdict.result, detail, shown)
 
 
 def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
@@ -121,7 +112,7 @@ def model_headline(
     """
     if ranges is None:
         detail = f"{_without_ranges(case)} {_standard(verdict)}"
-        words = f"{WORDS[RESULTS[verdict.result]]} by this model"
+        words = f"{verdict.result} by this model"
         return _headline(verdict, words, detail)
     result = RESULTS[ranges.result]
     names = [_label(entry.key) for entry in ranges.unknowns]
@@ -129,12 +120,11 @@ def model_headline(
         f"Probability of conformity {ranges.shown_probability} over the ranges of "
         f"{_joined(names)}, whatever the fields state within them. {_standard(verdict)}"
     )
-    words = WORDS[result]
     entries = [entry for entry in ranges.criteria if entry.result == ranges.result]
     causes = {entry.criterion.quantity.title: _range_text(entry) for entry in entries}
     if result == "conforms":
-        return _texts(result, words, f"{_closest(verdict)} {detail}")
-    return _texts(result, words, detail, *_listed(causes))
+        return _texts(result, ranges.result, f"{_closest(verdict)} {detail}")
+    return _texts(result, ranges.result, detail, *_listed(causes))
 
 
 def _headline(
