@@ -337,7 +337,7 @@ def test_chart_shows_each_criterion_its_limits_and_verdicts(folder: Path) -> Non
     panels = {axes.get_ylabel().replace("\n", " "): axes for axes in figure.axes}
     assert panels.keys() == {
         *(f"{band:g} Hz, dB" for band in get_bands().nominal),
-        *("Contact time, ms", "Restitution", "Peaks of the force", "Mass, kg", "Drop height, m"),
+        *("Contact time, ms", "Restitution", "Force peaks", "Mass, kg", "Drop height, m"),
     }
     second = panels["63 Hz, dB"]
     assert len(second.containers) == 5

@@ -448,11 +448,11 @@ def test_two_damping_laws_of_the_same_ball_have_one_verdict() -> None:
     plain = [thud.solve(case).assess().result for case in cases]
     assert plain == ["does not conform", "conforms"]
     first, second = (thud.assess(case) for case in cases)
-    assert first.result == second.result == "undecided by the model"
+    assert first.result == second.result == "undecided"
     low, high = first.probability_range
     assert low < second.probability < high
     page = comparison.compare(cases)
-    assert page.rows()[-1][1:3] == ("undecided by the model",) * 2
+    assert page.rows()[-1][1:3] == ("undecided",) * 2
     assert len({id(verdict) for verdict in page.model_verdicts.values()}) == 1
     (reason,) = page.reasons
     assert reason.startswith("Over what is not known of rubber_ball_fe and rubber_ball_fe_viscous:")
@@ -483,9 +483,9 @@ def test_verdict_of_direct_drops_is_that_of_a_closed_form() -> None:
 
 @pytest.mark.parametrize(
     ("low", "high", "result"),
-    [(0.96, 0.96, "conforms"), (0.95, 1.0, "conforms"), (0.94, 0.94, "undecided by the model"),
-     (0.94, 0.98, "undecided by the model"), (0.06, 0.06, "undecided by the model"),
-     (0.02, 0.06, "undecided by the model"), (0.0, 0.05, "does not conform")],
+    [(0.96, 0.96, "conforms"), (0.95, 1.0, "conforms"), (0.94, 0.94, "undecided"),
+     (0.94, 0.98, "undecided"), (0.06, 0.06, "undecided"),
+     (0.02, 0.06, "undecided"), (0.0, 0.05, "does not conform")],
 )  # fmt: skip
 def test_outcome_needs_95_percent(low: float, high: float, result: str) -> None:
     verdict = thud.assess(thud.read_case(EXAMPLE))

@@ -741,7 +741,7 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
     # The table on the screen has the same marks.
     marked = [row[0] for row in table(one)[1:] if row[2].endswith(" †")]
     assert len(marked) == 9
-    assert "Peaks of the force" not in marked
+    assert "Force peaks" not in marked
 
 
 def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -> None:

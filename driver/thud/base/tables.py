@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
 import textwrap
 from functools import lru_cache
@@ -34,6 +36,13 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
     """
     label, *columns = zip(*rows, strict=True)
     return "\n\n".join(_format_columns([label, *part]) for part in _distribute(label, columns))
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as CSV."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
 
 
 def wrap(text: str) -> str:

@@ -126,9 +126,10 @@ def _model_verdict(answer: Bundle) -> tuple[str, dict[str, bytes]]:
 
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
+    from thud.level.assessment import VERDICTS
     from thud.studies.directory import StudyDirectory
     from thud.studies.model_assessment import assess
-    from thud.studies.model_verdict import FILE, OUTCOMES
+    from thud.studies.model_verdict import FILE
 
     case = read_case(options.case)
     folder = Path(options.output or Path("outputs", f"{case.name}_unknowns"))
@@ -144,7 +145,7 @@ def assess_case(options: argparse.Namespace) -> int:
     print_results(verdict.message if options.quiet else str(verdict))
     if not options.quiet:
         print_path("Results", folder)
-    return NOT_CONFORMING if options.check and verdict.result != OUTCOMES[0] else 0
+    return NOT_CONFORMING if options.check and verdict.result != VERDICTS[0] else 0
 
 
 ASSESS = Command(

@@ -22,7 +22,7 @@ _VERDICTS = {
         r"|(?<=  )(?:does|not|conform|low|high)(?=  |$)"
     ),
     GREEN: r"(?<!that )\bconforms\b|(?<=criteria )conform\b|(?<=: )met\b",
-    YELLOW: r"\bundecided(?: by the model)?\b|(?<=  )by the(?: model)?(?=  |$)",
+    YELLOW: r"\bundecided\b",
 }
 _COLORED = re.compile(
     "|".join(f"(?P<color_{color}>{words})" for color, words in _VERDICTS.items()), re.MULTILINE

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import RATINGS
@@ -14,8 +13,7 @@ from thud.explorer.messages import lower
 from thud.level.assessment import VERDICTS
 from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
-from thud.studies.bundled_surrogate import reason_without_defaults
-from thud.studies.model_verdict import OUTCOMES
+from thud.studies.bundled_surrogate import range_without_defaults
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,17 +24,9 @@ if TYPE_CHECKING:
     from thud.level.assessment import Criterion, Verdict
     from thud.studies.model_verdict import ModelCriterion, ModelVerdict
 
-# Code of the result of a verdict, of a model or of a requirement; the page reads no words.
-RESULTS = {
-    VERDICTS[0]: "conforms",
-    VERDICTS[1]: "does_not_conform",
-    OUTCOMES[2]: "undecided",
-    "met": "conforms",
-    "not met": "does_not_conform",
-    VERDICTS[2]: "undecided",
-}
-# Words of the codes.
-WORDS = dict(zip(("conforms", "does_not_conform", "undecided"), VERDICTS, strict=True))
+# Code of the result of a verdict or of a requirement; the page reads no words.
+RESULTS = {verdict: verdict.replace(" ", "_") for verdict in VERDICTS}
+RESULTS |= {"met": RESULTS[VERDICTS[0]], "not met": RESULTS[VERDICTS[1]]}
 # Bands of the ratings of a room.
 BANDS: dict[RoomRequiredRating, str] = {
     "octaves": "octaves",
@@ -100,7 +90,7 @@ def recording_headline(
     if not is_stated:
         parts.append("The source is not stated: these limits are assumed.")
     detail = " ".join(filter(None, parts))
-    return _headline(verdict, WORDS[result], detail, shown)
+    return _headline(verdict, verdict.result, detail, shown)
 
 
 def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
@@ -121,7 +111,7 @@ def model_headline(
     """
     if ranges is None:
         detail = f"{_without_ranges(case)} {_standard(verdict)}"
-        words = f"{WORDS[RESULTS[verdict.result]]} by this model"
+        words = f"{verdict.result} by this model"
         return _headline(verdict, words, detail)
     result = RESULTS[ranges.result]
     names = [_label(entry.key) for entry in ranges.unknowns]
@@ -129,12 +119,11 @@ def model_headline(
         f"Probability of conformity {ranges.shown_probability} over the ranges of "
         f"{_joined(names)}, whatever the fields state within them. {_standard(verdict)}"
     )
-    words = WORDS[result]
     entries = [entry for entry in ranges.criteria if entry.result == ranges.result]
     causes = {entry.criterion.quantity.title: _range_text(entry) for entry in entries}
     if result == "conforms":
-        return _texts(result, words, f"{_closest(verdict)} {detail}")
-    return _texts(result, words, detail, *_listed(causes))
+        return _texts(result, ranges.result, f"{_closest(verdict)} {detail}")
+    return _texts(result, ranges.result, detail, *_listed(causes))
 
 
 def _headline(
@@ -167,13 +156,12 @@ def _without_ranges(case: Case) -> str:
     )
     if case.unknowns:
         return f"{text}; thud-driver assess counts the stated unknowns."
-    outside = re.fullmatch(
-        r"(\w+) = \S+, allowed: (\S+) <= \w+ <= (\S+)", reason_without_defaults(case)
-    )
+    outside = range_without_defaults(case)
     if outside is None:
         return f"{text}."
-    field = next(item for (_, name), item in fields_by_key().items() if name == outside[1])
-    low, high = (f"{scaled(float(end), -field['power']):g}" for end in outside.groups()[1:])
+    key, *limits = outside
+    field = next(item for (_, name), item in fields_by_key().items() if name == key)
+    low, high = (f"{scaled(end, -field['power']):g}" for end in limits)
     ends = f"{low} to {high} {field['unit']}".rstrip()
     return f"{text}; its ranges are known for {lower(field['label'])} {ends}."
 
@@ -186,11 +174,11 @@ def _label(key: str) -> str:
 
 def unknowns_text(ranges: ModelVerdict) -> str:
     """Return the ranges of the unknowns of a verdict, such as ``"friction 0 to 1"``."""
-    _, *rows = ranges.unknown_rows()
     parts = []
-    for entry, (label, low, high, *_) in zip(ranges.unknowns, rows, strict=True):
-        unit = label.partition(", ")[2]
-        parts.append(f"{_label(entry.key)} {low} to {high} {unit}".rstrip())
+    for entry in ranges.unknowns:
+        unit, size = entry.shown_unit
+        text = f"{_label(entry.key)} {entry.low / size:g} to {entry.high / size:g} {unit}"
+        parts.append(text.rstrip())
     return ", ".join(parts)
 
 

@@ -24,12 +24,11 @@ from thud.floors.constructions import constructions
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
-from thud.level.assessment import get_criteria
+from thud.level.assessment import VERDICTS, get_criteria
 from thud.level.rating import meets
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.model_assessment import assess_impact
-from thud.studies.model_verdict import OUTCOMES
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
@@ -101,7 +100,7 @@ def improve(values: Values) -> Work:
     if verdict:
         ranges = assess_impact(impact)
         none = "The source conforms already."
-        if ranges and ranges.result != OUTCOMES[0]:
+        if ranges and ranges.result != VERDICTS[0]:
             none = (
                 "The values of the fields conform already. The verdict over what is not known, "
                 f"{ranges.result} ({ranges.shown_probability}), is that of all values in its "

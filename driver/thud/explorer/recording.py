@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
+from thud.base.files import read_toml
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import largest_contribution, recording_headline
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import TABLES, name_fields
 from thud.plot.impact_figures import contact_force
 from thud.recordings.assumptions import ASSUMED_SHARE
-from thud.recordings.config import config_from, read_table
+from thud.recordings.config import config_from
 from thud.recordings.recording import Recording
 from thud.recordings.signal_files import open_signals
 from thud.report.contents import criteria_data, report_data
@@ -130,7 +131,7 @@ def _config_of(paths: Sequence[str], table: Mapping[str, object]) -> Config:
         refuse(f"{', '.join(paths)}: are {len(paths)} files of laboratories", "one")
     if not paths:
         return config_from(table)
-    stated = read_table(paths[0])
+    stated, _ = read_toml(Path(paths[0]))
     config = config_from(stated, f"{paths[0]}: ")
     if config.report.accreditation_mark:
         refuse(f"{paths[0]}: accreditation_mark cannot be sent by a page", "thud-driver measure")

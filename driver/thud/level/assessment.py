@@ -68,9 +68,7 @@ class Criterion(Displayed):
     @property
     def quantity(self) -> Quantity:
         """Declaration of the quantity, with title, display unit and decimals."""
-        band = self.name.removeprefix("octave_").replace("_", ".")
-        level = Quantity(self.name, f"{band} Hz", "", "dB", "dB", 1.0, 2, "")
-        return QUANTITIES.get(self.name, level)
+        return criterion_quantity(self.name)
 
     @property
     def shown_limits(self) -> str:
@@ -292,6 +290,12 @@ def _criteria(source: LimitsSource) -> tuple[Criterion, ...]:
         Criterion(name, replace(unknown, unit=unit), lower, upper)
         for name, unit, lower, upper in LIMITS[source]
     )
+
+
+def criterion_quantity(name: str) -> Quantity:
+    """Return the declaration of the quantity of a criterion: an octave level, or of the table."""
+    band = name.removeprefix("octave_").replace("_", ".")
+    return QUANTITIES.get(name, Quantity(name, f"{band} Hz", "", "dB", "dB", 1.0, 2, ""))
 
 
 def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import (
-    refuse,
-)
+from thud.base.checks import refuse
+from thud.base.files import read_toml
 from thud.level.levels import SOURCES
 from thud.recordings import dates
-from thud.recordings.channel import MIB, shown_path, shown_text
+from thud.recordings.channel import shown_path
 from thud.recordings.config_values import (
     Checked,
     checked_values,
@@ -430,29 +427,13 @@ def config_from(table: Mapping[str, object], prefix: str = "") -> Config:
     return Config(**checked_values(table, Config, prefix))
 
 
-def read_table(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the table of a configuration file; raise InputError if it is not one of TOML."""
-    file = regular_file(path)
-    name = shown_path(file)
-    if file.stat().st_size > MIB:
-        refuse(f"{name}: is larger than 1 MiB", "a TOML file of a few lines")
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError as error:
-        refuse(f"{name}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
-    except (OSError, ValueError, RecursionError) as error:
-        refuse(
-            f"{name}: is not valid TOML ({shown_text(error)})", 'lines such as unit = "V"', error
-        )
-
-
 def read_config(path: str | os.PathLike[str]) -> Config:
     """Read a configuration.
 
     Raise InputError if a key is unknown, or its value of the wrong type or out of range.
     """
-    file = Path(path)
-    config = config_from(read_table(path), f"{shown_path(file)}: ")
+    file = regular_file(path)
+    config = config_from(read_toml(file)[0], f"{shown_path(file)}: ")
     mark = config.report.accreditation_mark
     if not mark:
         return config

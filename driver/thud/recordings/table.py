@@ -6,7 +6,7 @@ import itertools
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -68,6 +68,8 @@ PAIR = re.compile(r"[:=\t;,]")
 MAX_TITLES = 3
 # A title with the number of its column, such as "Column 2: Force [N]".
 NUMBERED = re.compile(r"(?:column|col\.?|spalte|열|列)\s*(\d{1,3})\s*[:=]\s*(\S.*)", re.IGNORECASE)
+# A number behind a name.
+VALUE = re.compile(r"[:=]\s*[-+]?\d")
 DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
 # Titles of columns that may have no cells.
 REMARK = {
@@ -183,10 +185,6 @@ class _Layout:
     units: list[str] = field(default_factory=list)
 
     def cells(self, line: str) -> list[str]:
-        """Return the cells of a line of numbers up to the last one that is not empty."""
-        return _trimmed(self.all_cells(line))
-
-    def all_cells(self, line: str) -> list[str]:
         """Return the cells of a line of numbers."""
         text = strip_comment(line).rstrip("\t; ".replace(self.separator or " ", ""))
         return split_line(text, self.separator) if text else []
@@ -194,6 +192,10 @@ class _Layout:
     def rows(self) -> Iterator[tuple[int, str]]:
         """Yield number and text of the lines from the first number on."""
         return itertools.islice(enumerate(self.lines(), 1), self.first - 1, None)
+
+    def refuse(self, line: int, reason: str, allowed: str = "") -> NoReturn:
+        """Raise InputError for a line."""
+        refuse(f"{self.name}: line {line}: {reason}", allowed or self.allowed)
 
 
 def read_table(
@@ -262,33 +264,24 @@ def _lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
 
 
 def _read(layout: _Layout) -> Table:
-    above = _find_numbers(layout)
-    _read_header(above, layout)
-    _require_rows(above, layout)
+    _read_header(_find_numbers(layout), layout)
     if not layout.decimal.line:
         layout.decimal = find_decimal(_decisive(layout), layout.separator, layout.name)
     _require_separators(layout)
     values = _read_numbers(layout)
     clock = None if layout.clock is None else continued(values.pop(layout.clock))
-    return Table(
-        layout.name,
-        [
-            Column(i + 1, layout.names[i], layout.units[i], column, layout.name)
-            for i, column in values.items()
-        ],
-        layout.header,
-        layout.decimal.mark if layout.decimal.line else "",
-        any(layout.names) or any(layout.units),
-        clock,
-    )
+    columns = [
+        Column(i + 1, layout.names[i], layout.units[i], numbers, layout.name)
+        for i, numbers in values.items()
+    ]
+    mark = layout.decimal.mark if layout.decimal.line else ""
+    has_titles = any(layout.names) or any(layout.units)
+    return Table(layout.name, columns, layout.header, mark, has_titles, clock)
 
 
 def _trimmed(cells: list[str]) -> list[str]:
     """Return the cells up to the last one that is not empty."""
-    count = len(cells)
-    while count and not cells[count - 1]:
-        count -= 1
-    return cells[:count]
+    return cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
 
 
 def _value(cell: str) -> tuple[str, str]:
@@ -306,24 +299,27 @@ def _find_numbers(layout: _Layout) -> list[str]:
         if not is_workbook:
             layout.separator = find_separator(strip_comment(line).rstrip("\t; "))
         cells = layout.cells(line)
-        filled = [i for i, cell in enumerate(cells) if cell]
-        values = {i: _value(cells[i]) for i in filled}
+        filled = {i: cell for i, cell in enumerate(cells) if cell}
+        values = {i: _value(cell) for i, cell in filled.items()}
         used = {i: unit for i, (number, unit) in values.items() if is_number(number)}
-        clocks = [i for i in filled if seconds_of_day(cells[i]) is not None]
-        dates = [i for i in filled if is_date(cells[i])] + clocks
+        clocks = [i for i, cell in filled.items() if seconds_of_day(cell) is not None]
+        dates = [i for i, cell in filled.items() if is_date(cell)] + clocks
         # Dates precede the numbers, and further columns may hold words, such as a state.
         if (
             used
-            and filled[0] in {*used, *dates}
+            and min(filled) in {*used, *dates}
             and min(used) > max(dates, default=-1)
             and len(used) > (len(filled) - len(dates)) / 2
         ):
-            layout.first, layout.width, layout.used = len(above) + 1, len(cells), used
-            layout.full_width = len(layout.all_cells(line))
-            layout.has_gaps = len(filled) < len(cells)
-            layout.clock = clocks[0] if clocks else None
-            if len(cells) > MAX_COLUMNS:
-                refuse(f"{layout.name}: {len(cells)} columns", f"up to {MAX_COLUMNS}")
+            layout.first, layout.used, layout.clock = (
+                len(above) + 1,
+                used,
+                min(clocks, default=None),
+            )
+            layout.width, layout.full_width = max(filled) + 1, len(cells)
+            layout.has_gaps = len(filled) < layout.width
+            if layout.width > MAX_COLUMNS:
+                refuse(f"{layout.name}: {layout.width} columns", f"up to {MAX_COLUMNS}")
             return above
         above.append(line)
     return refuse(f"{layout.name}: cannot be read (no numbers)", layout.allowed)
@@ -339,42 +335,26 @@ def _decisive(layout: _Layout) -> Iterator[tuple[int, list[str], bool]]:
 
 def _require_separators(layout: _Layout) -> None:
     """Raise InputError if commas may be separators or decimal marks."""
+    texts = filter(None, (strip_comment(line) for _, line in layout.rows()))
     if layout.has_commas:
         # As separate numbers, 05 and -0 would be unusual.
-        texts = filter(None, (strip_comment(line) for _, line in layout.rows()))
-        if any("," not in text or DECIMAL_COMMA.match(text) for text in texts):
-            return
-    elif layout.separator != "," or layout.decimal.line or any(layout.names) or any(layout.units):
-        return
+        is_shown = any("," not in text or DECIMAL_COMMA.match(text) for text in texts)
     else:
-        # A cell that begins with a sign is not the fraction of the number before it.
-        signed = {0}
-        for _, line in layout.rows():
-            if '"' in line or "." in line:
-                return
-            cells = layout.all_cells(line)
-            signed |= {i for i, cell in enumerate(cells) if not cell[:1].isdigit()}
-            if len(signed) >= layout.width:
-                return
-    refuse(
-        f"{layout.name}: line {layout.first}: the commas may separate columns or be decimal marks",
-        "a title for each column, decimal points, or semicolons between columns",
-    )
-
-
-def _require_rows(above: list[str], layout: _Layout) -> None:
-    """Raise InputError if a line above the numbers looks like an unreadable row."""
-    for number, line in enumerate(above, 1):
-        cells = layout.cells(line)
-        if line.lstrip()[:1] in COMMENTS or len(cells) != layout.width or not cells[0]:
-            continue
-        is_row = not any(map(str.isalpha, cells[0])) and any(map(is_number, cells))
-        # A word may stand in front of the numbers of the first row.
-        is_row |= number == len(above) and all(is_number(cells[i]) for i in layout.used)
-        if is_row or is_number(cells[0]):
-            wrong = next(cell for cell in cells if not is_number(cell))
-            text = f"{layout.name}: line {number}: {shown_text(wrong)!r} is not a number"
-            refuse(text, layout.allowed)
+        titles = any(layout.names) or any(layout.units)
+        is_shown = layout.separator != "," or bool(layout.decimal.line) or titles
+    # A cell that begins with a sign is not the fraction of the number before it.
+    signed = {0}
+    for text in () if is_shown or layout.has_commas else texts:
+        signed |= {i for i, cell in enumerate(layout.cells(text)) if not cell[:1].isdigit()}
+        is_shown = '"' in text or "." in text or len(signed) >= layout.width
+        if is_shown:
+            return
+    if not is_shown:
+        layout.refuse(
+            layout.first,
+            "the commas may separate columns or be decimal marks",
+            "a title for each column, decimal points, or semicolons between columns",
+        )
 
 
 # Header: titles, units, names and values.
@@ -391,24 +371,24 @@ def _read_header(above: list[str], layout: _Layout) -> None:
     units = [cells for _, cells in rows if _are_units(cells)]
     titles = [row for row in rows if row[1] not in units]
     near = {number for number, _ in lines[-MAX_TITLES:]}
-    chosen = max(
+    _, chosen = max(
         (row for row in titles if row[0] in near or _evidence(row[1])),
         key=lambda row: (_evidence(row[1]), row[0]),
         default=(0, []),
     )
-    others += [(number, "\t".join(cells)) for number, cells in titles if cells is not chosen[1]]
+    others += [(number, "\t".join(cells)) for number, cells in titles if cells is not chosen]
     last = lines[-1][0] if lines else 0
-    _sort_others(sorted(others), last, layout, has_titles=bool(chosen[1] or numbered))
-    layout.width = max([layout.width, *map(len, (chosen[1], *units))])
+    for number, line in sorted(others):
+        _read_other(line, number, layout, is_last=number == last, is_open=not (chosen or numbered))
+    layout.width = max([layout.width, *map(len, (chosen, *units))])
     layout.names = [""] * layout.width
     stated: list[list[str]] = [[] for _ in range(layout.width)]
-    for i, cell in [*enumerate(chosen[1]), *numbered.items()]:
-        if i >= layout.width and plain(cell) in REMARK:
-            continue
-        if i >= layout.width:
+    for i, cell in [*enumerate(chosen), *numbered.items()]:
+        if i < layout.width:
+            layout.names[i], unit = split_title(cell)
+            stated[i].append(unit)
+        elif plain(cell) not in REMARK:
             refuse(f"{layout.name}: a title for column {i + 1} of {layout.width}", ONE_TITLE)
-        layout.names[i], unit = split_title(cell)
-        stated[i].append(unit)
     for i, cell in itertools.chain(*map(enumerate, units)):
         name, unit = split_title(cell)
         stated[i].append(unit or name)
@@ -416,9 +396,13 @@ def _read_header(above: list[str], layout: _Layout) -> None:
         stated[i].append(unit)
     _apply_header_units(stated, layout)
     layout.units = [
-        _one_unit(units, i, layout) or (layout.names[i] if layout.names[i] in UNITS else "")
-        for i, units in enumerate(stated)
+        _one_unit(units, i, layout) or (name if name in UNITS else "")
+        for i, (units, name) in enumerate(zip(stated, layout.names, strict=True))
     ]
+
+
+def _uncommented(line: str) -> str:
+    return line.lstrip(COMMENTS + " \t").strip()
 
 
 def _sort_lines(
@@ -430,14 +414,14 @@ def _sort_lines(
     numbered: dict[int, str] = {}
     others: list[tuple[int, str]] = []
     for number, line in lines:
-        text = line.lstrip(COMMENTS + " \t").strip()
-        name, *value = (part.strip() for part in PAIR.split(text, maxsplit=1))
+        text = _uncommented(line)
+        title, *value = PAIR.split(text, maxsplit=1)
+        name, values = plain(split_title(title)[0]), "".join(value).strip(" :=\t;,")
         if match := NUMBERED.fullmatch(text):
             numbered[int(match[1]) - 1] = match[2]
-        elif value and _is_pair(name, value[0].strip(" :=\t;,"), layout.width):
-            is_unit = plain(split_title(name)[0]) in UNIT | TIME_UNIT
-            values = value[0].strip(" :=\t;,")
-            layout.header.append((name, values if is_unit else re.split(r"[\t;]", values)[0]))
+        elif value and _is_pair(name, values, layout.width):
+            is_unit = name in UNIT | TIME_UNIT
+            layout.header.append((title.strip(), values if is_unit else _first(values)))
         elif cells := _fitting(line, text, layout):
             rows.append((number, cells))
         else:
@@ -445,15 +429,17 @@ def _sort_lines(
     return rows, numbered, others
 
 
+def _first(values: str) -> str:
+    """Return the first of the values for several channels."""
+    return re.split(r"[\t;]", values)[0]
+
+
 def _is_pair(name: str, value: str, width: int) -> bool:
     """Whether a line of the header is a known name with its value."""
-    words = plain(split_title(name)[0])
-    if words in DATE:
+    if name in DATE:
         return bool(DATE_LIKE.search(value))
-    has_digit = any(map(str.isdigit, value))
-    return bool(value) and (
-        words in UNIT | TIME_UNIT or (words in RATE | STEP and (has_digit or width == 1))
-    )
+    has_value = width == 1 or any(map(str.isdigit, value))
+    return bool(value) and (name in UNIT | TIME_UNIT or (name in RATE | STEP and has_value))
 
 
 def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
@@ -511,32 +497,35 @@ def _evidence(cells: list[str]) -> int:
     return 2 if any(find_unit(unit) for _, unit in pairs) else int(any(map(is_time, cells)))
 
 
-def _sort_others(
-    others: list[tuple[int, str]], last: int, layout: _Layout, *, has_titles: bool
-) -> None:
-    """Add further lines to the header; raise InputError for titles that do not fit."""
-    for number, line in others:
-        text = line.lstrip(COMMENTS + " \t").strip()
-        pieces = [piece.strip() for piece in re.split(r"[\t;,]", text)]
-        has_number = re.search(r"[:=]\s*[-+]?\d", text) or any(
-            is_number(_value(piece)[0]) for piece in pieces
-        )
-        cells = next(_splits(text, layout), [text])
-        is_title = any(map(is_time, cells)) and (len(cells) > 1 or number == last)
-        if number == last and line[:1] not in COMMENTS and ":" not in text:
-            is_title |= (layout.separator or "\n") in text
-        is_title &= not has_titles
-        is_unit = _are_units(cells) or any(map(_states_unit, pieces))
-        if (is_title or is_unit) and not has_number:
-            count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
-            reason = count if len(cells) != layout.width else "is a second line of titles"
-            refuse(f"{layout.name}: line {number}: {shown_text(text)!r}: {reason}", ONE_TITLE)
-        pair = PAIR.split(text, maxsplit=1)
-        if len(pair) == 1:
-            pair = text.rsplit(maxsplit=1)
-        if len(pair) == 2:  # noqa: PLR2004 - name and value
-            # Of values for several channels, the first is used.
-            layout.header.append((pair[0], re.split(r"[\t;]", pair[1].strip(" :=\t;,"))[0]))
+def _read_other(line: str, number: int, layout: _Layout, *, is_last: bool, is_open: bool) -> None:
+    """Add a further line to the header; raise InputError for titles or numbers that do not fit.
+
+    `is_last` is the line above the numbers; with `is_open` the columns have no titles yet.
+    """
+    text = _uncommented(line)
+    is_comment = line[:1] in tuple(COMMENTS)
+    row = [] if is_comment else _trimmed(layout.cells(line))
+    if len(row) == layout.width and row[0] and not layout.has_commas:
+        is_row = not any(map(str.isalpha, row[0])) and any(map(is_number, row))
+        # A word may stand in front of the numbers of the first row.
+        is_row |= number == layout.first - 1 and all(is_number(row[i]) for i in layout.used)
+        if is_row or is_number(row[0]):
+            wrong = next(cell for cell in row if not is_number(cell))
+            layout.refuse(number, f"{shown_text(wrong)!r} is not a number")
+    pieces = [piece.strip() for piece in re.split(r"[\t;,]", text)]
+    has_number = any(is_number(_value(piece)[0]) for piece in pieces)
+    cells = next(_splits(text, layout), [text])
+    is_title = any(map(is_time, cells)) and (len(cells) > 1 or is_last)
+    if is_last and not is_comment and ":" not in text:
+        is_title |= (layout.separator or "\n") in text
+    is_unit = _are_units(cells) or any(map(_states_unit, pieces))
+    if (is_unit or (is_title and is_open)) and not has_number | bool(VALUE.search(text)):
+        count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
+        reason = count if len(cells) != layout.width else "is a second line of titles"
+        layout.refuse(number, f"{shown_text(text)!r}: {reason}", ONE_TITLE)
+    pair = PAIR.split(text, maxsplit=1) if PAIR.search(text) else text.rsplit(maxsplit=1)
+    if pair[1:]:
+        layout.header.append((pair[0], _first(pair[1].strip(" :=\t;,"))))
 
 
 def _states_unit(text: str) -> bool:
@@ -593,7 +582,6 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     """Return the columns of numbers and times of day by their index in the table."""
     columns = [*layout.used, *([] if layout.clock is None else [layout.clock])]
     blocks: list[NDArray[np.float64]] = []
-    count = 0
     rows = layout.rows()
     while block := list(itertools.islice(rows, BLOCK)):
         values = _convert([line for _, line in block], columns, layout)
@@ -601,8 +589,7 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
             texts = [_convert_row(number, line, columns, layout) for number, line in block]
             values = np.array(list(filter(None, texts)), dtype=np.float64)
         blocks.append(values.reshape(-1, len(columns)))
-        count += values.size
-        if count > MAX_NUMBERS:
+        if sum(block.size for block in blocks) > MAX_NUMBERS:
             refuse(
                 f"{layout.name}: more than {MAX_NUMBERS / 1e6:.1f} million numbers as text",
                 "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
@@ -643,38 +630,34 @@ def _convert(block: list[str], columns: list[int], layout: _Layout) -> NDArray[n
 
 def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) -> list[float] | None:
     """Return the numbers of a line, None of an empty one; raise InputError if it is wrong."""
-    cells = layout.all_cells(line)
+    cells = layout.cells(line)
     if not cells:
         return None
     row = [_cell_value(cells[i], i, number, layout) for i in columns if i < len(cells)]
     if len(row) < len(columns) or len(_trimmed(cells)) > layout.width:
-        count = f"{len(cells)} columns, {layout.width} in the lines above"
-        refuse(f"{layout.name}: line {number}: {count}", layout.allowed)
-    for i, cell in enumerate(cells) if len(cells) > len(columns) else ():
-        if i not in columns and is_number(cell):
-            refuse(
-                f"{layout.name}: line {number}: column {i + 1} has a number, {shown_text(cell)}, "
-                f"but none in line {layout.first}",
-                "columns of numbers or of words",
-            )
+        layout.refuse(number, f"{len(cells)} columns, {layout.width} in the lines above")
+    for i in {*range(len(cells))} - {*columns}:
+        if is_number(cells[i]):
+            text = f"column {i + 1} has a number, {shown_text(cells[i])}, but none in line "
+            layout.refuse(number, text + str(layout.first), "columns of numbers or of words")
     return row
 
 
 def _cell_value(cell: str, column: int, number: int, layout: _Layout) -> float:
     """Return the number or the time of day, s, of a cell."""
-    first = layout.used.get(column, "")
+    unit = layout.used.get(column, "")
     if column == layout.clock:
         value, reason = seconds_of_day(cell), f"{shown_text(cell)!r} is not a time"
-    elif first:
-        text, unit = _value(cell)
-        base, size = UNITS.get(find_unit(unit), ("", 0.0))
-        is_same = base == UNITS[find_unit(first)][0]
+    elif unit:
+        text, own = _value(cell)
+        base, size = UNITS.get(find_unit(own), ("", 0.0))
+        is_same = base == UNITS[find_unit(unit)][0]
         value = to_number(text, layout.decimal.mark) if is_same else None
-        value = None if value is None else value * size / UNITS[find_unit(first)][1]
-        reason = f"{shown_text(cell)!r} is not in {first}"
+        value = None if value is None else value * size / UNITS[find_unit(unit)][1]
+        reason = f"{shown_text(cell)!r} is not in {unit}"
     else:
         value = to_number(cell, layout.decimal.mark)
         reason = "" if value is not None else layout.decimal.explain(shown_text(cell))
     if value is None:
-        refuse(f"{layout.name}: line {number}: {reason}", layout.allowed)
+        layout.refuse(number, reason)
     return value

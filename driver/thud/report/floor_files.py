@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from functools import partial
 from importlib.util import find_spec
 from textwrap import fill
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.bridge import version
 from thud.base.display import draw_all
+from thud.base.tables import csv_text
 from thud.base.workbooks import workbook
 from thud.report.predicted_floor import (
     contribution_title,
@@ -107,7 +106,5 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
 
 
 def _csv(rows: Iterable[Iterable[object]]) -> bytes:
-    text = io.StringIO()
-    text.write(f"# thud {version()}; levels in the room in dB re 20 uPa\n")
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue().encode()
+    comment = f"# thud {version()}; levels in the room in dB re 20 uPa\n"
+    return (comment + csv_text(rows)).encode()

@@ -82,5 +82,5 @@ def inline_svg(svg: str, prefix: str) -> str:
 
 def _attributes(style: re.Match[str]) -> str:
     """Return the properties of a style as attributes; all texts have the font of the page."""
-    pairs = (entry.split(": ", 1) for entry in style[1].split("; ") if entry)
+    pairs = re.findall(r"([\w-]+): ([^;]*)", style[1])
     return "".join(f' {name}="{value}"' for name, value in pairs if name != "font-family")

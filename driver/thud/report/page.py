@@ -154,9 +154,8 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     parts = []
     for verdict in VERDICTS[1:]:
         matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
-        names = [criterion_style(criterion).title.split(",")[0] for criterion in matching]
-        if names:
-            parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
+        if names := [criterion_style(criterion).quantity.title for criterion in matching]:
+            parts.append(f"{verdict}: {', '.join(names)}")
     parts = parts or ["all criteria are met"]
     if any(criterion["excluded"] for criterion in criteria):
         parts.append(f"U is incomplete where it is marked {INCOMPLETE}")
@@ -275,14 +274,14 @@ def _budget(criterion: dict[str, Any]) -> str:
     if not parts or not combined or criterion["value"] is None:
         return ""
     style = criterion_style(criterion)
-    name, _, unit = style.title.partition(", ")
+    unit = style.quantity.display_unit
 
     def with_unit(value: float, unit: str) -> str:
         return f"{width_text(value)} {unit}".rstrip()
 
     summary = "; ".join(
         [
-            f"{name}: {value_text(criterion)} ± {expanded_text(criterion)} {unit}".rstrip(),
+            f"{style.name}: {value_text(criterion)} ± {expanded_text(criterion)} {unit}".rstrip(),
             f"u = {with_unit(combined / style.unit, unit)}",
             f"degrees of freedom {freedom_text(criterion['freedom'])}",
             f"k = {number(criterion['coverage_factor'], 2)}",
@@ -307,7 +306,7 @@ def _budget(criterion: dict[str, Any]) -> str:
 
 def _budget_rule(data: dict[str, Any]) -> str:
     without = [
-        criterion_style(criterion).title.split(",")[0].lower()
+        criterion_style(criterion).quantity.title
         for criterion in data["criteria"]
         if criterion["name"] != COUNT and not criterion["uncertainty"]
     ]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import warnings
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ from thud.base.bridge import version
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
+from thud.base.tables import csv_text
 from thud.level.assessment import VERDICTS
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
@@ -141,7 +140,7 @@ def levels_csv(data: dict[str, Any]) -> str:
         for bands, levels in data["levels"].items()
         for i, nominal in enumerate(levels["band"])
     ]
-    return _csv([head.split(), *rows])
+    return csv_text([head.split(), *rows])
 
 
 def criteria_csv(data: dict[str, Any]) -> str:
@@ -159,13 +158,7 @@ def criteria_csv(data: dict[str, Any]) -> str:
     ]
     head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
     comment = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
-    return comment + _csv([head.split(), *rows])
-
-
-def _csv(rows: Iterable[Iterable[object]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
+    return comment + csv_text([head.split(), *rows])
 
 
 def file_names(*, figures: bool = True) -> list[str]:

@@ -5,22 +5,17 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.level.assessment import criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.budgets import AMPLITUDE_DECIBEL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from thud.base.quantity import Quantity
+
 NOT_KNOWN = "not known"
 COUNT = "peak_count"
-# Title, size of the unit and decimals of each criterion that is not a level.
-STYLES = {
-    "contact_time": ("Contact time, ms", 1e-3, 2),
-    "restitution": ("Restitution", 1.0, 3),
-    COUNT: ("Peaks of the force", 1.0, 0),
-    "mass": ("Mass, kg", 1.0, 3),
-    "drop_height": ("Drop height, m", 1.0, 3),
-}
 HEAD = (
     "Criterion", "Value", "U (95 %)", "Limits", "Margin", "P (outside)", "Spread", "Background",
     "Verdict",
@@ -36,11 +31,25 @@ INCOMPLETE = "†"
 
 
 class Style(NamedTuple):
-    """Format of a criterion: title, size of its unit, and decimals."""
+    """Format of a criterion: its quantity, and decimals."""
 
-    title: str
-    unit: float
+    quantity: Quantity
     decimals: int
+
+    @property
+    def name(self) -> str:
+        """Title without unit, with a capital."""
+        return self.quantity.title[:1].upper() + self.quantity.title[1:]
+
+    @property
+    def title(self) -> str:
+        """Title with unit, with a capital."""
+        return self.name + self.quantity.label.removeprefix(self.quantity.title)
+
+    @property
+    def unit(self) -> float:
+        """Size of the unit in SI units."""
+        return 1 / self.quantity.display_scale
 
     def text(self, value: float | None, unknown: str = NOT_KNOWN) -> str:
         """Return a value in the unit of the criterion as text."""
@@ -49,11 +58,8 @@ class Style(NamedTuple):
 
 def criterion_style(criterion: dict[str, Any]) -> Style:
     """Return the format of a criterion of a report."""
-    if criterion["band"] is not None:
-        return Style(f"{criterion['band']:g} Hz, dB", 1.0, 2)
-    name = criterion["name"]
-    unit = f", {criterion['unit']}" if criterion["unit"] else ""
-    return Style(*STYLES.get(name, (name.replace("_", " ").capitalize() + unit, 1.0, 3)))
+    quantity = criterion_quantity(criterion["name"])
+    return Style(quantity, quantity.decimals)
 
 
 def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
@@ -126,13 +132,11 @@ def _allowance_text(criterion: dict[str, Any]) -> str:
     if not lacking or not criterion["allowance"]:
         return ""
     style = criterion_style(criterion)
-    title, _, unit = style.title.partition(", ")
-    size = f"{criterion['allowance'] / style.unit:.2g} {unit}".rstrip()
+    size = f"{criterion['allowance'] / style.unit:.2g} {style.quantity.display_unit}".rstrip()
     if lacking == ["calibration"] and criterion["band"] is not None:
         percent = 100 * criterion["allowance"] / AMPLITUDE_DECIBEL
         size = f"{percent:.2g} % of calibration (U {NORMAL_FACTOR * percent:.2g} %)"
-    name = title if criterion["band"] is not None else title.lower()
-    return f"{name} {criterion['verdict_if_stated']} up to {size}"
+    return f"{style.quantity.title} {criterion['verdict_if_stated']} up to {size}"
 
 
 def limits_of(criterion: dict[str, Any]) -> tuple[float, float]:

@@ -5,18 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from thud.base._schema import KEYS
 from thud.base.display import Displayed
-from thud.base.tables import format_rows
-from thud.base.units import display_unit
+from thud.base.tables import csv_text, format_rows
+from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
     from thud.level.assessment import Criterion
     from thud.studies.unknowns import Unknown
 
-BY_MODEL = " by the model"
-OUTCOMES = ("conforms", "does not conform", f"undecided{BY_MODEL}")
 # File with the rows of a verdict, in SI units.
 FILE = "model_verdict.csv"
 # Width of an interval of a probability above which it means little.
@@ -59,7 +56,7 @@ class ModelCriterion(Displayed):
 
     @property
     def result(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"undecided by the model"``."""
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"``."""
         return _outcome(*self.probability_range)
 
     @property
@@ -100,7 +97,7 @@ class ModelCriterion(Displayed):
             (
                 quantity.label, quantity.show(criterion.value), self.range, criterion.shown_limits,
                 _percent(*self.probability_range), self.main_unknown,
-                self.result.removesuffix(BY_MODEL),
+                self.result,
             ),
         ]  # fmt: skip
 
@@ -135,7 +132,7 @@ class ModelVerdict(Displayed):
 
     @property
     def result(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"undecided by the model"``."""
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"``."""
         return _outcome(*self.probability_range)
 
     @property
@@ -161,7 +158,7 @@ class ModelVerdict(Displayed):
         If there are none, the decisive criterion.
         """
         probability = f"probability of conformity {self.shown_probability}"
-        causes = [c for c in self.criteria if c.result != OUTCOMES[0]] or [self.decisive]
+        causes = [c for c in self.criteria if c.result != VERDICTS[0]] or [self.decisive]
         causes.sort(key=lambda criterion: criterion.probability)
         return f"{self.result} ({probability}): {'; '.join(c.reason for c in causes)}"
 
@@ -185,18 +182,16 @@ class ModelVerdict(Displayed):
             "criterion", "unit", "value", "low", "high", "lower_limit", "upper_limit",
             "probability_low", "probability_high", "main_unknown", "result",
         )  # fmt: skip
-        lines = [",".join(columns)]
+        rows: list[tuple[object, ...]] = [columns]
         for entry in self.criteria:
             criterion = entry.criterion
-            numbers = (
-                criterion.value, entry.low, entry.high, criterion.lower, criterion.upper,
-                *entry.probability_range,
-            )  # fmt: skip
-            cells = (criterion.name, criterion.unit, *map(repr, numbers), entry.main_unknown)
-            lines.append(",".join((*cells, entry.result)))
-        low, high = self.probability_range
-        lines.append(f"all,,,,,,,{low!r},{high!r},{self.decisive.main_unknown},{self.result}")
-        return "\n".join(lines) + "\n"
+            rows.append((
+                criterion.name, criterion.unit, criterion.value, entry.low, entry.high,
+                criterion.lower, criterion.upper, *entry.probability_range, entry.main_unknown,
+                entry.result,
+            ))  # fmt: skip
+        ends = (*self.probability_range, self.decisive.main_unknown, self.result)
+        return csv_text([*rows, ("all", *("",) * 6, *ends)])
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -211,7 +206,7 @@ class ModelVerdict(Displayed):
                 "",
                 self.shown_probability,
                 self.decisive.main_unknown,
-                self.result.removesuffix(BY_MODEL),
+                self.result,
             ),
         ]
 
@@ -219,8 +214,7 @@ class ModelVerdict(Displayed):
         """Return header and rows of text: the unknowns."""
         rows: list[tuple[str, ...]] = [("not known", "low", "high", "standard deviation", "reason")]
         for entry in self.unknowns:
-            unit = next((key.unit for key in KEYS if key.name == entry.key), "")
-            unit, size = display_unit(unit, max(abs(entry.low), abs(entry.high)))
+            unit, size = entry.shown_unit
             low, high = (f"{end / size:g}" for end in (entry.low, entry.high))
             deviation = entry.standard_deviation / size
             label = f"{entry.key}, {unit}".removesuffix(", ")
@@ -230,8 +224,8 @@ class ModelVerdict(Displayed):
 
 def _outcome(low: float, high: float) -> str:
     if low >= COVERAGE:
-        return OUTCOMES[0]
-    return OUTCOMES[1] if high <= 1 - COVERAGE else OUTCOMES[2]
+        return VERDICTS[0]
+    return VERDICTS[1] if high <= 1 - COVERAGE else VERDICTS[2]
 
 
 def _percent(low: float, high: float) -> str:
