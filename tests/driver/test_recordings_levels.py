@@ -19,13 +19,11 @@ from synthetic import make_drop
 import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
-from thud.level.levels import RECORDED_BAND
 from thud.recordings.assumptions import assumed_contributions
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.contact import cells_between, uniform_bounds
-from thud.recordings.filters import low_pass_attenuation, low_pass_force
 from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
 from thud.recordings.plate import Plate, check_plate
@@ -133,30 +131,6 @@ def test_method_is_a_contribution_of_the_others_only() -> None:
         assert found.steps[-1].startswith("levels: ")
         assert method in found.steps[-1]
     assert not measure_levels([make_drop()])[0].contributions["method"].any()
-
-
-def test_low_pass_does_nothing_to_the_bands() -> None:
-    for rate in (8000.0, 25600.0, 96000.0):
-        drop = make_drop(rate=rate)
-        for bands in ("octave", "third"):
-            raw, low = (measure_levels([drop], bands, low_pass=one)[0] for one in (False, True))
-            np.testing.assert_allclose(low.level, raw.level, rtol=0, atol=2e-3)
-            assert "1.25 kHz" in low.steps[1]
-            # A rectangle between none of it and all at the upper edge, where it is largest.
-            taken = low_pass_attenuation(thud.get_bands(bands).upper, rate)
-            np.testing.assert_allclose(low.contributions["filter"], taken / math.sqrt(3))
-            assert taken.max() < 0.005
-            assert not raw.contributions["filter"].any()
-    sine = np.sin(2 * np.pi * RECORDED_BAND * np.arange(4000) / 25600)
-    passed, _ = low_pass_force(sine, 25600.0)
-    # Zero phase, half the energy, at the band edge; 19 dB at 1.6 kHz, the paper's force plate.
-    np.testing.assert_allclose(passed[1000:3000], sine[1000:3000] / math.sqrt(2), atol=1e-6)
-    assert low_pass_attenuation(np.array([RECORDED_BAND, 1600.0]), 1e6) == pytest.approx(
-        [3.01, 19.10], abs=0.01
-    )
-    short, sentence = low_pass_force(sine, 2500.0)
-    assert short is sine
-    assert "2500 Hz" in sentence
 
 
 @pytest.mark.parametrize("bands", ["octave", "third"])
@@ -649,7 +623,7 @@ def test_level_budget_has_calibration_and_plate() -> None:
     levels = level_estimates(average, calibration=0.01, systematic={"plate": plate})
     names = [c.name for c in levels[0].contributions]
     assert names == [
-        "repeatability", "noise", "method", "filter", "offset step", "calibration", "plate",
+        "repeatability", "noise", "method", "offset step", "calibration", "plate",
     ]  # fmt: skip
     calibration = next(c for c in levels[0].contributions if c.name == "calibration")
     assert calibration.uncertainty == pytest.approx(20 * math.log10(1.01), rel=0.01)

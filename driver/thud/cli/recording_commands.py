@@ -62,7 +62,6 @@ def measure(options: argparse.Namespace) -> int:
         leave_out=_left_out(options) or None,
         begin=options.begin,
         end=options.end,
-        low_pass=options.low_pass or None,
         config=options.config,
         progress=shows_progress(quiet=options.quiet),
     )
@@ -74,7 +73,7 @@ def measure(options: argparse.Namespace) -> int:
         if len(rows) > MAX_PRINTED + 1:
             print_path(f"and {len(rows) - MAX_PRINTED - 1} more drops", folder / "report.json")
         print_results(f"\n{format_rows(recording_files.table(recording))}\n")
-        for step in (*recording_files.messages(recording, "steps"), *recording.level_steps):
+        for step in recording_files.messages(recording, "steps"):
             print_results(f"  {step}")
         print_results(f"  {recording_files.verdict_text(recording)}")
         excluded = recording_files.uncertainty_text(recording)
@@ -167,11 +166,6 @@ MEASURE = Command(
             "--from", dest="begin", type=number, metavar="S", help="begin of the searched section"
         ),
         argument("--to", dest="end", type=number, metavar="S", help="end of the searched section"),
-        argument(
-            "--low-pass",
-            action="store_true",
-            help="compute levels of the force low-passed at 1.25 kHz",
-        ),
         *output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
         NO_FIGURES,

@@ -82,7 +82,7 @@ def level_estimates(
     lacking = tuple(name for name in not_stated if name in LEVEL_CAUSES)
     count = len(levels.names)
     contributions = dict(levels.contributions)
-    rectangular = ("method", "filter", "offset step", *ASSUMED)
+    rectangular = ("method", "offset step", *ASSUMED)
     sizes: dict[str, dict[str, Any]] = {name: {"divisor": math.sqrt(3)} for name in rectangular}
     if count > 1:
         sizes[REPEATABILITY] = {"divisor": math.sqrt(count)}

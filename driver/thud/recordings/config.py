@@ -21,7 +21,6 @@ from thud.recordings.config_values import (
     to_choice,
     to_date,
     to_day,
-    to_flag,
     to_instance,
     to_limits,
     to_line,
@@ -291,8 +290,6 @@ class Config(Checked):
         Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
     begin, end : float or None
         Section of each file that is searched for drops, s.
-    low_pass : bool
-        Whether levels are those of the force below 1.25 kHz.
     limits : mapping
         Minimum and maximum by criterion, which replace those of the standards.
     report : ReportConfig
@@ -328,7 +325,6 @@ class Config(Checked):
     leave_out: Mapping[str, str] = field(default_factory=dict, metadata={"check": to_reasons})
     begin: float | None = _key(partial(to_number, 0.0, 1e9))
     end: float | None = _key(partial(to_number, 0.0, 1e9))
-    low_pass: bool = _key(to_flag, default=False)
     limits: Mapping[str, tuple[float, float]] = field(
         default_factory=dict, metadata={"check": to_limits}
     )

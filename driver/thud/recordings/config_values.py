@@ -76,13 +76,6 @@ def to_choice(choices: Mapping[str, object] | tuple[str, ...], value: object, ke
     return str(value)
 
 
-def to_flag(value: object, key: str) -> bool:
-    """Return true or false."""
-    if not isinstance(value, bool):
-        refuse(f"{key} = {shown(value)} is not allowed", "true or false")
-    return value
-
-
 def to_channel(value: object, key: str) -> int | str:
     """Return the number or the name of a channel."""
     is_number = isinstance(value, int) and not isinstance(value, bool)

@@ -1,4 +1,4 @@
-"""Band filters of class 1 (IEC 61260-1), levels by them, and the paper's low-pass at 1.25 kHz."""
+"""Band filters of class 1 (IEC 61260-1), and levels by them."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import butter, resample, sosfilt, sosfiltfilt, zpk2sos
+from scipy.signal import butter, resample, sosfilt, zpk2sos
 
 from thud.base.checks import refuse, require_array, require_number, require_real
-from thud.level.levels import RECORDED_BAND, get_bands
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -26,10 +26,6 @@ MIN_RATIO = 4.0
 # Maximum fraction of the energy of a filter's decay that the padding cuts off: 4e-7 dB if the band
 # holds as much energy as the decay.
 MAX_CUT = 1e-7
-# Order of the Butterworth low-pass, which is applied forwards and backwards.
-LOW_PASS_ORDER = 6
-# Ratio of removed to remaining energy at the band edge in each run; both runs leave one half.
-RUN_LOSS = math.sqrt(2) - 1
 
 
 def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
@@ -101,42 +97,3 @@ def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], N
         # After n samples the energy of the decay is at most radius**(2 n).
         ringing[band] = math.ceil(math.log(MAX_CUT) / (2 * math.log(radius)))
     return sections, ringing
-
-
-def low_pass_force(
-    force: NDArray[np.float64], sample_rate: float
-) -> tuple[NDArray[np.float64], str]:
-    """Return a force low-passed at 1.25 kHz, N, shape (n_sample,), without delay, and a note.
-
-    A Butterworth filter of order 6 is applied forwards and backwards; both runs together are
-    3.01 dB down at 1.25 kHz. If the sample rate, Hz, is at most 2.5 kHz, the force is unchanged.
-    """
-    if sample_rate <= 2 * RECORDED_BAND:
-        return force, describe_low_pass(sample_rate)
-    # Both runs divide the energy by (1 + (t / t_corner)**12)**2, t = tan(pi f / rate): by 2 at the
-    # band edge.
-    edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
-    corner = sample_rate / math.pi * math.atan(edge / RUN_LOSS ** (1 / (2 * LOW_PASS_ORDER)))
-    sections = butter(LOW_PASS_ORDER, corner, fs=sample_rate, output="sos")
-    margin = min(len(force) - 1, math.ceil(10 * sample_rate / RECORDED_BAND))
-    filtered: NDArray[np.float64] = sosfiltfilt(sections, force, padlen=max(margin, 0))
-    return filtered, describe_low_pass(sample_rate)
-
-
-def describe_low_pass(sample_rate: float) -> str:
-    """Describe the filter of `low_pass_force` at a sample rate, Hz."""
-    if sample_rate <= 2 * RECORDED_BAND:
-        return f"no low-pass at 1.25 kHz: the sample rate, {sample_rate:g} Hz, is one"
-    return (
-        f"low-pass, -3 dB at 1.25 kHz: Butterworth of order {LOW_PASS_ORDER}, forwards and "
-        "backwards (no delay)"
-    )
-
-
-def low_pass_attenuation(frequency: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
-    """Return the attenuation of the low-pass, dB; zero if it is not applied."""
-    if sample_rate <= 2 * RECORDED_BAND:
-        return np.zeros(frequency.shape)
-    edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
-    ratio = np.tan(np.pi * np.minimum(frequency / sample_rate, 0.5)) / edge
-    return np.asarray(20 * np.log10(1 + RUN_LOSS * ratio ** (2 * LOW_PASS_ORDER)))

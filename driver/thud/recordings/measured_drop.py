@@ -139,15 +139,13 @@ class Drop(Immutable):
         """Time since first touch, s, shape (n,)."""
         return np.asarray(self.begin + np.arange(len(self.force)) / self.sample_rate)
 
-    def levels(
-        self, bands: BandSet = "octave", method: str = "exact", *, low_pass: bool = False
-    ) -> NDArray[np.float64]:
+    def levels(self, bands: BandSet = "octave", method: str = "exact") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
 
         The arguments are those of `thud.recordings.recorded_levels.measure_levels`, which has their
         uncertainties too.
         """
-        return measure_levels([self], bands, method, low_pass=low_pass)[0].level.copy()
+        return measure_levels([self], bands, method)[0].level.copy()
 
 
 def measure_drop(window: Window, conditions: DropConditions) -> Drop:

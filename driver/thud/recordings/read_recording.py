@@ -37,7 +37,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     leave_out: Mapping[str, str] | None = None,
     begin: float | None = None,
     end: float | None = None,
-    low_pass: bool | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> Recording:
@@ -65,8 +64,6 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
     begin, end
         Section of each file that is searched for drops, s.
-    low_pass
-        Whether levels are those of the force below 1.25 kHz, as in the paper.
     config
         Configuration of the laboratory, or its file; other arguments override it.
     progress
@@ -87,7 +84,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel,
         "channels": channels, "unit": unit,
         "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
-        "polarity": polarity, "sample_rate": sample_rate, "low_pass": low_pass,
+        "polarity": polarity, "sample_rate": sample_rate,
         "drops": drops, "leave_out": leave_out, "begin": begin, "end": end,
     }  # fmt: skip
     stated = {key: value for key, value in stated.items() if value is not None}

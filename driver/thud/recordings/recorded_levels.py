@@ -16,7 +16,7 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
-from thud.recordings.filters import filter_levels, low_pass_attenuation, low_pass_force
+from thud.recordings.filters import filter_levels
 from thud.recordings.offset_step import step_errors
 from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
 
@@ -32,9 +32,6 @@ METHODS = ("exact", "fft", "filter")
 # Levels above background, dB: below the first value a level is an upper bound, below the second the
 # standards require the correction (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
-# Length of zeros on either side of the gate for the response of the low-pass, s. The truncation of
-# the response changes an octave by up to 2e-4 dB at sample rates of 8 kHz or more, else 3e-3 dB.
-MARGIN = 3e-3
 # Change of a level per relative change of an energy, dB.
 ENERGY_DECIBEL = 10 / math.log(10)
 # Length of a mean force in gates, and number of times that it is scaled to its levels: they then
@@ -123,32 +120,26 @@ class AverageLevels(Immutable):
 
 
 def measure_levels(
-    drops: Sequence[Drop],
-    bands: BandSet = "octave",
-    method: str = "exact",
-    *,
-    low_pass: bool = False,
+    drops: Sequence[Drop], bands: BandSet = "octave", method: str = "exact"
 ) -> list[DropLevels]:
     """Return the levels of drops, corrected for the background, with their uncertainty.
 
     The force is set to zero outside the gate of each drop. ``"exact"`` is its band energy,
     ``"fft"`` the sum over the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters
-    of class 1. With `low_pass` the force is low-passed at 1.25 kHz first, as in the paper. The
-    expected energy of the noise is subtracted. Raise InputError if method or bands are unknown.
+    of class 1. The expected energy of the noise is subtracted. Raise InputError if method or bands
+    are unknown.
     """
     require_choice("method", method, METHODS)
     noise = band_noise(drops, get_bands(bands))
     return [
-        _drop_levels(drop, bands, method, energies, low_pass=low_pass)
+        _drop_levels(drop, bands, method, energies)
         for drop, energies in zip(drops, noise, strict=True)
     ]
 
 
-def _drop_levels(
-    drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64], *, low_pass: bool
-) -> DropLevels:
+def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64]) -> DropLevels:
     """Return the levels of a drop from the energies of its noise, [n_band, 3]."""
-    force, steps = _gated(drop, low_pass=low_pass)
+    force, gate = _gated(drop)
     rate, edges = drop.sample_rate, get_bands(bands)
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
@@ -159,12 +150,11 @@ def _drop_levels(
     contributions = {
         "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         "method": np.abs(measured - exact) / math.sqrt(3),
-        "filter": low_pass_attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
         "offset step": _step_uncertainty(drop, bands),
     }
     if offset.any():
         contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
-    steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
+    steps = (gate, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return DropLevels(
         drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
         contributions, steps,
@@ -184,11 +174,9 @@ def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
     return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / math.sqrt(3))
 
 
-def compare_methods(
-    drop: Drop, bands: BandSet = "octave", *, low_pass: bool = False
-) -> dict[str, NDArray[np.float64]]:
+def compare_methods(drop: Drop, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
     """Return the levels of a drop by each method, dB, shape (n_band,), background included."""
-    force, _ = _gated(drop, low_pass=low_pass)
+    force, _ = _gated(drop)
     return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
 
 
@@ -282,17 +270,12 @@ _DESCRIPTIONS = {
 }
 
 
-def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the force within the gate, padded with zeros if low-passed, and notes."""
+def _gated(drop: Drop) -> tuple[NDArray[np.float64], str]:
+    """Return the force within the gate, and a note on it."""
     first, stop = drop.gate
-    force = drop.force[first:stop]
     begin, end = 1e3 * drop.time[[first, stop - 1]]
-    steps = [f"gate: {begin:.1f} to {end:.1f} ms after first touch, zero outside"]
-    if low_pass:
-        force = np.pad(force, math.ceil(MARGIN * drop.sample_rate))
-        force, note = low_pass_force(force, drop.sample_rate)
-        steps.append(note)
-    return force, tuple(steps)
+    note = f"gate: {begin:.1f} to {end:.1f} ms after first touch, zero outside"
+    return drop.force[first:stop], note
 
 
 def _levels(

@@ -19,7 +19,6 @@ from thud.level.impact_result import DropForce
 from thud.recordings.assumptions import assumed_contributions, assumption_warnings
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
 from thud.recordings.config import Config
-from thud.recordings.filters import describe_low_pass
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.polarity import check_peak, scan
@@ -295,16 +294,7 @@ class Recording(Displayed):
         """Processing of the signals, a sentence each."""
         result = [f"{origin.name}: {step}" for origin in self.origins for step in origin.steps]
         result += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
-        result += self.level_steps
         return tuple(dict.fromkeys(result))
-
-    @property
-    def level_steps(self) -> tuple[str, ...]:
-        """Processing of the forces before their levels were measured, a sentence each."""
-        if not self.config.low_pass:
-            return ()
-        rates = dict.fromkeys(drop.sample_rate for drop in self.drops)
-        return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
     def quantity(self, name: str) -> float:
         """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
@@ -331,7 +321,7 @@ class Recording(Displayed):
     def average(self, bands: BandSet = "octave", method: str = "exact") -> AverageLevels:
         """Return the energy average of the levels by ``"exact"``, ``"fft"`` or ``"filter"``."""
         if (bands, method) not in self._averages:
-            levels = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
+            levels = measure_levels(self.drops, bands, method)
             self._averages[bands, method] = average_levels(levels)
         return self._averages[bands, method]
 
@@ -346,8 +336,7 @@ class Recording(Displayed):
 
     def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
         """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
-        low_pass = self.config.low_pass
-        levels = [compare_methods(drop, bands, low_pass=low_pass) for drop in self.drops]
+        levels = [compare_methods(drop, bands) for drop in self.drops]
         return {
             method: np.max([np.abs(entry[method] - entry["exact"]) for entry in levels], axis=0)
             for method in levels[0]

@@ -92,7 +92,6 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         },
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [vars(check) for check in config.plate_checks],
-        "steps": list(recording.level_steps),
         "warnings": list(recording.own_warnings),
         "outliers": [{**vars(outlier), "message": str(outlier)} for outlier in recording.outliers],
         "without_outliers": _without_outliers(recording),

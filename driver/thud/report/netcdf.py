@@ -94,7 +94,7 @@ def _attributes(data: dict[str, Any]) -> dict[str, Any]:
         kind: "\n".join(
             dict.fromkeys(
                 [
-                    *data[kind],
+                    *data.get(kind, ()),
                     *(
                         f"{entry['name']}: {message}"
                         for key in ("files", "drops")

@@ -106,7 +106,7 @@ def report_page(
         budget_rule=escaped(_budget_rule(data)),
         drops=notes("Drops and methods", _drops_and_methods(data)),
         properties=notes("Properties of the ball, as stated", _properties(data["properties"])),
-        processing=notes("Signal processing", _messages(data, "steps") or ["nothing"]),
+        processing=notes("Signal processing", _grouped(data, "steps") or ["nothing"]),
         warnings=notes("Warnings", _warnings(data) or ["none"]),
         files=_files(data["files"]),
         statement=escaped(
@@ -450,10 +450,6 @@ def _outliers(data: dict[str, Any]) -> list[str]:
 def _warnings(data: dict[str, Any]) -> list[str]:
     outliers = [outlier["message"] for outlier in data["outliers"]]
     return [*data["warnings"], *outliers, *_grouped(data, "warnings")]
-
-
-def _messages(data: dict[str, Any], kind: str) -> list[str]:
-    return [*data[kind], *_grouped(data, kind)]
 
 
 def _grouped(data: dict[str, Any], kind: str) -> list[str]:
