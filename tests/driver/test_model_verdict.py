@@ -355,14 +355,6 @@ def test_bundled_surrogate_has_its_stated_error() -> None:
     assert relative.max() < 5
 
 
-@pytest.mark.slow
-def test_bundled_surrogate_has_its_stated_error_at_many_points() -> None:
-    count = 40
-    relative = errors_at_random_points(count, 2)
-    # 95 % less three standard deviations of a fraction.
-    assert ((relative <= 1).mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)).all()
-
-
 def test_bundled_surrogate_is_small_and_belongs_to_its_study() -> None:
     path = Path(bundled_surrogate.__file__).with_name(FILE)
     assert path.stat().st_size <= 1e6
