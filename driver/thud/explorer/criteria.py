@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import RATINGS
@@ -14,7 +13,7 @@ from thud.explorer.messages import lower
 from thud.level.assessment import VERDICTS
 from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
-from thud.studies.bundled_surrogate import reason_without_defaults
+from thud.studies.bundled_surrogate import range_without_defaults
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -157,13 +156,12 @@ def _without_ranges(case: Case) -> str:
     )
     if case.unknowns:
         return f"{text}; thud-driver assess counts the stated unknowns."
-    outside = re.fullmatch(
-        r"(\w+) = \S+, allowed: (\S+) <= \w+ <= (\S+)", reason_without_defaults(case)
-    )
+    outside = range_without_defaults(case)
     if outside is None:
         return f"{text}."
-    field = next(item for (_, name), item in fields_by_key().items() if name == outside[1])
-    low, high = (f"{scaled(float(end), -field['power']):g}" for end in outside.groups()[1:])
+    key, *limits = outside
+    field = next(item for (_, name), item in fields_by_key().items() if name == key)
+    low, high = (f"{scaled(end, -field['power']):g}" for end in limits)
     ends = f"{low} to {high} {field['unit']}".rstrip()
     return f"{text}; its ranges are known for {lower(field['label'])} {ends}."
 
@@ -176,11 +174,11 @@ def _label(key: str) -> str:
 
 def unknowns_text(ranges: ModelVerdict) -> str:
     """Return the ranges of the unknowns of a verdict, such as ``"friction 0 to 1"``."""
-    _, *rows = ranges.unknown_rows()
     parts = []
-    for entry, (label, low, high, *_) in zip(ranges.unknowns, rows, strict=True):
-        unit = label.partition(", ")[2]
-        parts.append(f"{_label(entry.key)} {low} to {high} {unit}".rstrip())
+    for entry in ranges.unknowns:
+        unit, size = entry.shown_unit
+        text = f"{_label(entry.key)} {entry.low / size:g} to {entry.high / size:g} {unit}"
+        parts.append(text.rstrip())
     return ", ".join(parts)
 
 

@@ -55,11 +55,45 @@ def reason_without_defaults(case: Case) -> str:
     return ""
 
 
+def range_without_defaults(case: Case) -> tuple[str, float, float] | None:
+    """Return key and range of a value for which the default unknowns do not hold, if any."""
+    try:
+        return _outside(_as_trained(case, STANDARD_BALL), STANDARD_BALL)
+    except InputError:
+        return None
+
+
 def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
+    """Return `_as_trained`; raise InputError with the key that the surrogate does not cover."""
+    result = _as_trained(case, unknowns)
+    ranges = {u.key: (u.low, u.high) for u in unknowns}
+    surrogate = bundled_surrogate()
+    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
+        low, high = ranges.get(name, region)
+        if not region[0] <= low <= high <= region[1]:
+            refuse(f"{name} = {low:g} to {high:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
+    if outside := _outside(result, unknowns):
+        name, low, high = outside
+        refuse(f"{name} = {value_in(result, name):g}", f"{low:g} <= {name} <= {high:g}")
+    return result
+
+
+def _outside(case: Case, unknowns: tuple[Unknown, ...]) -> tuple[str, float, float] | None:
+    """Return the first key whose value lies outside of its range, and the range."""
+    ranges = {u.key: (u.low, u.high) for u in unknowns}
+    surrogate = bundled_surrogate()
+    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
+        value, (low, high) = value_in(case, name), ranges.get(name, region)
+        if not (isinstance(value, float | int) and low <= value <= high):
+            return name, low, high
+    return None
+
+
+def _as_trained(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
     """Return the drop of a case on a rigid floor as the bundled surrogate predicts it.
 
     Mesh, sampling and bands of the surrogate replace those of the case: they affect the numerical
-    error only. Raises InputError with the key that the surrogate does not cover.
+    error only. Raises InputError if the surrogate does not predict such a case.
     """
     surrogate = bundled_surrogate()
     result = blocked_case(case, unknowns)
@@ -79,12 +113,4 @@ def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
         sampling=surrogate.case.sampling,
     )
     surrogate.require(result, [entry.key for entry in unknowns])
-    ranges = {u.key: (u.low, u.high) for u in unknowns}
-    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
-        value = value_in(result, name)
-        low, high = ranges.get(name, region)
-        if not region[0] <= low <= high <= region[1]:
-            refuse(f"{name} = {low:g} to {high:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
-        if not (isinstance(value, float | int) and low <= value <= high):
-            refuse(f"{name} = {value:g}", f"{low:g} <= {name} <= {high:g}")
     return result

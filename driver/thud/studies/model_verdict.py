@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from thud.base._schema import KEYS
 from thud.base.display import Displayed
 from thud.base.tables import csv_text, format_rows
-from thud.base.units import display_unit
 from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
@@ -216,8 +214,7 @@ class ModelVerdict(Displayed):
         """Return header and rows of text: the unknowns."""
         rows: list[tuple[str, ...]] = [("not known", "low", "high", "standard deviation", "reason")]
         for entry in self.unknowns:
-            unit = next((key.unit for key in KEYS if key.name == entry.key), "")
-            unit, size = display_unit(unit, max(abs(entry.low), abs(entry.high)))
+            unit, size = entry.shown_unit
             low, high = (f"{end / size:g}" for end in (entry.low, entry.high))
             deviation = entry.standard_deviation / size
             label = f"{entry.key}, {unit}".removesuffix(", ")

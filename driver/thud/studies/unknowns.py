@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import FiniteElement
+from thud.base._schema import KEYS, FiniteElement
 from thud.base.checks import refuse
+from thud.base.units import display_unit
 from thud.case.case import impact_only
 
 if TYPE_CHECKING:
@@ -44,6 +45,12 @@ class Unknown:
     high: float
     standard_deviation: float
     reason: str
+
+    @property
+    def shown_unit(self) -> tuple[str, float]:
+        """Unit in which the range is shown, and its size."""
+        unit = next((key.unit for key in KEYS if key.name == self.key), "")
+        return display_unit(unit, max(abs(self.low), abs(self.high)))
 
     def quantiles(self, fraction: NDArray[np.float64], value: float) -> NDArray[np.float64]:
         """Return the values below which fractions of all values lie; `value` is of the case."""

@@ -29,6 +29,7 @@ from thud.studies.fitting.inference import (
     worst_directions,
 )
 from thud.studies.fitting.objective import Effects, Objective, new_terms
+from thud.studies.sampling import unit_samples
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -98,7 +99,8 @@ def _starts(ranges: list[Range], count: int, seed: int) -> Iterator[Array]:
     first = np.array([entry.start / entry.scale for entry in ranges])
     yield first
     low, high = np.array([np.array(entry.spread) / entry.scale for entry in ranges]).T
-    for x in stats.qmc.LatinHypercube(len(ranges), rng=seed).random(count - 1):
+    shape = len(ranges), count - 1
+    for x in unit_samples("latin_hypercube", *shape, seed, 0, count - 1):
         yield low + x * (high - low)
 
 
