@@ -287,6 +287,7 @@ def test_ordinary_layouts_are_read_with_their_units(
     [
         ("Time [s];F1 [N];F2 [N]", "{t};{f}", naming("line 1", "3 titles", "2 columns")),
         ("Time;F1", "{t};{f};{f}", naming("line 1", "2 titles", "3 columns")),
+        ("t, sec   State   a, V   F1, N   F9 [lbf]", "{t},,{f},{f}", naming("line 1")),
         ("# Force [lbf]", "{t};{f}", naming("line 1", "1 title", "2 columns")),
         ("# force in lbf", "{t} {f}", naming("line 1", "2 columns")),
         ("Time [s];Force [stone]", "{t};{f}", naming("'stone'", "kN")),

@@ -68,6 +68,8 @@ PAIR = re.compile(r"[:=\t;,]")
 MAX_TITLES = 3
 # A title with the number of its column, such as "Column 2: Force [N]".
 NUMBERED = re.compile(r"(?:column|col\.?|spalte|열|列)\s*(\d{1,3})\s*[:=]\s*(\S.*)", re.IGNORECASE)
+# What separates titles that hold commas: tabs, semicolons, or blanks between words.
+OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
 # A number behind a name.
 VALUE = re.compile(r"[:=]\s*[-+]?\d")
 DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
@@ -464,7 +466,7 @@ def _splits(text: str, layout: _Layout) -> Iterator[list[str]]:
     """Yield the cells of a line of titles by the separator of the numbers, and by others."""
     separator = layout.separator
     for mark in dict.fromkeys((separator, "\t", ";", ",")):
-        if mark and mark in text and not (mark == "," and re.search("[\t;]", text)):
+        if mark and mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
             cells = split_line(text, mark)
             # The commas of "Time, s" do not separate titles.
             loose = text.split(", ")[1:] if separator == "," else cells
