@@ -287,6 +287,7 @@ def test_ordinary_layouts_are_read_with_their_units(
     [
         ("Time [s];F1 [N];F2 [N]", "{t};{f}", naming("line 1", "3 titles", "2 columns")),
         ("Time;F1", "{t};{f};{f}", naming("line 1", "2 titles", "3 columns")),
+        ("t, sec   State   a, V   F1, N   F9 [lbf]", "{t},,{f},{f}", naming("line 1")),
         ("# Force [lbf]", "{t};{f}", naming("line 1", "1 title", "2 columns")),
         ("# force in lbf", "{t} {f}", naming("line 1", "2 columns")),
         ("Time [s];Force [stone]", "{t};{f}", naming("'stone'", "kN")),
@@ -295,6 +296,7 @@ def test_ordinary_layouts_are_read_with_their_units(
         ("Time;Force [kN]", "{t};{f} N", naming("column 2", "kN", "N")),
         ("Unit: kN\nTime;Force [N]", "{t};{f}", naming("column 2", "kN", "N")),
         ("Y_Unit_Label;N;N;m/s2\nTime;F1;F2", "{t};{f};{f}", naming("column 1, 'Time'", "'N'")),
+        ("x,State,F1 [N]\n,start,0.00", ",,{f}", naming("line 2", "'start'")),
         ("Column 3: Force [lbf]", "{t};{f}", naming("column 3", 2)),
         ("Time [s];Force [lbf]\nTime [s];Force [N]", "{t};{f}", naming("line 1", "second line")),
     ],

@@ -68,6 +68,8 @@ PAIR = re.compile(r"[:=\t;,]")
 MAX_TITLES = 3
 # A title with the number of its column, such as "Column 2: Force [N]".
 NUMBERED = re.compile(r"(?:column|col\.?|spalte|열|列)\s*(\d{1,3})\s*[:=]\s*(\S.*)", re.IGNORECASE)
+# What separates titles that hold commas: tabs, semicolons, or blanks between words.
+OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
 # A number behind a name.
 VALUE = re.compile(r"[:=]\s*[-+]?\d")
 DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
@@ -464,7 +466,7 @@ def _splits(text: str, layout: _Layout) -> Iterator[list[str]]:
     """Yield the cells of a line of titles by the separator of the numbers, and by others."""
     separator = layout.separator
     for mark in dict.fromkeys((separator, "\t", ";", ",")):
-        if mark and mark in text and not (mark == "," and re.search("[\t;]", text)):
+        if mark and mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
             cells = split_line(text, mark)
             # The commas of "Time, s" do not separate titles.
             loose = text.split(", ")[1:] if separator == "," else cells
@@ -505,12 +507,13 @@ def _read_other(line: str, number: int, layout: _Layout, *, is_last: bool, is_op
     text = _uncommented(line)
     is_comment = line[:1] in tuple(COMMENTS)
     row = [] if is_comment else _trimmed(layout.cells(line))
-    if len(row) == layout.width and row[0] and not layout.has_commas:
-        is_row = not any(map(str.isalpha, row[0])) and any(map(is_number, row))
+    if len(row) == layout.width and not layout.has_commas:
+        first = next(filter(None, row))
+        is_row = not any(map(str.isalpha, first)) and any(map(is_number, row))
         # A word may stand in front of the numbers of the first row.
         is_row |= number == layout.first - 1 and all(is_number(row[i]) for i in layout.used)
-        if is_row or is_number(row[0]):
-            wrong = next(cell for cell in row if not is_number(cell))
+        if is_row or is_number(first):
+            wrong = next(cell for cell in row if cell and not is_number(cell))
             layout.refuse(number, f"{shown_text(wrong)!r} is not a number")
     pieces = [piece.strip() for piece in re.split(r"[\t;,]", text)]
     has_number = any(is_number(_value(piece)[0]) for piece in pieces)
