@@ -48,7 +48,8 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', options%length, 'm', 'length of the floor, along the grain of the first layer', '[0.5, 100]'), &
+         real_field('length', options%length, 'm', 'length of the floor, along the grain of the first layer', &
+         '[0.5, 100]'), &
          real_field('width', options%width, 'm', 'width of the floor', '[0.5, 100]'), &
          list_field('layer_thickness', options%layer_thickness, 'm', &
          'thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &

@@ -13,7 +13,8 @@ module thud_screed
    !> Poisson's ratio of plates; it affects only edges that are not held.
    real(wp), parameter :: poisson = 0.2_wp
 
-   !> The floating plate, simply supported; no thickness means none. The other defaults are those of a cement screed on mineral wool.
+   !> The floating plate, simply supported; no thickness means none. The other defaults are those of a cement screed on
+   !> mineral wool.
    type :: screed_type
       !> Thickness, m; density, kg/m3; longitudinal wave speed, m/s; loss factor.
       real(wp) :: thickness = 0.0_wp, density = 2000.0_wp, wave_speed = 3500.0_wp, loss_factor = 0.03_wp
