@@ -158,8 +158,8 @@ contains
                   //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --verbose, --keys, --schema, ' &
                   //'--help, --version')
             else if (allocated(request%case_file)) then
-               error = input_error(quoted(argument)//' is a second case; allowed: one; thud-driver has commands, as run ' &
-                  //'and predict')
+               error = input_error(quoted(argument)//' is a second case; allowed: one (commands such as run ' &
+                  //'and predict belong to thud-driver)')
             else
                request%case_file = argument
             end if

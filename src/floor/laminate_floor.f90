@@ -19,7 +19,7 @@ module thud_laminate_floor
 
    !> The floor; the defaults are five layers of spruce (strength class C24).
    type, extends(rectangular_floor_type) :: laminate_floor_type
-      !> Length, along the grain of the outer layers, and width, m.
+      !> Length, along the grain of the first layer, and width, m.
       real(wp) :: length = 5.0_wp, width = 4.0_wp
       !> Thicknesses of the layers from the top, which alternate in direction, m; an empty list is the default.
       type(list_type) :: layer_thickness

@@ -93,8 +93,10 @@ contains
       if (.not. self%replace .and. (command /= self%command .or. subject /= self%subject)) then
          holds = 'files of something else'
          if (command /= '') holds = 'results of '//trim(command//' '//subject)
-         error = input_error(self%path//' holds '//holds//'; allowed: a new or empty directory, results of ' &
-            //trim(self%command//' '//self%subject)//', or --replace (replace=True)')
+         error = input_error(self%path//' holds '//holds//'; allowed: a new or empty directory, or results of ' &
+            //trim(self%command//' '//self%subject))
+         ! Other commands write other files, which are never removed.
+         if (command == self%command) error%message = error%message//'; with --replace (replace=True) others of '//command
          return
       end if
       if (command /= self%command) listed = listed(:0)

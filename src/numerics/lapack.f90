@@ -5,7 +5,7 @@ module thud_lapack
    private
 
    public :: dgbsv, dgeev, dgels, dgemm, dgetf2, dgetrs, dposv, dpotrf, dstevr
-   public :: dsygv, dsygvd, dsygvx, dtrsm, zgeev
+   public :: dsygvd, dsygvx, dtrsm, zgeev
 
    interface
       !> Eigenvalues of a general matrix.
@@ -18,17 +18,6 @@ module thud_lapack
          real(wp), intent(out) :: wr(*), wi(*), vl(ldvl, *), vr(ldvr, *), work(*)
          integer, intent(out) :: info
       end subroutine dgeev
-
-      !> Generalized symmetric eigenproblem.
-      pure subroutine dsygv(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, info)
-         import :: wp
-         implicit none (type, external)
-         integer, intent(in) :: itype, n, lda, ldb, lwork
-         character(len=1), intent(in) :: jobz, uplo
-         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
-         real(wp), intent(out) :: w(*), work(*)
-         integer, intent(out) :: info
-      end subroutine dsygv
 
       !> Generalized symmetric eigenproblem, by divide and conquer.
       pure subroutine dsygvd(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, iwork, liwork, info)

@@ -102,6 +102,21 @@ def test_reduced_step_of_an_unstable_run_is_stated() -> None:
     assert quantities["reduced_step_safety"] == pytest.approx(0.49)
 
 
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_run_that_breaks_down_by_its_step_is_repeated() -> None:
+    """It ended with a surface too deep in the layer, though half the step computes it."""
+    ball = thud.Ball(
+        outer_radius=0.0905, wall_thickness=0.01138, mass=1.2264, youngs_modulus=686214.0
+    )
+    options = {"radial_elements": 3, "polar_elements": 32, "layer_stiffness": 1.2e10}
+    material = {"viscosity": "constant_loss", "loss_factor": 0.1, "law": "mooney_rivlin"}
+    impact = thud.solve(
+        ball, thud.Drop(height=10.79), "finite_element", duration=0.3, **options, **material
+    )
+    assert impact.model_quantities["reduced_step_safety"] < 0.85
+    assert impact.energy_residual < 5e-3
+
+
 VERIFIED = {
     "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
     "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 800.0},
@@ -248,7 +263,7 @@ def slipping(
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_stick_and_slip_raises_the_stated_error() -> None:
     """Meshes that are too coarse for it agree with each other."""
-    least = np.array([0.05, 0.15, 0.35, 2.0, 2.0]) * 64 / 24
+    least = np.array([0.05, 0.2, 0.4, 2.0, 2.0]) * 64 / 24
     for friction in (0.4, 0.9):
         assert (slipping(friction).numerical_error.level >= least).all()
     for friction in (0.0, 0.3, 1.0):

@@ -128,8 +128,6 @@ def test_method_is_a_contribution_of_the_others_only() -> None:
         (found,) = measure_levels([make_drop()], method=method)
         expected = np.abs(found.measured - measure_levels([make_drop()])[0].level) / math.sqrt(3)
         np.testing.assert_allclose(found.contributions["method"], expected)
-        assert found.steps[-1].startswith("levels: ")
-        assert method in found.steps[-1]
     assert not measure_levels([make_drop()])[0].contributions["method"].any()
 
 
@@ -255,7 +253,6 @@ def test_background_is_flagged_and_corrected_as_the_standards_say() -> None:
         correction = -10 * math.log10(1 - 10 ** (-max(above, 6.0) / 10))
         # Above 15 dB too: the expected energy of the noise is in what is measured.
         assert found.measured[3] - found.level[3] == pytest.approx(correction, abs=0.003)
-        assert any("250" in step for step in found.steps) == bool(flag)
 
 
 def test_unknown_method_is_refused() -> None:
@@ -551,7 +548,7 @@ def level_estimate(level: float, background: float, noise: float, method: float)
     one = np.array([level])
     return DropLevels(
         "drop", "octave", "fft", one - 0.01, one, one, np.array([background]), np.array([""]),
-        parts, (),
+        parts,
     )  # fmt: skip
 
 

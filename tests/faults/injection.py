@@ -11,7 +11,6 @@ from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
 
-KILLS = ("kill", "term", "int")
 ERRORS = tuple(str(number) for number in (errno.ENOSPC, errno.EIO, errno.EINTR, errno.EMFILE))
 # Seconds that a run may take.
 PATIENCE = 60

@@ -429,7 +429,7 @@ class FiniteElement(Group):
     flight_after : float
         Duration of free flight after the last contact, s; 0 <= flight_after <= 10.
     step_safety : float
-        Time step divided by the stability limit; 0.01 <= step_safety <= 0.98.
+        Time step divided by a bound on stable steps; 0.01 <= step_safety <= 0.98.
     radial_elements : int
         Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
         ``&mesh``.
@@ -1222,7 +1222,7 @@ KEYS = (
     Key("finite_element", "finite_element", "bounces", "whole", "", "number of contacts to compute", (), 1.0, 100.0, True),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "duration of free flight before first touch", (), 0.0, 1.0),
     Key("finite_element", "finite_element", "flight_after", "real", "s", "duration of free flight after the last contact", (), 0.0, 10.0),
-    Key("finite_element", "finite_element", "step_safety", "real", "", "time step divided by the stability limit", (), 0.01, 0.98),
+    Key("finite_element", "finite_element", "step_safety", "real", "", "time step divided by a bound on stable steps", (), 0.01, 0.98),
     Key("finite_element", "mesh", "radial_elements", "whole", "", "number of elements through the wall; 0: automatic", (), 0.0, 64.0, True),
     Key("finite_element", "mesh", "polar_elements", "whole", "", "number of elements from pole to pole, from 8; 0: automatic", (), 0.0, 1024.0, True),
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),

@@ -110,7 +110,7 @@ class Results:
     inputs : tuple of path-like
         Files that the results depend on, never replaced.
     replace : bool
-        Also replace results of another subject or command.
+        Also replace results of another subject.
     """
 
     folder: Path

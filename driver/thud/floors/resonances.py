@@ -15,8 +15,8 @@ def resonances(prediction: RoomPrediction) -> dict[str, float]:
     """Return the resonance of each light plate on the bearing floor, Hz, by its name.
 
     Each is that of two masses per unit area on the stiffness of what is between them: the resilient
-    layer, or the air of the cavity with the lines that hold a subceiling. Bending, edges and
-    bridges are neglected, and so are further plates.
+    layer, or the air of the cavity with the lines that hold a subceiling. Bending, edges
+    and further plates are neglected.
     """
     floor, room = prediction.floor, prediction.room
     # Stiffness per unit area of a cavity of 1 m, N/m2.

@@ -70,10 +70,10 @@ SPIKE_MARGIN = 0.12
 CONTACT_MARGIN = 3e-3
 # Minimum number of different values of a contact over the period of a bit that may be missing.
 MIN_VISITS = 4
-# Samples are held, filled or gated where they deviate from a cubic for MIN_BACKGROUND by less than
-# this fraction of the noise: by chance so does one of 10 000. A background that is so to this
-# fraction is no dropout.
+# Samples are held, filled or gated if they deviate from a cubic for MIN_BACKGROUND by less than
+# this fraction of the noise; one of 10 000 does so by chance.
 MAX_QUIET = 1e-4
+# Fraction of the background outside the contact from which constant samples are a gate, not a loss.
 MAX_CONSTANT = 0.5
 # Value and slope are compared between the lines through the samples of this time, s, or four at
 # least, on either side. Its curvature changes the slope of a force of 600 Hz by less than that of

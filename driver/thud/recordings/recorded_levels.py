@@ -60,10 +60,8 @@ class DropLevels(Immutable):
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties, dB: noise, method, filter, offset step, and quantization if the
-        background lies within a step.
-    steps : tuple of str
-        Processing, a sentence each.
+        Standard uncertainties, dB: noise, method, offset step, and quantization if the background
+        lies within a step.
     """
 
     name: str
@@ -75,7 +73,6 @@ class DropLevels(Immutable):
     background: NDArray[np.float64]
     flag: NDArray[np.str_]
     contributions: dict[str, NDArray[np.float64]]
-    steps: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +136,7 @@ def measure_levels(
 
 def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64]) -> DropLevels:
     """Return the levels of a drop from the energies of its noise, [n_band, 3]."""
-    force, gate = _gated(drop)
-    rate, edges = drop.sample_rate, get_bands(bands)
+    force, rate = drop.force[slice(*drop.gate)], drop.sample_rate
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
     expected, deviation, offset = noise.T
@@ -154,10 +150,9 @@ def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.floa
     }
     if offset.any():
         contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
-    steps = (gate, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return DropLevels(
         drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
-        contributions, steps,
+        contributions,
     )  # fmt: skip
 
 
@@ -176,7 +171,7 @@ def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
 
 def compare_methods(drop: Drop, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
     """Return the levels of a drop by each method, dB, shape (n_band,), background included."""
-    force, _ = _gated(drop)
+    force = drop.force[slice(*drop.gate)]
     return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
 
 
@@ -262,22 +257,6 @@ def noise_exceeds(scatter: ArrayLike, noise: ArrayLike, count: int) -> NDArray[n
     )
 
 
-_DESCRIPTIONS = {
-    "exact": "band energy of the force within the gate (exact)",
-    "fft": "1 Hz bins of a rectangular window of 1 s, zero outside the gate (fft)",
-    "filter": "Butterworth filters of class 1 of IEC 61260-1, the gated force padded until they "
-    "have decayed (filter)",
-}
-
-
-def _gated(drop: Drop) -> tuple[NDArray[np.float64], str]:
-    """Return the force within the gate, and a note on it."""
-    first, stop = drop.gate
-    begin, end = 1e3 * drop.time[[first, stop - 1]]
-    note = f"gate: {begin:.1f} to {end:.1f} ms after first touch, zero outside"
-    return drop.force[first:stop], note
-
-
 def _levels(
     force: NDArray[np.float64], rate: float, bands: BandSet, method: str
 ) -> NDArray[np.float64]:
@@ -304,19 +283,6 @@ def _corrected(
 
 def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(np.sum([value**2 for value in contributions.values()], axis=0)))
-
-
-def _background_steps(nominal: NDArray[np.float64], flag: NDArray[np.str_]) -> tuple[str, ...]:
-    texts = {
-        "corrected": "corrected for the background, 6 to 15 dB below",
-        "background": "less than 6 dB above the background, an upper bound",
-        "rate": "not measured, the sample rate is too low",
-    }
-    return tuple(
-        f"{', '.join(f'{f:g}' for f in nominal[flag == key])} Hz: {text}"
-        for key, text in texts.items()
-        if (flag == key).any()
-    )
 
 
 def _level_outliers(

@@ -94,7 +94,7 @@ def _attributes(data: dict[str, Any]) -> dict[str, Any]:
         kind: "\n".join(
             dict.fromkeys(
                 [
-                    *data.get(kind, ()),
+                    *(data["warnings"] if kind == "warnings" else ()),
                     *(
                         f"{entry['name']}: {message}"
                         for key in ("files", "drops")

@@ -12,8 +12,8 @@ module thud_mode_mixing
 
    public :: diagonalize, get_mixed, get_mixing, get_row, get_unmixed, is_identity, mixing_type
 
-   !> Relative difference that squared frequencies are given, so that no two poles coincide: two poles that do by their
-   !> losses have one shape, and W does not exist.
+   !> Relative shift of the squared frequencies that separates equal poles; for two equal poles with one shape W does not
+   !> exist.
    real(wp), parameter :: separation = 1.0e-9_wp
 
    !> The matrix W of the modes of one block.
@@ -123,16 +123,8 @@ contains
       type(mixing_type), intent(in) :: mixing
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: mixed(size(values, 1), size(values, 2))
-      integer :: i, before
 
-      mixed = values
-      before = 0
-      do i = 1, size(mixing%block)
-         associate (block => mixing%block(i), first => before + 1, last => before + mixing%block(i)%count)
-            if (allocated(block%weight)) mixed(first:last, :) = matmul(block%weight, values(first:last, :))
-         end associate
-         before = before + mixing%block(i)%count
-      end do
+      mixed = get_product(mixing, values, .false.)
    end function get_mixed
 
    !> The transpose of W times a matrix: [n_mode, n].
@@ -140,16 +132,32 @@ contains
       type(mixing_type), intent(in) :: mixing
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: unmixed(size(values, 1), size(values, 2))
+
+      unmixed = get_product(mixing, values, .true.)
+   end function get_unmixed
+
+   !> W or its transpose times a matrix: [n_mode, n].
+   pure function get_product(mixing, values, transposed) result(product)
+      type(mixing_type), intent(in) :: mixing
+      complex(wp), intent(in) :: values(:, :)
+      logical, intent(in) :: transposed
+      complex(wp) :: product(size(values, 1), size(values, 2))
       integer :: i, before
 
-      unmixed = values
+      product = values
       before = 0
       do i = 1, size(mixing%block)
          associate (block => mixing%block(i), first => before + 1, last => before + mixing%block(i)%count)
-            if (allocated(block%weight)) unmixed(first:last, :) = matmul(transpose(block%weight), values(first:last, :))
+            if (.not. allocated(block%weight)) then
+               continue
+            else if (transposed) then
+               product(first:last, :) = matmul(transpose(block%weight), values(first:last, :))
+            else
+               product(first:last, :) = matmul(block%weight, values(first:last, :))
+            end if
          end associate
          before = before + mixing%block(i)%count
       end do
-   end function get_unmixed
+   end function get_product
 
 end module thud_mode_mixing

@@ -151,37 +151,34 @@ contains
       part = stack
       do while (get_resolved_frequency(part, frequency) < frequency .and. max(part%length, part%width) > min_part)
          if (part%length > part%width) then
-            call shorten(part%length, .true.)
+            part%length = 0.9_wp*part%length
          else
-            call shorten(part%width, .false.)
+            call narrow()
          end if
       end do
    contains
 
-      !> Shortens a side, with the positions across it.
-      pure subroutine shorten(side, is_length)
-         real(wp), intent(inout) :: side
-         logical, intent(in) :: is_length
+      !> Cuts both sides of the width, with the positions across it.
+      pure subroutine narrow()
          real(wp) :: cut
          integer :: i
 
-         cut = 0.05_wp*side
-         side = side - 2*cut
-         if (is_length) return
+         cut = 0.05_wp*part%width
+         part%width = part%width - 2*cut
          do i = 1, size(part%plate)
-            if (allocated(part%plate(i)%ribs)) call move(part%plate(i)%ribs%position, cut, side)
+            if (allocated(part%plate(i)%ribs)) call move(part%plate(i)%ribs%position, cut)
          end do
          do i = 1, size(part%layer)
-            if (allocated(part%layer(i)%line_y)) call move(part%layer(i)%line_y, cut, side)
+            if (allocated(part%layer(i)%line_y)) call move(part%layer(i)%line_y, cut)
          end do
-      end subroutine shorten
+      end subroutine narrow
 
-      !> Moves positions, without those beyond the new side.
-      pure subroutine move(position, cut, side)
+      !> Moves positions, without those beyond the new width.
+      pure subroutine move(position, cut)
          real(wp), allocatable, intent(inout) :: position(:)
-         real(wp), intent(in) :: cut, side
+         real(wp), intent(in) :: cut
 
-         position = pack(position - cut, position > cut .and. position < cut + side)
+         position = pack(position - cut, position > cut .and. position < cut + part%width)
       end subroutine move
    end function get_resolved_part
 

@@ -6,7 +6,7 @@ module thud_finite_element
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
-   use thud_error, only: error_type, input_error, numerical_error
+   use thud_error, only: error_type, input_error, numerical_error, numerical_failure
    use thud_finite_element_options, only: count_work, finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
@@ -51,7 +51,7 @@ module thud_finite_element
    !> Factor with which a number of three digits is never rounded down.
    real(wp), parameter :: rounded_up = 1.005_wp
 
-   !> Time between two checks of the step, or of a mobile floor after a contact, s: the ball deforms little meanwhile.
+   !> Time between two reports of progress, or checks of a mobile floor after a contact, s.
    real(wp), parameter :: check_interval = 0.5e-3_wp
 
    !> The contacts of a run.
@@ -162,8 +162,8 @@ contains
       end do
    end subroutine compress
 
-   !> Force history of one drop. A run that turns out to be unstable is repeated with a smaller step, and the history states
-   !> the reduced `step_safety`.
+   !> Force history of one drop. A run that turns out to be unstable is repeated with half the step, and the history states the
+   !> reduced `step_safety`. One that breaks down may be unstable, too: it is repeated once.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -174,11 +174,17 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       class(finite_element_type), allocatable :: attempted
       integer :: attempt
+      logical :: breaks_down, broke_down
 
       allocate (attempted, source=options)
+      broke_down = .false.
       do attempt = 1, max_attempts
          call solve_once(ball, drop, attempted, sampling, history, error, receiver)
-         if (history%energy_residual <= max_energy_residual) exit
+         breaks_down = .false.
+         if (allocated(error)) breaks_down = error%code == numerical_failure .and. .not. error%has_short_record &
+            .and. history%energy_residual > 0.0_wp
+         if (history%energy_residual <= max_energy_residual .and. (broke_down .or. .not. breaks_down)) exit
+         broke_down = breaks_down .and. history%energy_residual <= max_energy_residual
          attempted%step_safety = attempted%step_safety/2
       end do
       if (attempt > 1 .and. .not. allocated(error)) call add_model_quantity(history, 'reduced_step_safety', '', &
@@ -250,13 +256,13 @@ contains
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
-      n_step = 0
+      call choose_steps(run, options, sampling, n_sample, n_step, error)
+      if (allocated(error)) return
       check_stride = max(1, nint(check_interval*sampling%sample_rate))
       stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
-         if (mod(i - 1, check_stride) == 0) call check_step(run, time, options, sampling, n_sample, n_step, error)
-         if (allocated(error)) return
+         if (mod(i - 1, check_stride) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
             ! No further contact is wanted.
@@ -321,35 +327,31 @@ contains
       end if
    end function get_duration_error
 
-   !> Chooses the steps of the next sampling intervals, never fewer than before; returns an error if the run would take too
-   !> long.
-   subroutine check_step(run, time, options, sampling, n_sample, n_step, error)
-      type(impact_run_type), intent(inout) :: run
-      !> Time since the record began, s.
-      real(wp), intent(in) :: time
-      !> Options; `step_safety` is the fraction of the stability limit to use.
+   !> Number of steps in a sampling interval; returns an error if the run would take too long.
+   subroutine choose_steps(run, options, sampling, n_sample, n_step, error)
+      type(impact_run_type), intent(in) :: run
+      !> Options; `step_safety` is the ratio of the step to the bound.
       class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Number of samples of the record.
       integer, intent(in) :: n_sample
-      !> Number of steps in each interval.
-      integer, intent(inout) :: n_step
+      !> The number.
+      integer, intent(out) :: n_step
       !> Set if there would be too many steps.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, wanted
 
       interval = 1/sampling%sample_rate
-      call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
       wanted = interval/(options%step_safety*get_stable_interval(run%body%mesh%r, run%body%mesh%z, run%body%material, &
          run%contact))
-      n_step = max(n_step, sampling%substeps, ceiling(min(wanted, 2.0_wp*max_steps)))
+      n_step = max(sampling%substeps, ceiling(min(wanted, 2.0_wp*max_steps)))
       associate (n_node => size(run%position)/2)
          if (n_step <= max_steps .and. real(n_step, wp)*n_sample*n_node <= max_work) return
-         error = numerical_error(trim(event_prefix(time))//' stability asks for steps below '//to_text(interval/n_step) &
+         error = numerical_error('&finite_element: stability asks for steps below '//to_text(interval/n_step) &
             //' s, too many for '//to_text(sampling%duration)//' s of '//to_text(n_node) &
             //' nodes; allowed: a shorter duration, fewer elements, a lower bulk_ratio, less viscosity')
       end associate
-   end subroutine check_step
+   end subroutine choose_steps
 
    !> Whether a node may reach the floor in the next step.
    pure function will_touch(run, step) result(touches)

@@ -51,7 +51,7 @@ module thud_finite_element_options
 
    !> Largest changes by it from the default elements to finer ones among eight balls, dB, at the octaves that the velocity
    !> of shear waves per radius makes those of the standard ball; the change is taken as proportional to the element size.
-   real(wp), parameter :: slip_error(octave_count) = [0.05_wp, 0.15_wp, 0.35_wp, 2.0_wp, 2.0_wp]
+   real(wp), parameter :: slip_error(octave_count) = [0.05_wp, 0.2_wp, 0.4_wp, 2.0_wp, 2.0_wp]
    type(ball_type), parameter :: standard_ball = ball_type(youngs_modulus=2.08e6_wp)
 
    !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
@@ -65,7 +65,7 @@ module thud_finite_element_options
       real(wp) :: flight_before = 0.0_wp
       !> Free flight after the last contact, s.
       real(wp) :: flight_after = 0.0_wp
-      !> Time step as a fraction of the stability limit.
+      !> Time step divided by a bound on stable steps.
       real(wp) :: step_safety = 0.85_wp
       !> Time between snapshots of the deformed ball, s; 0 for none.
       real(wp) :: snapshot_interval = 0.0_wp
@@ -98,7 +98,7 @@ contains
          is_numerical=.true.), &
          real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
          '[0, 10]', is_numerical=.true.), &
-         real_field('step_safety', options%step_safety, '', 'time step divided by the stability limit', &
+         real_field('step_safety', options%step_safety, '', 'time step divided by a bound on stable steps', &
          '[0.01, 0.98]', is_numerical=.true.), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &

@@ -50,7 +50,7 @@ contains
 
       ratio = interval/time
       step%modulus = modulus
-      step%power_factor = step%modulus/time
+      step%power_factor = modulus/time
       if (ratio < 1.0e-3_wp) then
          ! A series, since the difference would lose digits; off by x**4/720.
          step%mean_weight = ratio/2 + ratio**2/12
@@ -59,7 +59,7 @@ contains
          step%mean_weight = ratio/(1 - exp(-ratio)) - 1
       end if
       ! Work, energy and loss of a linear branch balance over the steps.
-      step%stiffness = step%modulus/2*(1 + step%mean_weight)*(1 + exp(-ratio))/2
+      step%stiffness = modulus/2*(1 + step%mean_weight)*(1 + exp(-ratio))/2
       ratio = min(ratio, max_step_ratio)
       step%end_weight = exp(ratio) - 1
       ! The weight grows at the rate tr(C Cv^-1)/3, 1 at small strain: a correction of second order in the step.

@@ -17,7 +17,7 @@ module thud_stable_step
 
 contains
 
-   !> Longest stable step, s.
+   !> Lower bound of the longest stable step, s.
    pure function get_stable_interval(r, z, material, contact) result(interval)
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial].
       real(wp), intent(in) :: r(0:, 0:), z(0:, 0:)
