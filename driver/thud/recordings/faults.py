@@ -82,6 +82,9 @@ MAX_CONSTANT = 0.5
 JUMP_TIME = 2.5e-4
 JUMP_MARGIN = 5e-4
 MIN_JUMP_RATIO = 3.0
+# The same for the quieter side alone, of values: packets that change places jump three times, and
+# hide each other on the sides between them. The slope may change on one side only.
+MIN_SIDE_RATIO = 6.0
 
 
 def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
@@ -283,7 +286,11 @@ def check_jumps(contact: Contact) -> tuple[str, ...]:
     least = max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step)
     for name, before, after in (("", line, line[::-1]), ("slope of the ", slope, slope)):
         jump = np.abs(np.correlate(force, np.concatenate([before, -after]), mode="valid"))
-        limit = np.maximum(MIN_JUMP_RATIO * _largest_around(jump, count + 1, 3 * count), least)
+        sides = _largest_beside(jump, count + 1, 3 * count)
+        limit = MIN_JUMP_RATIO * sides.max(axis=0)
+        if not name:
+            limit = np.minimum(limit, MIN_SIDE_RATIO * sides.min(axis=0))
+        limit = np.maximum(limit, least)
         found = (jump > limit)[first : max(stop, first)]
         if found.any():
             size = float(jump[first:stop][found].max())
@@ -332,11 +339,11 @@ def _deviation(force: NDArray[np.float64]) -> float:
     return 1.4826 * float(np.median(np.abs(deviation))) / math.sqrt(float(DIFFERENCE @ DIFFERENCE))
 
 
-def _largest_around(values: NDArray[np.float64], near: int, far: int) -> NDArray[np.float64]:
-    """Return the largest of the values from near to far samples before and after each one."""
+def _largest_beside(values: NDArray[np.float64], near: int, far: int) -> NDArray[np.float64]:
+    """Return the largest of the values from near to far samples before and after, [2, n]."""
     extended = np.pad(values, far, mode="edge")
     largest = sliding_window_view(extended, far - near + 1).max(axis=1)
-    return np.asarray(np.maximum(largest[: len(values)], largest[-len(values) :]))
+    return np.stack([largest[: len(values)], largest[-len(values) :]])
 
 
 def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -385,7 +392,7 @@ def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDA
     least = max(
         MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
     )
-    limit = np.maximum(MIN_SPIKE_RATIO * _largest_around(from_cubic, *CLEAN), least)
+    limit = np.maximum(MIN_SPIKE_RATIO * _largest_beside(from_cubic, *CLEAN).max(axis=0), least)
     spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
     return spikes
 

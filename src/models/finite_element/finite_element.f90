@@ -162,8 +162,8 @@ contains
       end do
    end subroutine compress
 
-   !> Force history of one drop. A run that turns out to be unstable is repeated with half the step, and the history states the
-   !> reduced `step_safety`. One that breaks down may be unstable, too: it is repeated once.
+   !> Force history of one drop. A run that turns out to be unstable is repeated with half the step, and the history states
+   !> the reduced `step_safety`. One that breaks down may be unstable, too: it is repeated once.
    subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
