@@ -15,7 +15,11 @@ from thud.studies.trained_surrogate import Surrogate, read_surrogate
 from thud.studies.unknowns import STANDARD_BALL, Unknown, blocked_case, stated_unknowns
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from thud.case.case import Case
+
+    Range = tuple[float, float]
 
 # File of the package, made by `./bootstrap surrogate` from inputs/studies/standard_ball.toml.
 FILE = "standard_ball.npz"
@@ -66,10 +70,7 @@ def range_without_defaults(case: Case) -> tuple[str, float, float] | None:
 def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
     """Return `_as_trained`; raise InputError with the key that the surrogate does not cover."""
     result = _as_trained(case, unknowns)
-    ranges = {u.key: (u.low, u.high) for u in unknowns}
-    surrogate = bundled_surrogate()
-    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
-        low, high = ranges.get(name, region)
+    for name, (low, high), region in _ranges(unknowns):
         if not region[0] <= low <= high <= region[1]:
             refuse(f"{name} = {low:g} to {high:g}", f"{region[0]:g} <= {name} <= {region[1]:g}")
     if outside := _outside(result, unknowns):
@@ -80,13 +81,19 @@ def _covered_case(case: Case, unknowns: tuple[Unknown, ...]) -> Case:
 
 def _outside(case: Case, unknowns: tuple[Unknown, ...]) -> tuple[str, float, float] | None:
     """Return the first key whose value lies outside of its range, and the range."""
-    ranges = {u.key: (u.low, u.high) for u in unknowns}
-    surrogate = bundled_surrogate()
-    for name, region in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
-        value, (low, high) = value_in(case, name), ranges.get(name, region)
+    for name, (low, high), _ in _ranges(unknowns):
+        value = value_in(case, name)
         if not (isinstance(value, float | int) and low <= value <= high):
             return name, low, high
     return None
+
+
+def _ranges(unknowns: tuple[Unknown, ...]) -> Iterator[tuple[str, Range, Range]]:
+    """Yield each key of the surrogate, its range, and the range in which it was trained."""
+    ranges = {u.key: (u.low, u.high) for u in unknowns}
+    surrogate = bundled_surrogate()
+    for name, (low, high) in zip(surrogate.keys, surrogate.region.tolist(), strict=True):
+        yield name, ranges.get(name, (low, high)), (low, high)
 
 
 def _as_trained(case: Case, unknowns: tuple[Unknown, ...]) -> Case:

@@ -133,10 +133,9 @@ contains
       pure function get_all_counts(plate) result(n)
          type(orthotropic_type), intent(in) :: plate
          integer :: n(2)
-         integer :: direction
 
          n = get_counts(stack, plate, frequency)
-         n = n + [(size(get_twisting_ribs(plate, direction, n(direction))), direction=1, 2)]
+         n(2) = n(2) + size(get_twisting_ribs(plate, n(2)))
       end function get_all_counts
    end function get_resolved_frequency
 
@@ -203,9 +202,7 @@ contains
          yes = yes .and. has_sines(stack%plate(i), direction)
          if (direction == 2) yes = yes .and. .not. allocated(stack%plate(i)%ribs)
       end do
-      do i = 1, size(stack%plate) - 1
-         if (direction == 2) yes = yes .and. .not. allocated(stack%layer(i)%line_y)
-      end do
+      if (direction == 2) yes = yes .and. .not. any([(allocated(stack%layer(i)%line_y), i=1, size(stack%plate) - 1)])
    end function is_uncoupled_along
 
    !> Whether the supports and connections of a stack are symmetric in a direction.
@@ -267,20 +264,18 @@ contains
       end do
    end function get_counts
 
-   !> Positions of ribs across a direction that resist rotation, m: [n_rib]. There are none if the plate yields in shear, or
-   !> if sines are much shorter than the distance of the ribs.
-   pure function get_twisting_ribs(plate, direction, n) result(position)
+   !> Positions across the width of ribs that resist rotation, m: [n_rib]. There are none if the plate yields in shear, or if
+   !> sines are much shorter than the distance of the ribs.
+   pure function get_twisting_ribs(plate, n) result(position)
       type(orthotropic_type), intent(in) :: plate
-      !> 1: along the length, 2: along the width.
-      integer, intent(in) :: direction
-      !> Number of functions.
+      !> Number of functions of y.
       integer, intent(in) :: n
       real(wp), allocatable :: position(:)
 
       allocate (position(0))
-      if (direction == 1 .or. .not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
+      if (.not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
       if (max(plate%ribs%torsion, plate%ribs%inertia) > 0.0_wp) position = plate%ribs%position
-      if (has_sines(plate, direction) .and. n >= max(min_sines(1)*size(position), min_sines(2))) then
+      if (has_sines(plate, 2) .and. n >= max(min_sines(1)*size(position), min_sines(2))) then
         position = position(:0)
       end if
    end function get_twisting_ribs

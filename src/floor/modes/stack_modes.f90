@@ -106,7 +106,8 @@ contains
       is_thin = .not. maxval(plate%shear) > 0.0_wp
       sides = [stack%length, stack%width]
       do i = 1, 2
-         twisting = get_twisting_ribs(plate, i, n(i))
+         twisting = spread(0.0_wp, 1, 0)
+         if (i == 2) twisting = get_twisting_ribs(plate, n(2))
          n_rib = size(twisting)
          if (has_sines(plate, i) .and. n_rib == 0) then
             deflection(i) = function_set_type(sines, sides(i), n(i))
