@@ -117,11 +117,6 @@ from .studies.fitting.fit_result import Fit as Fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
 from .studies.fitting.level_target import LevelTarget as LevelTarget
 from .studies.kinds import read_study as read_study
-from .studies.model_assessment import assess as assess
-from .studies.model_verdict import (
-    ModelCriterion as ModelCriterion,
-    ModelVerdict as ModelVerdict,
-)
 from .studies.parameter import Parameter as Parameter
 from .studies.sensitivity import (
     Sensitivity as Sensitivity,

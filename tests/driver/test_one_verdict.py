@@ -11,7 +11,6 @@ from conftest import INPUTS
 
 import thud
 from thud import cli
-from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -47,9 +46,8 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     assert [shown[f"{f:g} Hz, dB"].split()[0] for f in thud.get_bands().nominal] == [
         f"{level:.2f}" for level in levels
     ]
-    verdict = assess_impact(impact)
     # The cell of a long verdict has several lines.
-    assert (verdict or conformity).result.startswith(shown["verdict"].split("  ")[0])
+    assert conformity.result.startswith(shown["verdict"].split("  ")[0])
 
     swept = thud.sweep(
         {"case": str(path), "parameters": {"height": {"values": [case.drop.height]}}}

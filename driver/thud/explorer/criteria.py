@@ -6,23 +6,16 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import RATINGS
-from thud.base.units import scaled
-from thud.case.keys import humanize
-from thud.explorer.form import fields_by_key
-from thud.explorer.messages import lower
 from thud.level.assessment import VERDICTS
 from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
-from thud.studies.bundled_surrogate import range_without_defaults
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from thud.base._schema import LimitsSource, RoomRequiredRating
-    from thud.case.case import Case
     from thud.floors.prediction import RoomPrediction
     from thud.level.assessment import Criterion, Verdict
-    from thud.studies.model_verdict import ModelCriterion, ModelVerdict
 
 # Code of the result of a verdict or of a requirement; the page reads no words.
 RESULTS = {verdict: verdict.replace(" ", "_") for verdict in VERDICTS}
@@ -102,28 +95,13 @@ def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
     return None
 
 
-def model_headline(
-    case: Case, verdict: Verdict, ranges: ModelVerdict | None = None
-) -> dict[str, str]:
-    """Return the headline of the verdict on the source of a case, see `_headline`.
-
-    The verdict over what is not known, `ranges`, goes before that of the values of the model.
-    """
-    if ranges is None:
-        detail = f"{_without_ranges(case)} {_standard(verdict)}"
-        words = f"{verdict.result} by this model"
-        return _headline(verdict, words, detail)
-    result = RESULTS[ranges.result]
-    names = [_label(entry.key) for entry in ranges.unknowns]
+def model_headline(verdict: Verdict) -> dict[str, str]:
+    """Return the headline of the verdict on a source by the values of its model."""
     detail = (
-        f"Probability of conformity {ranges.shown_probability} over the ranges of "
-        f"{_joined(names)}, whatever the fields state within them. {_standard(verdict)}"
+        "Values of this model only, from which others may differ; thud-driver assess counts what "
+        f"is not known of the source. {_standard(verdict)}"
     )
-    entries = [entry for entry in ranges.criteria if entry.result == ranges.result]
-    causes = {entry.criterion.quantity.title: _range_text(entry) for entry in entries}
-    if result == "conforms":
-        return _texts(result, ranges.result, f"{_closest(verdict)} {detail}")
-    return _texts(result, ranges.result, detail, *_listed(causes))
+    return _headline(verdict, f"{verdict.result} by this model", detail)
 
 
 def _headline(
@@ -146,40 +124,6 @@ def _texts(result: str, words: str, detail: str, why: str = "", also: str = "") 
 
 def _standard(verdict: Verdict) -> str:
     return f"Limits of the {verdict.source.replace('_', ' ')}: {STANDARDS[verdict.source]}."
-
-
-def _without_ranges(case: Case) -> str:
-    """Return why the verdict on a case has no range, as a sentence."""
-    text = (
-        "Values of this model only, from which others may differ; what is not known of the source "
-        "is not counted"
-    )
-    if case.unknowns:
-        return f"{text}; thud-driver assess counts the stated unknowns."
-    outside = range_without_defaults(case)
-    if outside is None:
-        return f"{text}."
-    key, *limits = outside
-    field = next(item for (_, name), item in fields_by_key().items() if name == key)
-    low, high = (f"{scaled(end, -field['power']):g}" for end in limits)
-    ends = f"{low} to {high} {field['unit']}".rstrip()
-    return f"{text}; its ranges are known for {lower(field['label'])} {ends}."
-
-
-def _label(key: str) -> str:
-    """Return the label of a key for the middle of a sentence."""
-    labels = (item["label"] for (_, name), item in fields_by_key().items() if name == key)
-    return lower(next(labels, humanize(key)))
-
-
-def unknowns_text(ranges: ModelVerdict) -> str:
-    """Return the ranges of the unknowns of a verdict, such as ``"friction 0 to 1"``."""
-    parts = []
-    for entry in ranges.unknowns:
-        unit, size = entry.shown_unit
-        text = f"{_label(entry.key)} {entry.low / size:g} to {entry.high / size:g} {unit}"
-        parts.append(text.rstrip())
-    return ", ".join(parts)
 
 
 def room_headline(prediction: RoomPrediction) -> dict[str, str]:
@@ -251,14 +195,6 @@ def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
         return f"{quantity.title} {_shown(criterion, value)}, uncertainty not known"
     low, high = _number(criterion, value - expanded), _shown(criterion, value + expanded)
     return f"{quantity.title} {low} to {high}, limits {criterion.shown_limits}"
-
-
-def _range_text(entry: ModelCriterion) -> str:
-    """Return name, range and limits of a criterion over what is not known."""
-    quantity = entry.criterion.quantity
-    value = entry.range or _number(entry.criterion, entry.criterion.value)
-    unit = f" {quantity.display_unit}" if quantity.display_unit else ""
-    return f"{quantity.title} {value}{unit}, limits {entry.criterion.shown_limits}"
 
 
 def _number(criterion: Criterion, value: float) -> str:
