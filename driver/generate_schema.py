@@ -66,15 +66,8 @@ def solve(ball: Case) -> Impact:
 STANDARD_BALL = '''
     @classmethod
     def standard(cls) -> Self:
-        """Return the standard rubber ball for finite elements.
-
-        With its modulus, 2.08 MPa, the first free modes are those that the paper computed by finite
-        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. By
-        ``thud.solve(thud.Ball.standard(), model="finite_element")`` it conforms to the standards up
-        to 250 Hz; the octave of 500 Hz depends on the damping law (docs/finite_elements.md).
-        The shell model has another modulus, the default.
-        """
-        return cls(youngs_modulus=2.08e6)
+        """Return the standard rubber ball, which is also the default."""
+        return cls()
 '''
 EXTRAS = {"ball": STANDARD_BALL}
 # Base of the floors of rectangular plates, named like a group.
@@ -145,7 +138,7 @@ def python_type(key: Entry) -> str:
         entry = "int" if key["whole"] else "float"
         # A list that is not empty by default is often a single number.
         return f"{entry} | Sequence[{entry}]" if key["default"] else f"Sequence[{entry}]"
-    return TYPES[key["kind"]]
+    return TYPES[key["kind"]] + (" | None" if key["default"] is None else "")
 
 
 def python_default(key: Entry) -> str:
@@ -163,6 +156,8 @@ def python_class(
     for key in keys:
         unit = f", {key['unit']}" if key["unit"] else ""
         words = [key["meaning"][0].upper() + key["meaning"][1:] + unit, allowed(key)]
+        if key["default"] is None:
+            words.append("None: that of the standard ball by the model")
         default = python_default(key)
         if key["group"] != group:
             words.append(f"group ``&{key['group']}``")
@@ -270,8 +265,6 @@ def python_module(schema: Entry) -> str:
         union("FloorOptions", floors),
         table("Source models by name, the default first.", "MODELS: dict[str, type[ModelOptions]]",
               [f"{name}.name: {name}" for name in map(class_name, models)]),
-        "\n# Source of a case with a room that names no model.\n",
-        f"ROOM_SOURCE = {instance(schema['room_source'])}\n",
         table("Floors by name, the default first.", "FLOORS: dict[str, type[FloorOptions]]",
               [f"{name}.name: {name}" for name in map(class_name, floors)]),
         table("Groups that every model uses.", "GROUPS",
@@ -301,6 +294,10 @@ def python_module(schema: Entry) -> str:
         table("Single-number ratings of a level in a room, with symbols, bands and standards.",
               "RATINGS: dict[RoomRequiredRating, str]",
               [f"{quoted(name)}: {quoted(title)}" for name, title in schema["ratings"].items()]),
+        table("Values of the standard ball by model and key; without a model for free modes alone.",
+              "STANDARD_BALL: dict[tuple[str, str], float]",
+              [f"({quoted(entry['model'])}, {quoted(entry['key'])}): {entry['value']!r}"
+               for entry in schema["standard_ball"]]),
         "\n# Every key, in the order of an input file.\nKEYS = (\n",
         *(f"    {python_key(key)},\n" for key in keys),
         ")\n",
@@ -345,16 +342,6 @@ def python_calls(schema: Entry) -> str:
     parts.append(CALL.format(default=" = ...", star="", model="ModelName | ModelOptions = ...",
                              options="SamplingOptions", by=""))  # fmt: skip
     return "".join(parts)
-
-
-def instance(options: Entry) -> str:
-    """Return the options of a model as Python writes them."""
-    values = (
-        f"{key}={quoted(value)}" if isinstance(value, str) else f"{key}={value!r}"
-        for key, value in options.items()
-        if key != "name"
-    )
-    return f"{class_name(options['name'])}({', '.join(values)})"
 
 
 def table(comment: str, name: str, entries: list[str]) -> str:
@@ -409,6 +396,17 @@ def quoted(text: str) -> str:
     return json.dumps(text)
 
 
+def standard_values(key: Entry, standard: list[Entry]) -> str:
+    """Return the values of the standard ball for a key, with the models if they differ."""
+    models: dict[float, list[str]] = {}
+    for entry in standard:
+        if entry["key"] == key["name"] and key["owner"] in {"", entry["model"]}:
+            models.setdefault(entry["value"], []).append(entry["model"] or "free modes")
+    if len(models) == 1:
+        return repr(next(iter(models)))
+    return ", ".join(f"{value!r} ({', '.join(names)})" for value, names in models.items())
+
+
 def page(schema: Entry) -> str:
     """Return the reference of all keys in Markdown."""
     text, seen, group = PAGE, set(), ""
@@ -424,6 +422,8 @@ def page(schema: Entry) -> str:
             text += f"\n## `&{group}`\n\n{used}"
             text += "| key | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"
         default = python_default(key) if key["default"] not in ([], "") else ""
+        if key["default"] is None:
+            default = standard_values(key, schema["standard_ball"])
         cells = [f"`{key['name']}`", default, key["unit"], allowed(key), key["meaning"]]
         text += f"| {' | '.join(cells)} |\n"
     return text

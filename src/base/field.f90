@@ -84,6 +84,8 @@ module thud_field
       logical :: is_path = .false.
       !> At the value 0 the key is derived from others.
       logical :: derived_at_zero = .false.
+      !> Calibrated on the standard ball: where the key is not stated, it has the value of the standard ball by the model.
+      logical :: is_calibrated = .false.
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
       !> Allowed texts; the first `n_choice` are used: [max_choices]. The size is fixed because some compilers lose

@@ -12,18 +12,19 @@ module thud_new_field
 contains
 
    !> Describes a real key.
-   function real_field(key, variable, unit, meaning, range, is_numerical, derived_at_zero) result(field)
+   function real_field(key, variable, unit, meaning, range, is_numerical, derived_at_zero, is_calibrated) result(field)
       character(len=*), intent(in) :: key
       real(wp), intent(in), target :: variable
       !> SI unit, empty for a pure number; help text; allowed range.
       character(len=*), intent(in) :: unit, meaning, range
       !> See `field_type` (default: false).
-      logical, intent(in), optional :: is_numerical, derived_at_zero
+      logical, intent(in), optional :: is_numerical, derived_at_zero, is_calibrated
       type(field_type) :: field
 
       field = field_type(key=key, unit=unit, meaning=meaning, range=range)
       if (present(is_numerical)) field%is_numerical = is_numerical
       if (present(derived_at_zero)) field%derived_at_zero = derived_at_zero
+      if (present(is_calibrated)) field%is_calibrated = is_calibrated
       field%real_value => variable
    end function real_field
 

@@ -5,7 +5,7 @@ module thud_case
    use thud_compression, only: check_compression, compression_options_type, get_compression_fields
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: check_fields, field_type, name_length
+   use thud_field, only: check_fields, field_type, key_length, name_length
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_kinds, only: wp
@@ -21,12 +21,14 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: keep_impact_only, new_case, set_floor_air, set_room_source
+   public :: get_full_key, is_stated, keep_impact_only, new_case, set_floor_air, set_standard_modulus
 
    !> Input of one run.
    type :: case_type
       !> Main groups missing from the text of the case, so that their defaults apply: ` &drop &model`.
       character(len=32) :: left_out = ''
+      !> Calibrated keys that the text of the case does not state, as `group.key`: [n].
+      character(len=2*key_length + 1), allocatable :: unstated(:)
       !> Name of the case and of its output directory.
       character(len=name_length) :: name = ''
       !> The case asks for an impact: it has the group `&model`, or no `&modes`.
@@ -78,24 +80,42 @@ contains
 
       call new_models(case%models)
       call new_floors(case%floors)
+      allocate (case%unstated(0))
    end subroutine new_case
 
-   !> Chooses the source of a case with a room that names none: the modal ball, with losses that rise with frequency so that
-   !> the standard ball conforms. Both other fast models, by default, do not.
-   subroutine set_room_source(case)
-      type(case_type), intent(inout), target :: case
-      type(field_type), allocatable :: fields(:)
-      type(error_type), allocatable :: error
+   !> Gives a ball whose modulus is not stated that of the standard ball by the model, or by finite elements for free modes
+   !> alone. Models that do not use the wall keep the default.
+   subroutine set_standard_modulus(case)
+      type(case_type), intent(inout) :: case
+      character(len=name_length) :: model
       integer :: i
 
-      case%model = 'modal_ball'
-      allocate (fields, source=get_fields(case))
-      do i = 1, size(fields)
-         if (fields(i)%owner /= case%model) cycle
-         if (fields(i)%key == 'damping_law') call fields(i)%set_from_text("'rising'", error)
-         if (fields(i)%key == 'loss_factor') call fields(i)%set_from_text('0.3', error)
+      model = case%model
+      if (.not. case%has_impact) model = 'finite_element'
+      do i = 1, size(model_names)
+         if (model_names(i) /= model) cycle
+         associate (modulus => case%models(i)%model%get_standard_modulus())
+            if (modulus > 0.0_wp) case%ball%youngs_modulus = modulus
+         end associate
       end do
-   end subroutine set_room_source
+   end subroutine set_standard_modulus
+
+   !> Group and key, as in `unstated`.
+   pure elemental function get_full_key(field) result(name)
+      type(field_type), intent(in) :: field
+      character(len=2*key_length + 1) :: name
+
+      name = trim(field%group)//'.'//field%key
+   end function get_full_key
+
+   !> Whether the text of a case states a key, or the key is not calibrated.
+   pure elemental function is_stated(case, field) result(stated)
+      type(case_type), intent(in) :: case
+      type(field_type), intent(in) :: field
+      logical :: stated
+
+      stated = .not. any(case%unstated == get_full_key(field))
+   end function is_stated
 
    !> Surrounds the floors with the air of the room, after keys of the case have been set.
    pure subroutine set_floor_air(case)
@@ -149,7 +169,7 @@ contains
          owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
          in_group('drop', get_drop_fields(case%drop)), &
          in_group('model', [ &
-         choice_field('name', case%model, 'source model (default with &room: a modal ball that conforms)', model_names)])]
+         choice_field('name', case%model, 'source model', model_names)])]
       do i = 1, size(case%models)
          fields = [fields, owned_by(model_names(i), in_group(model_names(i), case%models(i)%model%get_fields()))]
       end do

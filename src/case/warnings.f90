@@ -34,9 +34,6 @@ module thud_warnings
    !> Range of Poisson's ratios of rubbers, including filled ones: [2].
    real(wp), parameter :: rubber_ratio(2) = [0.45_wp, 0.5_wp]
 
-   !> Relative difference below which two moduli are treated as equal.
-   real(wp), parameter :: same_modulus = 0.02_wp
-
    !> Levels over all frequencies of a conforming ball and a conforming tyre, dB re 1 N and 1 s: [2]. They are 4.4 dB above
    !> the sums of the nominal octave levels, as for the standard ball and for a half sine of 20 ms.
    real(wp), parameter :: source_level(2) = [44.0_wp, 52.0_wp]
@@ -268,12 +265,11 @@ contains
       character(len=*), intent(in) :: model
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: paper_modulus, other, density
+      real(wp) :: density
       integer :: i
 
       i = findloc(model_names == model, .true., dim=1)
-      paper_modulus = case%models(i)%model%get_paper_modulus()
-      if (.not. paper_modulus > 0.0_wp) return
+      if (.not. case%models(i)%model%get_standard_modulus() > 0.0_wp) return
       density = get_density(case%ball)
       associate (modulus => case%ball%youngs_modulus)
          if (density < rubber_density(1) .or. density > rubber_density(2)) call add(warnings, &
@@ -285,15 +281,6 @@ contains
          if (case%ball%poisson_ratio < rubber_ratio(1)) call add(warnings, '&ball: poisson_ratio = ' &
             //to_text(case%ball%poisson_ratio)//', rubbers have '//fixed(rubber_ratio(1), 2)//' to ' &
             //fixed(rubber_ratio(2), 2))
-         do i = 1, size(model_names)
-            other = case%models(i)%model%get_paper_modulus()
-            if (.not. (other > 0.0_wp .and. abs(other - paper_modulus) > same_modulus*paper_modulus)) cycle
-            if (abs(modulus - other) > same_modulus*other) cycle
-            call add(warnings, '&ball: youngs_modulus = '//fixed(modulus/1.0e6_wp, 2)//' MPa is the modulus of the ' &
-               //"paper's ball in the model "//quoted(model_names(i))//'; '//quoted(model)//' needs ' &
-               //fixed(paper_modulus/1.0e6_wp, 2)//' MPa')
-            exit
-         end do
       end associate
    end subroutine add_ball_warnings
 

@@ -45,9 +45,9 @@ contains
          real_field('mass', ball%mass, 'kg', 'mass', &
          '[1e-12, 1000000]'), &
          real_field('youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
-         '(0, 1e13]'), &
+         '(0, 1e13]', is_calibrated=.true.), &
          real_field('poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", &
-         '(-1, 0.5]'), &
+         '(-1, 0.5]', is_calibrated=.true.), &
          real_field('gauge_pressure', ball%gauge_pressure, 'Pa', &
          'overpressure of the gas in the undeformed ball', '[0, 1e8]'), &
          real_field('ambient_pressure', ball%ambient_pressure, 'Pa', &

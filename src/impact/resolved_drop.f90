@@ -132,7 +132,7 @@ contains
       integer :: level, expected_level
 
       ! Only models that use the wall have such a modulus.
-      if (model%get_paper_modulus() > 0.0_wp) contact = estimate_contact(ball, drop)
+      if (model%get_standard_modulus() > 0.0_wp) contact = estimate_contact(ball, drop)
       expected_level = min(model%get_highest_level(ball, sampling), model%get_expected_level(ball, contact))
       cost = 0.0_wp
       do level = 0, merge(expected_level + 1, expected_level, sampling%verify)

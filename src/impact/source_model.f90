@@ -30,7 +30,7 @@ module thud_source_model
       procedure, pass(options) :: check
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: get_cost
-      procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: get_standard_modulus
       procedure, pass(options) :: get_validity_limits
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
@@ -123,14 +123,14 @@ contains
       end if
    end function get_cost
 
-   !> Modulus of elasticity of the paper's ball in this model, Pa; by default 0, for models that do not use the wall.
-   function get_paper_modulus(options) result(modulus)
+   !> Modulus of elasticity of the standard ball in this model, Pa; by default 0, for models that do not use the wall.
+   function get_standard_modulus(options) result(modulus)
       class(source_model_type), intent(in) :: options
       !> The modulus, Pa.
       real(wp) :: modulus
 
       modulus = 0.0_wp
-   end function get_paper_modulus
+   end function get_standard_modulus
 
    !> Validity limits of the model for a result; by default those of a source without size and without gravity during the
    !> contact.

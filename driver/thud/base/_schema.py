@@ -50,18 +50,18 @@ __all__ = [
 # Choices of keys.
 CompressionGas = Literal["vented", "isothermal", "adiabatic"]
 ModelName = Literal[
-    "hollow_sphere",
     "modal_ball",
     "finite_element",
+    "hollow_sphere",
     "measured_modes",
     "hunt_crossley",
     "two_mass",
 ]
-HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
 ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
 ModalBallFloorFriction = Literal["none", "stick"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
 FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
+HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
 LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
 LevelsForce = Literal["floor", "elastic"]
@@ -100,10 +100,11 @@ class Ball(Group):
         Wall thickness, less than the outer radius, m; 0 < wall_thickness < outer_radius.
     mass : float
         Mass, kg; 1e-12 <= mass <= 1e+06.
-    youngs_modulus : float
-        Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e+13.
-    poisson_ratio : float
-        Poisson's ratio; -1 < poisson_ratio <= 0.5.
+    youngs_modulus : float | None
+        Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e+13; None: that of the standard ball by
+        the model.
+    poisson_ratio : float | None
+        Poisson's ratio; -1 < poisson_ratio <= 0.5; None: that of the standard ball by the model.
     gauge_pressure : float
         Overpressure of the gas in the undeformed ball, Pa; 0 <= gauge_pressure <= 1e+08.
     ambient_pressure : float
@@ -115,23 +116,16 @@ class Ball(Group):
     outer_radius: float = 0.089
     wall_thickness: float = 0.032
     mass: float = 2.5
-    youngs_modulus: float = 1600000.0
-    poisson_ratio: float = 0.5
+    youngs_modulus: float | None = None
+    poisson_ratio: float | None = None
     gauge_pressure: float = 0.0
     ambient_pressure: float = 101325.0
     heat_capacity_ratio: float = 1.4
 
     @classmethod
     def standard(cls) -> Self:
-        """Return the standard rubber ball for finite elements.
-
-        With its modulus, 2.08 MPa, the first free modes are those that the paper computed by finite
-        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. By
-        ``thud.solve(thud.Ball.standard(), model="finite_element")`` it conforms to the standards up
-        to 250 Hz; the octave of 500 Hz depends on the damping law (docs/finite_elements.md).
-        The shell model has another modulus, the default.
-        """
-        return cls(youngs_modulus=2.08e6)
+        """Return the standard rubber ball, which is also the default."""
+        return cls()
 
 
 @dataclass(frozen=True, eq=False)
@@ -358,21 +352,6 @@ class Room(Group):
 
 
 @dataclass(frozen=True, eq=False)
-class HollowSphere(Group):
-    """Options of the source model ``hollow_sphere``.
-
-    Attributes
-    ----------
-    momentum_flux : str
-        Term for the momentum of wall that enters or leaves the flat cap; "momentum_balance",
-        "retarding", "conservative", "none".
-    """
-
-    name: ClassVar[ModelName] = "hollow_sphere"
-    momentum_flux: HollowSphereMomentumFlux = "momentum_balance"
-
-
-@dataclass(frozen=True, eq=False)
 class ModalBall(Group):
     """Options of the source model ``modal_ball``.
 
@@ -386,11 +365,12 @@ class ModalBall(Group):
         rings <= 400.
     damping_law : str
         Damping law: loss factor as a function of frequency; "constant", "rising", "fractional".
-    loss_factor : float
-        Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9.
-    loss_frequency : float
+    loss_factor : float | None
+        Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9; None: that of the standard
+        ball by the model.
+    loss_frequency : float | None
         Frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply, Hz;
-        0.1 <= loss_frequency <= 100000.
+        0.1 <= loss_frequency <= 100000; None: that of the standard ball by the model.
     fractional_order : float
         Order of the derivative, for fractional; 1: as rising; 0 < fractional_order <= 1.
     cavity_gas : bool
@@ -406,9 +386,9 @@ class ModalBall(Group):
     name: ClassVar[ModelName] = "modal_ball"
     highest_frequency: float = 0.0
     rings: int = 0
-    damping_law: ModalBallDampingLaw = "constant"
-    loss_factor: float = 0.1
-    loss_frequency: float = 74.0
+    damping_law: ModalBallDampingLaw = "rising"
+    loss_factor: float | None = None
+    loss_frequency: float | None = None
     fractional_order: float = 0.3
     cavity_gas: bool = True
     contact_gravity: bool = False
@@ -447,23 +427,25 @@ class FiniteElement(Group):
     viscosity : str
         Law of viscosity; "none", "kelvin_voigt", "fractional", "constant_loss", "prony"; group
         ``&material``.
-    loss_factor : float
+    loss_factor : float | None
         Loss factor: at loss_frequency (kelvin_voigt, fractional), or from 10 to 1000 Hz
-        (constant_loss); 0 < loss_factor <= 1; group ``&material``.
-    loss_frequency : float
+        (constant_loss); 0 < loss_factor <= 1; None: that of the standard ball by the model; group
+        ``&material``.
+    loss_frequency : float | None
         Frequency at which the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <=
-        10000; group ``&material``.
-    fractional_order : float
+        10000; None: that of the standard ball by the model; group ``&material``.
+    fractional_order : float | None
         Order of the derivative, for fractional; 1: as kelvin_voigt; 0 < fractional_order <= 1;
-        group ``&material``.
+        None: that of the standard ball by the model; group ``&material``.
     prony_share : sequence of float
         Moduli of the branches divided by the long-term modulus, for prony; 0 <= prony_share <=
         1000; group ``&material``.
     prony_time : sequence of float
         Relaxation times of the branches, for prony, s; 0 < prony_time <= 1000; group
         ``&material``.
-    friction : float
-        Coefficient of friction between ball and floor; 0 <= friction <= 100; group ``&contact``.
+    friction : float | None
+        Coefficient of friction between ball and floor; 0 <= friction <= 100; None: that of the
+        standard ball by the model; group ``&contact``.
     layer_stiffness : float
         Stiffness per area of a thin layer on the floor; 0: hard floor without a layer, N/m3; 0 <=
         layer_stiffness <= 1e+13; group ``&contact``.
@@ -483,14 +465,29 @@ class FiniteElement(Group):
     mooney_share: float = field(default=0.2, metadata={"group": "material"})
     bulk_ratio: float = field(default=200.0, metadata={"group": "material"})
     viscosity: FiniteElementViscosity = field(default="fractional", metadata={"group": "material"})
-    loss_factor: float = field(default=0.143, metadata={"group": "material"})
-    loss_frequency: float = field(default=74.0, metadata={"group": "material"})
-    fractional_order: float = field(default=0.3, metadata={"group": "material"})
+    loss_factor: float | None = field(default=None, metadata={"group": "material"})
+    loss_frequency: float | None = field(default=None, metadata={"group": "material"})
+    fractional_order: float | None = field(default=None, metadata={"group": "material"})
     prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
     prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
-    friction: float = field(default=0.0, metadata={"group": "contact"})
+    friction: float | None = field(default=None, metadata={"group": "contact"})
     layer_stiffness: float = field(default=0.0, metadata={"group": "contact"})
     snapshot_interval: float = field(default=0.0, metadata={"group": "output"})
+
+
+@dataclass(frozen=True, eq=False)
+class HollowSphere(Group):
+    """Options of the source model ``hollow_sphere``.
+
+    Attributes
+    ----------
+    momentum_flux : str
+        Term for the momentum of wall that enters or leaves the flat cap; "momentum_balance",
+        "retarding", "conservative", "none".
+    """
+
+    name: ClassVar[ModelName] = "hollow_sphere"
+    momentum_flux: HollowSphereMomentumFlux = "momentum_balance"
 
 
 @dataclass(frozen=True, eq=False)
@@ -982,7 +979,7 @@ class ModalFloor(Group):
     point_y: Sequence[float] = ()
 
 
-ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley | TwoMass
+ModelOptions = ModalBall | FiniteElement | HollowSphere | MeasuredModes | HuntCrossley | TwoMass
 FloorOptions = (
     Rigid
     | InfinitePlate
@@ -996,16 +993,13 @@ FloorOptions = (
 
 # Source models by name, the default first.
 MODELS: dict[str, type[ModelOptions]] = {
-    HollowSphere.name: HollowSphere,
     ModalBall.name: ModalBall,
     FiniteElement.name: FiniteElement,
+    HollowSphere.name: HollowSphere,
     MeasuredModes.name: MeasuredModes,
     HuntCrossley.name: HuntCrossley,
     TwoMass.name: TwoMass,
 }
-
-# Source of a case with a room that names no model.
-ROOM_SOURCE = ModalBall(damping_law="rising", loss_factor=0.3)
 
 # Floors by name, the default first.
 FLOORS: dict[str, type[FloorOptions]] = {
@@ -1190,6 +1184,30 @@ RATINGS: dict[RoomRequiredRating, str] = {
     "standardized": "standardized L_iA,Fmax of one-third octaves (ISO 16283-2)",
 }
 
+# Values of the standard ball by model and key; without a model for free modes alone.
+STANDARD_BALL: dict[tuple[str, str], float] = {
+    ("", "youngs_modulus"): 2060000.0,
+    ("", "poisson_ratio"): 0.5,
+    ("modal_ball", "youngs_modulus"): 1560000.0,
+    ("modal_ball", "poisson_ratio"): 0.5,
+    ("modal_ball", "loss_factor"): 0.31,
+    ("modal_ball", "loss_frequency"): 74.0,
+    ("finite_element", "youngs_modulus"): 2060000.0,
+    ("finite_element", "poisson_ratio"): 0.5,
+    ("finite_element", "loss_factor"): 0.21,
+    ("finite_element", "loss_frequency"): 74.0,
+    ("finite_element", "fractional_order"): 0.75,
+    ("finite_element", "friction"): 0.0,
+    ("hollow_sphere", "youngs_modulus"): 1600000.0,
+    ("hollow_sphere", "poisson_ratio"): 0.5,
+    ("measured_modes", "youngs_modulus"): 1600000.0,
+    ("measured_modes", "poisson_ratio"): 0.5,
+    ("hunt_crossley", "youngs_modulus"): 1600000.0,
+    ("hunt_crossley", "poisson_ratio"): 0.5,
+    ("two_mass", "youngs_modulus"): 1600000.0,
+    ("two_mass", "poisson_ratio"): 0.5,
+}
+
 # Every key, in the order of an input file.
 KEYS = (
     Key("", "case", "name", "text", "", "name of the case and of its output directory"),
@@ -1207,8 +1225,7 @@ KEYS = (
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves through the hole (vented), or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point above the floor", (), 1e-12, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
-    Key("", "model", "name", "choice", "", "source model (default with &room: a modal ball that conforms)", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
-    Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
+    Key("", "model", "name", "choice", "", "source model", ('modal_ball', 'finite_element', 'hollow_sphere', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("modal_ball", "modal_ball", "highest_frequency", "real", "Hz", "highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic", (), 0.0, 20000.0),
     Key("modal_ball", "modal_ball", "rings", "whole", "", "number of rings on the surface, from the lowest point to 60 degrees; 0: automatic", (), 0.0, 400.0, True),
     Key("modal_ball", "modal_ball", "damping_law", "choice", "", "damping law: loss factor as a function of frequency", ('constant', 'rising', 'fractional')),
@@ -1237,6 +1254,7 @@ KEYS = (
     Key("finite_element", "contact", "friction", "real", "", "coefficient of friction between ball and floor", (), 0.0, 100.0),
     Key("finite_element", "contact", "layer_stiffness", "real", "N/m3", "stiffness per area of a thin layer on the floor; 0: hard floor without a layer", (), 0.0, 10000000000000.0),
     Key("finite_element", "output", "snapshot_interval", "real", "s", "time between snapshots of the deformed ball; 0: none", (), 0.0, 10.0),
+    Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
     Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),
     Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 1e-12, 1000000.0),

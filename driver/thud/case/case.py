@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import f90nml
 import numpy as np
@@ -15,14 +15,14 @@ from thud.base._schema import (
     GROUPS,
     KEYS,
     MODELS,
-    ROOM_SOURCE,
+    STANDARD_BALL,
     Ball,
     Compression,
     Drop,
     FloorOptions,
-    HollowSphere,
     Levels,
     Limits,
+    ModalBall,
     ModelOptions,
     Modes,
     Room,
@@ -48,10 +48,13 @@ if TYPE_CHECKING:
     from dataclasses import Field
     from typing import Any, Self
 
+GroupType = TypeVar("GroupType", bound=Group)
 # Values by group and key, as f90nml has them.
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # Names of the keys that take lists of numbers or texts.
 LISTS = {key.name for key in KEYS if key.kind in {"list", "texts"}}
+# Names of the keys that are those of the standard ball where they are None.
+CALIBRATED = {key for _, key in STANDARD_BALL}
 # Optional groups of an impact, and all optional groups of a case.
 IMPACT_GROUPS: dict[str, type[Group]] = {
     "compression": Compression,
@@ -67,34 +70,20 @@ def group_of(model: str, option: Field[Any]) -> str:
     return group
 
 
-def default_model(room: Room | None) -> ModelOptions:
-    """Return the model of a case that names none: below a room, a source that conforms."""
-    return HollowSphere() if room is None else ROOM_SOURCE
-
-
-def new_model(
-    model: str | ModelOptions | None, options: Mapping[str, object], room: Room | None = None
-) -> ModelOptions:
-    """Return the options of a model by its name, or of that of a case that names none.
+def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -> ModelOptions:
+    """Return the options of a model by its name, by default those of the first one.
 
     Raise InputError if a name is not known.
     """
-    if model is None:
-        unnamed = default_model(room)
-        require_keywords(f"&{unnamed.name}", options, [key.name for key in fields(unnamed)])
-        return replace(unnamed, **options)  # type: ignore[arg-type]
     if isinstance(model, ModelOptions):
         if options:
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
+    model = model or next(iter(MODELS))
     require_choice("&model: name", model, MODELS)
     require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
     return MODELS[model](**options)  # type: ignore[arg-type]
-
-
-# The model of a case whose model is not stated.
-_UNNAMED = HollowSphere()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,8 +95,7 @@ class Case(Group, Displayed):
     name : str
         Name of the case, also of its output directory.
     model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
-        Options of the source model; by default `HollowSphere()`, with a room a `ModalBall` that
-        conforms to the standards; None: no impact.
+        Options of the source model, by default `ModalBall()`; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
     floor : FloorOptions or None
@@ -117,8 +105,8 @@ class Case(Group, Displayed):
     compression : Compression or None
         Options of the quasi-static compression by the source model; None: no compression.
     unknowns : Unknowns or None
-        What is not known of the source; None: the defaults of `assess`, which only standard balls
-        by finite elements have.
+        What is not known of the source; None: the calibrated set of the standard ball, which
+        `assess` has for finite elements and the modal ball.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -126,7 +114,7 @@ class Case(Group, Displayed):
     name: str = "python"
     ball: Ball = field(default_factory=Ball)
     drop: Drop = field(default_factory=Drop)
-    model: ModelOptions | None = _UNNAMED
+    model: ModelOptions | None = field(default_factory=ModalBall)
     sampling: Sampling = field(default_factory=Sampling)
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
@@ -135,12 +123,6 @@ class Case(Group, Displayed):
     room: Room | None = None
     compression: Compression | None = None
     unknowns: Unknowns | None = None
-
-    def __post_init__(self) -> None:
-        """Choose the model if none is stated."""
-        if self.model is _UNNAMED:
-            object.__setattr__(self, "model", default_model(self.room))
-        super().__post_init__()
 
     def __repr__(self) -> str:
         """Return what is computed."""
@@ -155,15 +137,23 @@ class Case(Group, Displayed):
         """Return header and rows of text."""
         units = {(key.owner or key.group, key.name): key.unit for key in KEYS}
         rows: list[tuple[str, ...]] = [("group", "key", "value", "unit")]
-        for group, entries in vars(self).items():
+        for group, entries in vars(self.resolved()).items():
             if isinstance(entries, Group):
                 owner = str(getattr(entries, "name", group))
                 for key, value in vars(entries).items():
                     rows.append((owner, key, str(value), units[owner, key]))
         return rows
 
+    def resolved(self) -> Self:
+        """Return the case with the values of the standard ball by its model where keys are None."""
+        name = self.model.name if self.model else ""
+        model = self.model and _resolved(self.model, name)
+        return replace(self, ball=_resolved(self.ball, name), model=model)
+
     def to_namelist(self) -> Namelist:
-        """Return the case as a namelist with every key, which prints as the text of a file.
+        """Return the case as a namelist, which prints as the text of a file.
+
+        It has every key but those of the standard ball that are None.
 
         Raise InputError if a value is not a number, a text or, if the key takes a list, a list of
         numbers.
@@ -194,7 +184,11 @@ class Case(Group, Displayed):
         }
         namelist = f90nml.Namelist()
         for group, options in groups.items():
-            plain = {key: _plain(group, key, value) for key, value in options.items()}
+            plain = {
+                key: _plain(group, key, value)
+                for key, value in options.items()
+                if value is not None or key not in CALIBRATED
+            }
             namelist[group] = {key: value for key, value in plain.items() if value != []}
         result: Namelist = namelist
         return result
@@ -216,25 +210,34 @@ class Case(Group, Displayed):
             for group, kind in IMPACT_GROUPS.items()
             if group in content
         }
-        room = optional.get("room")
         model = modes = None
         if "modes" in content:
             modes = Modes(**content["modes"])
         if "model" in content or not modes:
-            name = content.get("model", {}).get("name")
-            kind = type(default_model(room)) if name is None else MODELS[name]
+            name = content.get("model", {}).get("name", next(iter(MODELS)))
+            kind = MODELS[name]
             options = {}
             for option in fields(kind):
                 entries = content.get(group_of(kind.name, option), {})
                 if option.name in entries:
                     options[option.name] = entries[option.name]
-            model = new_model(name, _with_lists(options), room)
+            model = new_model(name, _with_lists(options))
         floor = None
         if "floor" in content:
             name = content["floor"].get("name", next(iter(FLOORS)))
             floor = FLOORS[name](**_with_lists(content.get(name, {})))
         name = content.get("case", {}).get("name", cls.name)
         return cls(name=name, model=model, floor=floor, modes=modes, **groups, **optional)
+
+
+def _resolved(group: GroupType, model: str) -> GroupType:
+    """Return a group with the values of the standard ball by a model where keys are None."""
+    values = {
+        name: STANDARD_BALL[model, name]
+        for name, value in vars(group).items()
+        if value is None and (model, name) in STANDARD_BALL
+    }
+    return replace(group, **values)  # type: ignore[type-var]
 
 
 def tables_case(tables: Mapping[str, Any]) -> Case:

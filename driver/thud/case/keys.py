@@ -117,10 +117,17 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 def value_in(case: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None if there is no value or a list."""
     key, entry = find_key(name, key_owners(case))
-    value = getattr(getattr(case, _group_of(key, case)), key.name, None)
+    value = getattr(getattr(case.resolved(), _group_of(key, case)), key.name, None)
     if isinstance(value, tuple) and entry:
         value = next(iter(value[entry - 1 :]), None)
     return value if isinstance(value, Value) else None
+
+
+def number_in(case: Case, name: str) -> float:
+    """Return the number of a key in a case, or of the standard ball where it is None."""
+    value = value_in(case, name)
+    assert isinstance(value, float | int)  # noqa: S101 - for the type checker
+    return value
 
 
 def humanize(name: str) -> str:

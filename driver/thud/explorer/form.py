@@ -9,7 +9,7 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, RATINGS
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, RATINGS, STANDARD_BALL
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
 from thud.case.keys import humanize
@@ -106,8 +106,23 @@ def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
 def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str, Any]:
     """Return a group of fields."""
     used = [key for key in keys if key.group not in OMITTED_GROUPS]
-    shown = [_field(key, getattr(values, key.name)) for key in used]
+    shown = [_field(key, _default(key, values)) for key in used]
     return {"part": part, "name": name, "title": _title(name), "fields": shown}
+
+
+def _default(key: Key, values: Group) -> object:
+    """Return the default of a key: of a calibrated one that of the first model that has it."""
+    value = getattr(values, key.name)
+    return next(iter(_standard(key).values())) if value is None else value
+
+
+def _standard(key: Key) -> dict[str, float]:
+    """Return the values of the standard ball for a key by model; empty if it has none."""
+    return {
+        model: STANDARD_BALL[model, key.name]
+        for model in MODELS
+        if key.owner in {"", model} and (model, key.name) in STANDARD_BALL
+    }
 
 
 def _field(key: Key, default: object) -> dict[str, Any]:
@@ -121,6 +136,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "help": meaning,
         "choices": {choice: humanize(choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
+        "standard": _standard(key),
         "unit": _typeset(key.unit),
         "si_unit": key.unit,
         "power": 0,

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import f90nml
 
-from thud.base._schema import FLOORS, KEYS, MODELS, Room
+from thud.base._schema import FLOORS, KEYS, MODELS
 from thud.base.files import inputs_folder
-from thud.case.case import Case, default_model
+from thud.case.case import Case
 from thud.case.keys import humanize
 
 if TYPE_CHECKING:
@@ -108,18 +108,12 @@ def input_case(name: str) -> Case:
     return Case.from_namelist(values)
 
 
-def standard_ball() -> Case:
-    """Return the ball of a room whose case names no source; it conforms to the standards."""
-    return Case(model=default_model(Room()))
-
-
 MODEL_FACTS = {
     "modal_ball": Facts(
         "Modal ball",
         "A rubber ball, computed while a slider moves: the exact modes of the sphere",
         "Octaves from 31.5 to 250 Hz; 500 Hz depends on the damping law. The modes are linear: "
         "1.6 MPa is an effective modulus.",
-        standard_ball,
         tuned=("loss_factor", *_MADE),
         fitted=("youngs_modulus", "loss_factor"),
     ),
@@ -127,10 +121,9 @@ MODEL_FACTS = {
         "Finite elements",
         "A rubber ball in detail: large strains, gas, losses and friction",
         "Octaves from 31.5 to 250 Hz; 500 Hz varies by 2 dB with the damping law.",
-        partial(input_case, "rubber_ball_fe.nml"),
-        ("gauge_pressure",),
-        ("loss_factor", *_MADE),
-        ("youngs_modulus", "loss_factor"),
+        unused=("gauge_pressure",),
+        tuned=("loss_factor", *_MADE),
+        fitted=("youngs_modulus", "loss_factor"),
     ),
     "hollow_sphere": Facts(
         "Thin shell",

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 from thud.base._schema import Ball, FiniteElement, HollowSphere, ModalBall, Modes, TwoMass
 from thud.base.bridge import ask
 from thud.case.case import Case, case_text
+from thud.case.keys import number_in, value_in
 from thud.explorer.series import TIME_RANGE, thin_out, to_json
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.free_modes import new_modes
@@ -34,6 +35,8 @@ DECIMALS = 1
 MODES = 12
 # Minimum amplitude of the lowest point of an excited mode, relative to its maximum.
 MIN_AMPLITUDE = 1e-6
+# Keys of the elasticity of the ball.
+_ELASTIC = ("youngs_modulus", "poisson_ratio")
 # Number of contact radii for which the forces on the modes are tabulated.
 RADII = 24
 
@@ -96,7 +99,8 @@ def _elements(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
     }
     if isinstance(model, FiniteElement):
         share = model.mooney_share if model.law == "mooney_rivlin" else 0.0
-        stress = mises_stress(start, mesh, impact.case.ball, share)
+        modulus, ratio = (number_in(impact.case, key) for key in _ELASTIC)
+        stress = mises_stress(start, mesh, modulus / (2 * (1 + ratio)), share)
         answer["color"] = {
             "name": "von Mises stress, elastic part",
             "unit": "kPa",
@@ -105,11 +109,11 @@ def _elements(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
     return answer
 
 
-def mises_stress(start: Array, position: Array, ball: Ball, share: float) -> Array:
+def mises_stress(start: Array, position: Array, modulus: float, share: float) -> Array:
     """Return the von Mises stress at the centers of the elements of an axisymmetric mesh, Pa.
 
     The stress is the elastic part, that of a Mooney–Rivlin material whose fraction of the second
-    invariant is `share` (0: neo-Hookean), for the modulus of the ball.
+    invariant is `share` (0: neo-Hookean), for a shear modulus, Pa.
 
     Parameters
     ----------
@@ -128,8 +132,7 @@ def mises_stress(start: Array, position: Array, ball: Ball, share: float) -> Arr
     gradient[..., 2, 2] = _centers(position)[..., 0] / _centers(start)[..., 0]
     gradient /= np.cbrt(np.linalg.det(gradient))[..., None, None]
     strain = gradient @ np.swapaxes(gradient, -1, -2)
-    shear_modulus = ball.youngs_modulus / (2 * (1 + ball.poisson_ratio))
-    stress = shear_modulus * ((1 - share) * strain - share * np.linalg.inv(strain))
+    stress = modulus * ((1 - share) * strain - share * np.linalg.inv(strain))
     pressure = np.trace(stress, axis1=-2, axis2=-1) / 3
     deviator = stress - pressure[..., None, None] * np.eye(3)
     result: Array = np.sqrt(1.5 * (deviator**2).sum(axis=(-2, -1)))
@@ -171,7 +174,10 @@ def _modal_section(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
     ball, model = impact.case.ball, impact.case.model
     assert isinstance(model, ModalBall)  # noqa: S101 - for the type checker
     modes = _modes(
-        ball.outer_radius, ball.wall_thickness, ball.mass, ball.youngs_modulus, ball.poisson_ratio
+        ball.outer_radius,
+        ball.wall_thickness,
+        ball.mass,
+        *(number_in(impact.case, key) for key in _ELASTIC),
     )
     pole = modes.shape[:, 0, -1, 1]
     # Shapes of unit modal mass; a mode whose lowest point rests is not excited.
@@ -180,7 +186,7 @@ def _modal_section(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
     shapes = modes.shape * scale[:, None, None, None]
     loads = _loads(modes.start[:, -1, 0], shapes[:, :, -1, 1], impact, ball.outer_radius)
     omega = 2 * math.pi * modes.frequency
-    damping = np.minimum(_loss_factors(model, modes.frequency) / 2, 0.99)
+    damping = np.minimum(_loss_factors(impact.case, modes.frequency) / 2, 0.99)
     amplitudes = np.array(
         [
             _response(load, w, z, 1 / impact.sample_rate)[chosen]
@@ -203,10 +209,13 @@ def _modal_section(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
     return {"kind": "section", "outer": sections[0], "inner": sections[1], "caption": caption}
 
 
-def _loss_factors(model: ModalBall, frequency: Array) -> Array:
+def _loss_factors(case: Case, frequency: Array) -> Array:
     """Return the loss factor of the modes of a modal ball."""
-    order = {"constant": 0.0, "rising": 1.0}.get(model.damping_law, model.fractional_order)
-    result: Array = model.loss_factor * (frequency / model.loss_frequency) ** order
+    order = {"constant": 0.0, "rising": 1.0}.get(
+        str(value_in(case, "damping_law")), number_in(case, "fractional_order")
+    )
+    loss, reference = number_in(case, "loss_factor"), number_in(case, "loss_frequency")
+    result: Array = loss * (frequency / reference) ** order
     return result
 
 

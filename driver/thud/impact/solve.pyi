@@ -30,15 +30,12 @@ class SamplingOptions(TypedDict, total=False):
     floor: FloorOptions | None
     room: Room | None
 
-class HollowSphereOptions(SamplingOptions, total=False):
-    momentum_flux: HollowSphereMomentumFlux
-
 class ModalBallOptions(SamplingOptions, total=False):
     highest_frequency: float
     rings: int
     damping_law: ModalBallDampingLaw
-    loss_factor: float
-    loss_frequency: float
+    loss_factor: float | None
+    loss_frequency: float | None
     fractional_order: float
     cavity_gas: bool
     contact_gravity: bool
@@ -56,14 +53,17 @@ class FiniteElementOptions(SamplingOptions, total=False):
     mooney_share: float
     bulk_ratio: float
     viscosity: FiniteElementViscosity
-    loss_factor: float
-    loss_frequency: float
-    fractional_order: float
+    loss_factor: float | None
+    loss_frequency: float | None
+    fractional_order: float | None
     prony_share: Sequence[float]
     prony_time: Sequence[float]
-    friction: float
+    friction: float | None
     layer_stiffness: float
     snapshot_interval: float
+
+class HollowSphereOptions(SamplingOptions, total=False):
+    momentum_flux: HollowSphereMomentumFlux
 
 class MeasuredModesOptions(SamplingOptions, total=False):
     frequency: Sequence[float]
@@ -94,21 +94,7 @@ def solve(ball: Case) -> Impact:
 
 @overload
 def solve(
-    ball: Ball | None = ..., drop: Drop | None = ..., model: Literal["hollow_sphere"] = ...,
-    **options: Unpack[HollowSphereOptions],
-) -> Impact:
-    """Drop a ball on a floor by the model ``hollow_sphere``."""
-
-@overload
-def solve(
-    ball: Ball | None, drop: Drop | None, model: Literal["modal_ball"],
-    **options: Unpack[ModalBallOptions],
-) -> Impact:
-    """Drop a ball on a floor by the model ``modal_ball``."""
-
-@overload
-def solve(
-    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["modal_ball"],
+    ball: Ball | None = ..., drop: Drop | None = ..., model: Literal["modal_ball"] = ...,
     **options: Unpack[ModalBallOptions],
 ) -> Impact:
     """Drop a ball on a floor by the model ``modal_ball``."""
@@ -126,6 +112,20 @@ def solve(
     **options: Unpack[FiniteElementOptions],
 ) -> Impact:
     """Drop a ball on a floor by the model ``finite_element``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["hollow_sphere"],
+    **options: Unpack[HollowSphereOptions],
+) -> Impact:
+    """Drop a ball on a floor by the model ``hollow_sphere``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["hollow_sphere"],
+    **options: Unpack[HollowSphereOptions],
+) -> Impact:
+    """Drop a ball on a floor by the model ``hollow_sphere``."""
 
 @overload
 def solve(

@@ -89,7 +89,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         case = Case(
             ball=Ball() if ball is None else ball,
             drop=Drop() if drop is None else drop,
-            model=new_model(model, options, room),
+            model=new_model(model, options),
             sampling=Sampling(**settings, verify=verify),  # type: ignore[arg-type]
             floor=floor,
             room=room,

@@ -65,7 +65,7 @@ def _draw_viscosity() -> Figure:
 
 def _draw_shell() -> Figure:
     """Draw both forces of the model of the paper."""
-    floor = solve()
+    floor = solve(model="hollow_sphere")
     elastic = replace(floor, case=replace(floor.case, levels=Levels(force="elastic")))
     return levels({"paper": elastic, "force plate": floor})
 
@@ -79,8 +79,10 @@ def _draw_models() -> Figure:
         )
         for order, loss_factor in ((0.15, 0.1305), (1.0, 0.2041))
     }
-    elements = {name: solve(Ball.standard(), model=model) for name, model in extremes.items()}
-    return levels({"hollow sphere": solve(), "modal ball": solve(model="modal_ball"), **elements})
+    elements = {name: solve(model=model) for name, model in extremes.items()}
+    return levels(
+        {"hollow sphere": solve(model="hollow_sphere"), "modal ball": solve(), **elements}
+    )
 
 
 def _draw_tires() -> Figure:
@@ -97,7 +99,10 @@ def _draw_fluxes() -> Figure:
     choices: tuple[HollowSphereMomentumFlux, ...] = (
         "momentum_balance", "retarding", "conservative", "none",
     )  # fmt: skip
-    impacts = {choice.replace("_", " "): solve(momentum_flux=choice) for choice in choices}
+    impacts = {
+        choice.replace("_", " "): solve(model="hollow_sphere", momentum_flux=choice)
+        for choice in choices
+    }
     return levels(impacts, "elastic")
 
 
@@ -131,7 +136,7 @@ def _draw_laws() -> Figure:
 
 def _draw_compressions() -> Figure:
     """Draw the paper's ball by each model, with one modulus, undamped."""
-    ball = Ball(poisson_ratio=0.49)
+    ball = Ball(youngs_modulus=1.6e6, poisson_ratio=0.49)
     models: dict[str, ModelName] = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
     curves = {name: compress(ball, model) for name, model in models.items()}
     for gas in ("vented", "adiabatic"):

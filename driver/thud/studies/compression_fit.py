@@ -15,6 +15,8 @@ from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
+from thud.case.case import Case, new_model
+from thud.case.keys import number_in
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.alternatives import PRESS_UNKNOWNS, require_unknowns
 from thud.studies.fitting.estimates import Estimates
@@ -154,7 +156,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     force : array_like, shape (n,)
         Measured force, N.
     ball
-        The ball, whose modulus starts the search; by default the ball of the paper.
+        The ball, whose modulus starts the search; by default the standard ball.
     model, gas
         As in `compress`.
     gain
@@ -177,13 +179,16 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     NumericalError
         If the model cannot be compressed that far, or its curve does not depend on the modulus.
     """
-    start = Ball() if ball is None else ball
+    case = Case(ball=Ball() if ball is None else ball, model=new_model(model, {}))
     measured, measured_force = _data(deflection, force)
     require_confidence(confidence)
     require_unknowns(unknowns, PRESS_UNKNOWNS)
     _require_gain(gain)
-    problem = _Problem(start, model, gas, measured, measured_force, tuple(unknowns), gain)
-    first = problem.curve(start.youngs_modulus)
+    problem = _Problem(
+        case.ball, number_in(case, "youngs_modulus"), model, gas, measured, measured_force,
+        tuple(unknowns), gain,
+    )  # fmt: skip
+    first = problem.curve(problem.modulus)
     x = np.array([np.log(_work_ratio(first, measured, measured_force)), 0.0])
     x = least_squares(
         problem.residual, x, bounds=_BOUNDS, x_scale=(1.0, 0.1), diff_step=_STEP, xtol=1e-6
@@ -200,7 +205,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
             texts.append(f"the {name} is {value:.2g} times as large as expected")
     for text in texts:
         warnings.warn(text, FitWarning, stacklevel=3)
-    scale = np.array([float(np.exp(x[0])) * start.youngs_modulus, problem.span])
+    scale = np.array([float(np.exp(x[0])) * problem.modulus, problem.span])
     errors = np.sqrt(np.diag(best.effect_covariance))
     nuisances = (problem.sizes * np.array([best.effect, errors])).T.tolist()
     return CompressionFit(
@@ -249,10 +254,11 @@ def _refine(problem: _Problem, x: Array) -> tuple[Array, Marginal, bool]:
 class _Problem:
     """The curve of a model and the effects of unknowns, at x.
 
-    x are the logarithm of the modulus over that of the ball, and the first touch over the span.
+    x are the logarithm of the modulus over that of the start, and the first touch over the span.
     """
 
     ball: Ball
+    modulus: float
     model: ModelName | ModelOptions
     gas: CompressionGas
     deflection: Array
@@ -282,7 +288,7 @@ class _Problem:
 
     def residual(self, x: Array) -> Array:
         """Return model − measured, N: [n]."""
-        curve = self.curve(float(np.exp(x[0])) * self.ball.youngs_modulus)
+        curve = self.curve(float(np.exp(x[0])) * self.modulus)
         force = PchipInterpolator(curve.deflection, curve.force)(self.depth(x))
         return np.asarray(force - self.force, dtype=np.float64)
 

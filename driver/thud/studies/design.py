@@ -51,7 +51,7 @@ class Design(SampleResult):
     mark : tuple of float or None
         Position of the ball of `mark_name`; None if it is outside the map.
     mark_name : str
-        ``"paper's ball"`` or ``"case"``.
+        ``"standard ball"`` or ``"case"``.
     rating_name : str
         Rating of the room that `required` refers to: ``"octaves"``, ``"thirds"`` or
         ``"standardized"``.
@@ -207,14 +207,17 @@ def _is_axis(parameter: Parameter) -> bool:
 
 
 def _mark(study: SampleStudy) -> tuple[tuple[float, ...] | None, str]:
-    """Return the mark: the paper's ball if all other keys have its values, else the case."""
+    """Return the mark: the standard ball if all other keys have its values, else the case."""
     names = [parameter.name for parameter in study.parameters]
-    paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
+    standard = _ball_and_drop(Case(model=study.case.model), None)
+    ours = _ball_and_drop(study.case, study.density)
     mass_follows_density = study.density is not None or DENSITY.name in names
     ignored = "mass" if mass_follows_density else DENSITY.name
-    compared = set(paper) - set(names) - {ignored}
-    of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in compared)
-    values = paper if of_paper else ours
+    compared = set(standard) - set(names) - {ignored}
+    is_standard = set(names) <= set(standard) and all(
+        math.isclose(ours[n], standard[n]) for n in compared
+    )
+    values = standard if is_standard else ours
     positions: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
     ends = [(min(grid), max(grid)) for grid in (p.grid() for p in study.parameters)]
     inside = all(
@@ -222,12 +225,12 @@ def _mark(study: SampleStudy) -> tuple[tuple[float, ...] | None, str]:
         for position, (low, high) in zip(positions, ends, strict=True)
     )
     mark = tuple(map(float, positions)) if inside else None
-    return mark, "paper's ball" if of_paper else "case"
+    return mark, "standard ball" if is_standard else "case"
 
 
 def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
     """Return the parameters of ball and drop, and the density of the wall, by name."""
-    ball = case.ball
+    ball = case.resolved().ball
     volume = wall_volume(ball.outer_radius, ball.wall_thickness)
     if density is None:
         density = ball.mass / volume if volume else math.nan

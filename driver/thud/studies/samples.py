@@ -123,7 +123,7 @@ class SampleStudy(Study):
         result = dict(columns)
         density = result.pop(DENSITY.name, self.density)
         if density is not None:
-            ball = vars(self.case.ball) | result
+            ball = vars(self.case.resolved().ball) | result
             volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
             result["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
         return self.temperature.apply(self.case, result) if self.temperature else result

@@ -75,7 +75,8 @@ class Temperature:
         """
         result = dict(samples)
         temperature = result.pop(TEMPERATURE.name)
-        values = {**vars(case.ball), **vars(case.model), **result}
+        standard = case.resolved()
+        values = {**vars(standard.ball), **vars(standard.model), **result}
         above = temperature - self.reference
         modulus = values["youngs_modulus"] * (1 + (self.coefficient or 0.0) * above)
         if self.c1 is not None:

@@ -424,7 +424,7 @@ def _columns(parts: tuple[Values, ...], count: int) -> Values:
 
 def keys_of(case: Case) -> dict[str, str]:
     """Return the keys of a case that matter for a surrogate, as texts by group and key."""
-    groups = case.to_namelist()
+    groups = case.resolved().to_namelist()
     return {
         f"&{group}: {key}": f"{value!r}"
         for group, keys in groups.items()

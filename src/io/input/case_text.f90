@@ -1,8 +1,8 @@
 !> Cases as namelist files: reading, writing, and the description of all keys.
 module thud_case_text
    use, intrinsic :: iso_fortran_env, only: int64
-   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case, set_floor_air, &
-      set_room_source
+   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, get_full_key, is_stated, &
+      new_case, set_floor_air, set_standard_modulus
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
@@ -37,6 +37,7 @@ contains
       logical :: needs_floor
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
+      logical, allocatable :: stated(:)
       integer :: i, j
 
       call new_case(case)
@@ -44,6 +45,7 @@ contains
       call parse_groups(text, groups, error)
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
+      allocate (stated(size(fields)), source=.false.)
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
       case%has_floor = any([(groups(i)%name == 'floor', i=1, size(groups))])
       case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
@@ -55,17 +57,18 @@ contains
       if (present(room_alone)) needs_floor = needs_floor .and. .not. room_alone
       if (needs_floor .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &
          '&room is given without &floor; allowed: both, for the level in the room below')
-      if (case%has_impact .and. case%has_room .and. .not. names_model(groups)) call set_room_source(case)
       do i = 1, merge(size(main_groups), 1, case%has_impact)
          if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
          case%left_out = trim(case%left_out)//' &'//main_groups(i)
       end do
       do i = 1, size(groups)
          if (allocated(error)) return
-         call assign_group(groups(i), fields, error)
+         call assign_group(groups(i), fields, stated, error)
       end do
       if (present(directory) .and. .not. allocated(error)) call resolve_paths(fields, directory, error)
       if (allocated(error)) return
+      case%unstated = pack(get_full_key(fields), fields%is_calibrated .and. .not. stated)
+      if (any(case%unstated == 'ball.youngs_modulus')) call set_standard_modulus(case)
       call set_floor_air(case)
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
@@ -104,17 +107,6 @@ contains
          end associate
       end do
    end subroutine resolve_paths
-
-   !> Whether a file names the source model.
-   pure function names_model(groups) result(named)
-      !> Groups of the file: [n_group].
-      type(group_type), intent(in) :: groups(:)
-      logical :: named
-      integer :: i, j
-
-      named = any([((groups(i)%name == 'model' .and. groups(i)%assignments(j)%key == 'name', &
-         j=1, size(groups(i)%assignments)), i=1, size(groups))])
-   end function names_model
 
    !> Returns an error if the case does not use a group.
    subroutine check_use(groups, case, error)
@@ -170,10 +162,12 @@ contains
    end subroutine check_groups
 
    !> Sets the variables of one group.
-   subroutine assign_group(group, fields, error)
+   subroutine assign_group(group, fields, stated, error)
       type(group_type), intent(in) :: group
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
+      !> Set for the keys of the group: [n_field].
+      logical, intent(inout) :: stated(:)
       !> Set if a key is unknown or given twice, or its value has the wrong type.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: allowed, suggestion
@@ -183,6 +177,7 @@ contains
       do i = 1, size(group%assignments)
          associate (assignment => group%assignments(i))
             is_meant = fields%group == group%name .and. fields%key == assignment%key
+            stated = stated .or. is_meant
             if (.not. any(is_meant)) then
                call get_suggestion(assignment%key, pack(fields%key, fields%group == group%name), suggestion)
                error = input_error('&'//group%name//': '//shortened(assignment%key)//' in line '//to_text(assignment%line) &
@@ -217,16 +212,19 @@ contains
       once = pack(texts, first)
    end function distinct
 
-   !> The complete input as the text of a namelist file; reading it gives the same case.
-   subroutine get_case_text(case, text)
+   !> The input as the text of a namelist file; reading it gives the same case.
+   subroutine get_case_text(case, text, stated_only)
       type(case_type), intent(in), target :: case
       character(len=:), allocatable, intent(out) :: text
+      !> Without the calibrated keys that the case does not state (default: the complete input).
+      logical, intent(in), optional :: stated_only
       character(len=:), allocatable :: value
       type(field_type), allocatable :: fields(:)
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
-      text = '! thud: the full input of case '//trim(case%name)//', SI units'//newline
+      if (present(stated_only)) fields = pack(fields, is_stated(case, fields) .or. .not. stated_only)
+      text = '! thud: the input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
          call fields(i)%get_text(value)

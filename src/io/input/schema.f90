@@ -2,10 +2,10 @@
 !> from it.
 module thud_schema
    use thud_band, only: band_set_names, band_type, get_bands, octave_count
-   use thud_case, only: case_type, get_active_fields, get_fields, new_case, set_room_source
+   use thud_case, only: case_type, get_active_fields, get_fields, new_case, set_standard_modulus
    use thud_constants, only: version
    use thud_error, only: error_type
-   use thud_field, only: field_type
+   use thud_field, only: field_type, name_length
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_quantities, only: history_quantity_count, quantities, quantity_type, sample_quantity_count
@@ -29,15 +29,14 @@ contains
       type(field_type), allocatable :: fields(:)
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
-      character(len=:), allocatable :: entry, room_source
+      character(len=:), allocatable :: entry
       integer :: i
 
-      call describe_room_source(room_source)
       call new_case(case)
       allocate (fields, source=get_fields(case))
       text = '{"version": '//text_value(version)//','//newline//'"models": '//list_of(model_names)//','//newline &
          //'"floors": '//list_of(floor_names)//','//newline//'"sources": '//list_of(source_names)//','//newline &
-         //'"room_source": '//room_source//','//newline//'"band_sets": {'
+         //'"band_sets": {'
       do i = 1, size(band_set_names)
          bands = get_bands(band_set_names(i))
          text = text//newline//text_value(band_set_names(i))//': {"nominal": ['//join(bands%nominal)//'], "center": [' &
@@ -71,32 +70,37 @@ contains
          call describe(fields(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(fields)))
       end do
-      text = text//']}'
+      call describe_standard_ball(entry)
+      text = text//'],'//newline//'"standard_ball": ['//newline//entry//']}'
    end subroutine get_schema
 
-   !> Describes the source of a room by the options of its model that differ from their defaults.
-   subroutine describe_room_source(text)
-      !> A JSON object.
+   !> Describes the calibrated keys: the values of the standard ball by each model, and for free modes alone by ''.
+   subroutine describe_standard_ball(text)
+      !> JSON objects with a comma between them.
       character(len=:), allocatable, intent(out) :: text
-      type(case_type), target :: case, default
-      type(field_type), allocatable :: fields(:), defaults(:)
-      character(len=:), allocatable :: value
-      integer :: i
+      type(case_type), target :: case
+      type(field_type), allocatable :: fields(:)
+      character(len=name_length) :: model
+      integer :: i, j
 
-      call new_case(case)
-      call set_room_source(case)
-      call new_case(default)
-      default%model = case%model
-      allocate (fields, source=get_active_fields(case))
-      allocate (defaults, source=get_active_fields(default))
-      text = '{"name": '//text_value(case%model)
-      do i = 1, size(fields)
-         if (fields(i)%owner /= case%model) cycle
-         value = json_value(fields(i))
-         if (value /= json_value(defaults(i))) text = text//', '//text_value(fields(i)%key)//': '//value
+      text = ''
+      do i = 0, size(model_names)
+         call new_case(case)
+         case%has_impact = i > 0
+         case%has_modes = i == 0
+         model = ''
+         if (i > 0) model = model_names(i)
+         if (i > 0) case%model = model
+         call set_standard_modulus(case)
+         fields = get_active_fields(case)
+         do j = 1, size(fields)
+            if (.not. fields(j)%is_calibrated) cycle
+            if (text /= '') text = text//','//newline
+            text = text//'{"model": '//text_value(model)//', "key": ' &
+               //text_value(fields(j)%key)//', "value": '//json_value(fields(j))//'}'
+         end do
       end do
-      text = text//'}'
-   end subroutine describe_room_source
+   end subroutine describe_standard_ball
 
    !> Describes the criteria of a source.
    subroutine describe_limits(source, text)
@@ -137,10 +141,13 @@ contains
       !> A JSON object.
       character(len=:), allocatable, intent(out) :: text
       type(interval_type) :: interval
+      character(len=:), allocatable :: value
 
+      value = json_value(field)
+      if (field%is_calibrated) value = 'null'
       text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
          //text_value(field%key)//', "kind": '//text_value(field%get_kind())//', "unit": '//text_value(field%unit) &
-         //', "default": '//json_value(field)//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
+         //', "default": '//value//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
          //text_value(field%meaning)
       if (field%range /= '') then
          interval = new_interval(field%range)

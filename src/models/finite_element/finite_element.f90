@@ -73,7 +73,7 @@ module thud_finite_element
    contains
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
-      procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: get_standard_modulus
       procedure, pass(options) :: get_validity_limits
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
@@ -104,13 +104,13 @@ contains
       if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 
-   !> Modulus of elasticity of the paper's ball, Pa (from its published free modes, section 4.1).
-   function get_paper_modulus(options) result(modulus)
+   !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
+   function get_standard_modulus(options) result(modulus)
       class(finite_element_type), intent(in) :: options
       real(wp) :: modulus
 
-      modulus = 2.08e6_wp
-   end function get_paper_modulus
+      modulus = 2.06e6_wp
+   end function get_standard_modulus
 
    !> The limit of the speed of the ball; the error of the mesh is stated by its numerical error.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)

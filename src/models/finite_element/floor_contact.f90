@@ -53,7 +53,8 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('friction', options%friction, '', 'coefficient of friction between ball and floor', '[0, 100]'), &
+         real_field('friction', options%friction, '', 'coefficient of friction between ball and floor', '[0, 100]', &
+         is_calibrated=.true.), &
          real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
          'stiffness per area of a thin layer on the floor; 0: hard floor without a layer', '[0, 1e13]')]
    end function get_contact_fields

@@ -29,11 +29,11 @@ module thud_material
       !> Law of viscosity: `none`, `kelvin_voigt`, `fractional`, `constant_loss` or `prony`.
       character(len=name_length) :: viscosity = 'fractional'
       !> Loss factor at `loss_frequency`.
-      real(wp) :: loss_factor = 0.143_wp
+      real(wp) :: loss_factor = 0.21_wp
       !> Frequency of the loss factor, Hz; there the storage modulus is the ball's modulus of elasticity.
       real(wp) :: loss_frequency = 74.0_wp
       !> Order of the fractional derivative.
-      real(wp) :: fractional_order = 0.3_wp
+      real(wp) :: fractional_order = 0.75_wp
       !> Prony series: moduli divided by the long-term modulus.
       type(list_type) :: prony_share
       !> Prony series: relaxation times, s.
@@ -75,11 +75,11 @@ contains
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
-         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]'), &
+         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', is_calibrated=.true.), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]'), &
+         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', is_calibrated=.true.), &
          real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]'), &
+         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', is_calibrated=.true.), &
          list_field('prony_share', options%prony_share, '', &
          'moduli of the branches divided by the long-term modulus, for prony', '[0, 1000]'), &
          list_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &

@@ -32,7 +32,7 @@ module thud_hollow_sphere
       procedure, pass(options) :: get_error_ratio
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: solve => solve_hollow_sphere
-      procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: get_standard_modulus
       procedure, pass(options) :: get_validity_limits
       procedure, pass(options) :: compress
    end type hollow_sphere_type
@@ -79,12 +79,12 @@ contains
    end function get_fields
 
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
-   function get_paper_modulus(options) result(modulus)
+   function get_standard_modulus(options) result(modulus)
       class(hollow_sphere_type), intent(in) :: options
       real(wp) :: modulus
 
       modulus = 1.6e6_wp
-   end function get_paper_modulus
+   end function get_standard_modulus
 
    !> Limits of the assumptions: a thin shell, a wall that stays close to the sphere, and no gravity during the contact.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)

@@ -41,7 +41,7 @@ module thud_modal_ball
       procedure, pass(options) :: solve
       procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
-      procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: get_standard_modulus
       procedure, pass(options) :: get_validity_limits
    end type modal_ball_type
 
@@ -83,13 +83,14 @@ contains
       end if
    end function get_cost
 
-   !> Modulus of elasticity of the paper's ball, Pa (section 2.3). For linear modes it is an effective modulus.
-   function get_paper_modulus(options) result(modulus)
+   !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
+   !> modulus.
+   function get_standard_modulus(options) result(modulus)
       class(modal_ball_type), intent(in) :: options
       real(wp) :: modulus
 
-      modulus = 1.6e6_wp
-   end function get_paper_modulus
+      modulus = 1.56e6_wp
+   end function get_standard_modulus
 
    !> Limits of linear modes.
    function get_validity_limits(ball, drop, options, sampling, history) result(limits)

@@ -69,9 +69,9 @@ module thud_modal_ball_options
       !> Number of rings of the surface that carry the pressure; 0: chosen with the resolution.
       integer :: rings = 0
       !> Loss factor: `constant`, `rising` in proportion to frequency, or of a `fractional` law.
-      character(len=name_length) :: damping_law = 'constant'
+      character(len=name_length) :: damping_law = 'rising'
       !> Loss factor, twice the damping ratio.
-      real(wp) :: loss_factor = 0.1_wp
+      real(wp) :: loss_factor = 0.31_wp
       !> Frequency at which `loss_factor` applies if it is not constant, Hz. At this frequency the storage modulus is the
       !> modulus of the ball.
       real(wp) :: loss_frequency = 74.0_wp
@@ -122,9 +122,10 @@ contains
          choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
          [character(len=10) :: 'constant', 'rising', 'fractional']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
-         '[0, 1.9]'), &
+         '[0, 1.9]', is_calibrated=.true.), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]'), &
+         'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]', &
+         is_calibrated=.true.), &
          real_field('fractional_order', options%fractional_order, '', &
          'order of the derivative, for fractional; 1: as rising', '(0, 1]'), &
          logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists volume changes'), &

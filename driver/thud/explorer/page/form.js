@@ -35,13 +35,16 @@ function isUsed(field) {
 
 const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 
+/** Return the default of a field: of a calibrated key the value of the standard ball by the model. */
+export const defaultOf = (field, model = state.model) => field?.standard?.[model] ?? field?.default;
+
 function valueOf(field) {
-  return state.values[field.group]?.[field.name] ?? field.default;
+  return state.values[field.group]?.[field.name] ?? defaultOf(field);
 }
 
 function setValue(field, value) {
   const group = (state.values[field.group] ??= {});
-  if (isSame(value, field.default)) delete group[field.name];
+  if (isSame(value, defaultOf(field))) delete group[field.name];
   else group[field.name] = value;
   if (!Object.keys(group).length) delete state.values[field.group];
 }
@@ -98,7 +101,7 @@ function exchange(old, next) {
   for (const [group, values] of Object.entries(old)) {
     for (const [name, value] of Object.entries(values)) {
       const field = findField(group, name);
-      if (field && isSame(valueOf(field), value)) setValue(field, field.default);
+      if (field && isSame(valueOf(field), value)) setValue(field, defaultOf(field));
     }
   }
   for (const [group, values] of Object.entries(next)) for (const [name, value] of Object.entries(values)) {
@@ -130,7 +133,7 @@ const ceilingFields = () => findGroup("room", "room").fields.filter((field) => f
 
 /** Return the construction whose values the form has, if there is one, and choose it; of several, the chosen one. */
 function findConstruction() {
-  const hasValues = (fields, values) => fields.every((field) => isSame(valueOf(field), values[field.name] ?? field.default));
+  const hasValues = (fields, values) => fields.every((field) => isSame(valueOf(field), values[field.name] ?? defaultOf(field)));
   const equal = about.constructions.filter((construction) => construction.floor === state.floor && hasValues(filledFields(construction), construction.keys)
     && (showsRoom() ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
   const construction = equal.find(({ name }) => name === state.chosen) ?? equal[0];
@@ -143,8 +146,8 @@ function fillConstruction(name) {
   const construction = about.constructions.find((entry) => entry.name === name);
   if (!construction) return;
   Object.assign(state, { chosen: name, floor: construction.floor, room: state.room || Object.keys(construction.room).length > 0 });
-  for (const field of filledFields(construction)) setValue(field, construction.keys[field.name] ?? field.default);
-  for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? field.default);
+  for (const field of filledFields(construction)) setValue(field, construction.keys[field.name] ?? defaultOf(field));
+  for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? defaultOf(field));
 }
 
 // ---- Form.
@@ -203,7 +206,7 @@ const AGING = { ends: [0, 100], log: false };
 function newModulus() {
   const field = findField("ball", "youngs_modulus");
   const preset = isUsed(field) && about.presets.find(({ door, values }) => door === "ball" && values.model.name === state.model);
-  return preset ? preset.values.ball?.youngs_modulus ?? field.default : null;
+  return preset ? preset.values.ball?.youngs_modulus ?? defaultOf(field) : null;
 }
 
 /** Return the percentage by which aging has raised the modulus. */

@@ -2,7 +2,7 @@
 import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
 import { STYLES, swatch } from "./plot.js";
 import { SOURCE_VERDICTS, headlineText } from "./results.js";
-import { about, factsOf, findField } from "./form.js";
+import { about, defaultOf, factsOf, findField } from "./form.js";
 
 // Words of keys in names, if shorter than their labels.
 const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
@@ -75,7 +75,7 @@ function closest(values, isOwn, candidates, chosen) {
 
 function keyValue(values, key) {
   const [group, name] = key.split(".");
-  return values[group]?.[name] ?? findField(group, name)?.default;
+  return values[group]?.[name] ?? defaultOf(findField(group, name), values.model?.name);
 }
 
 /** Return the text of the value of a key, "group.key", in the unit of its field. */
@@ -105,7 +105,7 @@ export function inputRows(values) {
   if (values.floor) rows.push(["Floor", factsOf("floor", values.floor.name).title]);
   const stated = ({ group, name }) => values[group]?.[name];
   const isMain = ({ advanced, models, condition }) => !advanced && models?.includes(values.model.name) !== false
-    && (!condition || condition.values.includes(stated(condition) ?? findField(condition.group, condition.name).default));
+    && (!condition || condition.values.includes(stated(condition) ?? defaultOf(findField(condition.group, condition.name), values.model.name)));
   for (const { part, name, title, fields } of about.form) {
     if (!(part === "room" ? values.room : part === name || values[part]?.name === name)) continue;
     for (const field of fields) if (stated(field) !== undefined || isMain(field)) rows.push([`${field.label} (${title.toLowerCase()})`, valueText(values, `${field.group}.${field.name}`)]);
