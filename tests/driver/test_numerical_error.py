@@ -67,7 +67,7 @@ def test_verdict_and_page_do_not_take_an_unknown_error_as_small(
     known = thud.solve()
     unknown = replace(known, octave_500_error=np.nan)
     assert known.assess().criteria[4].estimate.expanded == pytest.approx(known.octave_500_error)
-    assert unknown.assess().criteria[4].result == "undecided"
+    assert unknown.assess().criteria[4].conforms == "undecided"
     assert unknown.assess().rows()[5][2] == "unknown"
     monkeypatch.setattr("thud.explorer.answer.compute", lambda _: unknown)
     titles = [title for title, *_ in answer_case(known.case)["numbers"]]

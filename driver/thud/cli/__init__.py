@@ -14,6 +14,7 @@ from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.tables import wrap
 from thud.cli.case_commands import (
+    ASSESS,
     EXAMPLES,
     EXPORT,
     compare_cases,
@@ -86,6 +87,7 @@ COMMANDS = {
         ),
         run_cases,
     ),
+    "assess": ASSESS,
     "compare": Command(
         "compare models and recordings of the same drop on one page",
         (

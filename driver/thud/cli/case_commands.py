@@ -34,6 +34,7 @@ from thud.cli.screen import print_error, print_notes, print_path, print_results,
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
+from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
     import argparse
@@ -102,6 +103,38 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         print_results(text(answer["table"]).removesuffix("\n"))
         print_path("  Results", f"{results.folder}\n")
     return bool(answer["conforms"])
+
+
+def assess_case(options: argparse.Namespace) -> int:
+    """Assess a case over what is not known of its source; return the exit code."""
+    from thud.studies.calibrated_set import assess
+
+    case = read_case(options.case)
+    results = results_of(options, f"{case.name}_verdict", (options.case,), case.name)
+    results.require()
+    verdict = assess(case, progress=shows_progress(quiet=options.quiet))
+    results.write({"verdict.csv": verdict.to_csv().encode()})
+    if not options.quiet:
+        print_results("\n".join([format_rows(verdict.rows()), *verdict.notes]))
+        print_path("Results", results.folder)
+    return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0
+
+
+ASSESS = Command(
+    "assess a case over what is not known of its source",
+    (
+        argument("case", type=file_of("case"), metavar="CASE.nml", help="namelist file"),
+        *output("the verdict (default: outputs/<case name>_verdict)"),
+        argument(
+            "--check",
+            action="store_true",
+            help="exit with 3 unless the source conforms over what is not known of it "
+            "(run --check: with the values of the case)",
+        ),
+        QUIET,
+    ),
+    assess_case,
+)
 
 
 def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:

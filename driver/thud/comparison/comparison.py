@@ -95,7 +95,7 @@ class Comparison(Displayed, Page):
         ]
         if any(times):
             rows.append(("computing time, ms", *(f"{1e3 * t:.3g}" if t else "" for t in times)))
-        rows.append(("verdict", *(verdict.result for verdict in verdicts)))
+        rows.append(("verdict", *(verdict.conforms for verdict in verdicts)))
         # The criteria are the rows after the first three; the verdict is the last row.
         blank = [""] * (len(rows) - 4 - len(criteria))
         limits = (row[0].shown_limits for row in criteria)
@@ -125,9 +125,9 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
     if np.isnan(criterion.value):
         return "unknown"
     conforms, fails, _ = VERDICTS
-    if criterion.result == conforms:
+    if criterion.conforms == conforms:
         state = ""
-    elif criterion.result == fails:
+    elif criterion.conforms == fails:
         state = "low" if criterion.value < criterion.lower else "high"
     else:
         state = "undecided"

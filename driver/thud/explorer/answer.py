@@ -146,7 +146,7 @@ def common_answer(
             },
         },
         "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
-        "result": RESULTS[verdict.result],
+        "result": RESULTS[verdict.conforms],
         "numbers": _numbers(source),
         "warnings": [],
     }
@@ -183,7 +183,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
         "uncertainty_name": criterion.uncertainty_name,
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
-        "result": RESULTS[criterion.result],
+        "result": RESULTS[criterion.conforms],
         **criterion_facts(criterion.name, source),
     }
 

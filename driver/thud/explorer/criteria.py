@@ -75,7 +75,7 @@ def recording_headline(
     level names the largest contribution to its uncertainty; `excluded` is a sentence on what the
     uncertainty lacks, and `is_stated` whether the source is stated.
     """
-    result = RESULTS[verdict.result]
+    result = RESULTS[verdict.conforms]
     parts = [excluded, _standard(verdict)]
     largest = largest_contribution(verdict)
     if result == "undecided" and largest:
@@ -83,14 +83,14 @@ def recording_headline(
     if not is_stated:
         parts.append("The source is not stated: these limits are assumed.")
     detail = " ".join(filter(None, parts))
-    return _headline(verdict, verdict.result, detail, shown)
+    return _headline(verdict, verdict.conforms, detail, shown)
 
 
 def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
     """Return the title of the first undecided level and its largest contribution, if any."""
     for entry in verdict.criteria:
         parts = [part for part in entry.estimate.contributions if part.counted]
-        if entry.result_if_stated == VERDICTS[2] and entry.unit == "dB" and parts:
+        if entry.conforms_if_stated == VERDICTS[2] and entry.unit == "dB" and parts:
             return entry.quantity.title, max(parts, key=lambda part: part.uncertainty).name
     return None
 
@@ -101,17 +101,17 @@ def model_headline(verdict: Verdict) -> dict[str, str]:
         "Values of this model only, from which others may differ; thud-driver assess counts what "
         f"is not known of the source. {_standard(verdict)}"
     )
-    return _headline(verdict, f"{verdict.result} by this model", detail)
+    return _headline(verdict, f"{verdict.conforms} by this model", detail)
 
 
 def _headline(
     verdict: Verdict, words: str, detail: str, shown: Mapping[str, str] | None = None
 ) -> dict[str, str]:
     """Return the headline of a verdict by its values, with their causes or the closest limit."""
-    result = RESULTS[verdict.result]
+    result = RESULTS[verdict.conforms]
     if result == "conforms":
         return _texts(result, words, f"{_closest(verdict)} {detail}")
-    entries = [entry for entry in verdict.criteria if entry.result == verdict.result]
+    entries = [entry for entry in verdict.criteria if entry.conforms == verdict.conforms]
     causes = {e.quantity.title: _cause(e, shown or {}) for e in entries if not math.isnan(e.value)}
     unknown = [entry.quantity.title for entry in entries if math.isnan(entry.value)]
     return _texts(result, words, detail, *_listed(causes, unknown))
@@ -178,7 +178,7 @@ def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
     """Return name, value and limit of a criterion that is not met or not decided."""
     quantity = criterion.quantity
     value, expanded = criterion.value, criterion.estimate.expanded
-    if criterion.result == VERDICTS[1]:
+    if criterion.conforms == VERDICTS[1]:
         is_low = value < criterion.lower
         limit = criterion.lower if is_low else criterion.upper
         word = "below" if is_low else "above"
@@ -188,7 +188,7 @@ def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
             text = f"{quantity.show(value)} {quantity.display_unit}".rstrip()
         text = shown.get(criterion.name, text)
         return f"{quantity.title} {text}, {word} {limit * quantity.display_scale:g}"
-    if criterion.result_if_stated != criterion.result:
+    if criterion.conforms_if_stated != criterion.conforms:
         missing = " and ".join(criterion.estimate.not_stated)
         return f"{quantity.title} {_shown(criterion, value)}, uncertainty of {missing} not stated"
     if not math.isfinite(expanded):

@@ -24,7 +24,7 @@ from thud.floors.constructions import constructions
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
-from thud.level.assessment import get_criteria
+from thud.level.assessment import VERDICTS, get_criteria
 from thud.level.rating import meets
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
@@ -95,7 +95,7 @@ def improve(values: Values) -> Work:
         return (yield from _improve_floor(case))
     impact = compute(case)
     verdict = impact.assess()
-    if verdict:
+    if verdict.conforms == VERDICTS[0]:
         return {"changes": [], "none": "The source conforms already.", "note": NOTE}
     model = case.model.name if case.model else ""
     names = _facts(model).tuned
@@ -323,7 +323,7 @@ def _conforms(case: Case, name: str, value: float) -> bool:
         verdict = compute(with_values(case, {name: value})).assess()
     except ThudError:
         return False
-    return verdict.conforms and all(map(_has_margin, verdict.criteria))
+    return verdict.conforms == VERDICTS[0] and all(map(_has_margin, verdict.criteria))
 
 
 def _has_margin(criterion: Criterion) -> bool:
