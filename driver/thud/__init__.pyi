@@ -104,6 +104,7 @@ from .level.rating import (
 from .recordings.read_recording import read_recording as read_recording
 from .recordings.recording import Recording as Recording
 from .report.write import write_report as write_report
+from .studies.calibrated_set import assess as assess
 from .studies.compression_fit import (
     CompressionFit as CompressionFit,
     fit_compression as fit_compression,
@@ -117,11 +118,6 @@ from .studies.fitting.fit_result import Fit as Fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
 from .studies.fitting.level_target import LevelTarget as LevelTarget
 from .studies.kinds import read_study as read_study
-from .studies.model_assessment import assess as assess
-from .studies.model_verdict import (
-    ModelCriterion as ModelCriterion,
-    ModelVerdict as ModelVerdict,
-)
 from .studies.parameter import Parameter as Parameter
 from .studies.sensitivity import (
     Sensitivity as Sensitivity,

@@ -441,7 +441,7 @@ def test_levels_and_forces_are_kept_by_their_names() -> None:
             kept = getattr(found, f"{force}_force")[i]
             assert kept == pytest.approx(impact.force(force), abs=1e-6)  # type: ignore[arg-type]
             met = getattr(found, f"{force}_conforms")[i]
-            assert met == impact.assess(force=force).conforms  # type: ignore[arg-type]
+            assert met == bool(impact.assess(force=force))  # type: ignore[arg-type]
     assert list(thud.solve_many({"height": 1.0}).levels) == [
         ("elastic", "octave"),
         ("floor", "octave"),

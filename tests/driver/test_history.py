@@ -62,7 +62,7 @@ def report(day: str, levels: Any = LEVELS, deviation: float = 0.1, **keys: Any) 
             "upper": one.upper,
             "limits_of_standard": True,
             "margin": None if np.isnan(one.value) else one.margin,
-            "verdict": one.result,
+            "verdict": one.conforms,
             "spread": None,
             "background": None,
             "contributions": [vars(c) for c in one.estimate.contributions],

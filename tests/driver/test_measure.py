@@ -77,7 +77,7 @@ def test_examples_are_measured_as_they_were_made(
         rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
     assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
     report = json.loads((tmp_path / "out/report.json").read_text())
-    assert report["verdict"] == recording.assess().result == "does not conform"
+    assert report["verdict"] == recording.assess().conforms == "does not conform"
     assert [one["name"] for one in report["criteria"] if one["verdict"] != "conforms"] == [
         "octave_500"
     ]
@@ -95,10 +95,10 @@ def test_noise_and_offset_leave_the_contact_time(flagship: thud.Impact) -> None:
 
 
 def test_record_of_an_unknown_ball_cannot_be_decided(flagship: thud.Impact) -> None:
-    assert recorded(flagship).assess().result == "undecided"
+    assert recorded(flagship).assess().conforms == "undecided"
     known = {"height": 1.0, "mass": 2.5, "height_uncertainty": 0.002, "mass_uncertainty": 0.01}
     verdict = recorded(flagship, **known, calibration_uncertainty=0.001).assess()
-    assert verdict.result == "conforms"
+    assert verdict.conforms == "conforms"
     assert verdict
 
 
@@ -116,20 +116,20 @@ def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -
 
     lowest = criteria()["octave_31_5"]
     assert lowest.estimate.not_stated == ("calibration",)
-    assert lowest.result == "undecided"
+    assert lowest.conforms == "undecided"
     assert np.isnan(lowest.probability)
     # At the allowance the verdict turns, whatever the degrees of freedom.
     largest = lowest.allowance / AMPLITUDE_DECIBEL
     for factor, result in ((0.999, channel), (1.001, "undecided")):
         stated = criteria(calibration_uncertainty=factor * largest)["octave_31_5"]
-        assert stated.result == result
-    assert criteria()["contact_time"].result == criteria()["contact_time"].result_if_stated
+        assert stated.conforms == result
+    assert criteria()["contact_time"].conforms == criteria()["contact_time"].conforms_if_stated
     for key, names in (("mass", {"mass", "restitution"}), ("height", {"drop_height"})):
         without = {f"{key}_uncertainty": None, "calibration_uncertainty": 0.001}
         found = criteria(**without)  # type: ignore[arg-type]
         lacking = {name for name, entry in found.items() if entry.estimate.not_stated}
         assert names <= lacking
-        assert all(found[name].result == "undecided" for name in lacking)
+        assert all(found[name].conforms == "undecided" for name in lacking)
 
 
 @pytest.mark.parametrize(
@@ -219,8 +219,8 @@ def test_limits_of_the_configuration_are_those_of_the_verdict(tmp_path: Path) ->
     limits = ("# [limits]", "[limits]\noctave_500 = [20.0, 30.0]\n#")
     recording = example("drop_1.wav", tmp_path, limits)
     verdict = recording.assess()
-    assert verdict.result == "does not conform"
-    assert [d.name for d in verdict.criteria if not d.conforms] == ["octave_500"]
+    assert verdict.conforms == "does not conform"
+    assert [d.name for d in verdict.criteria if not d] == ["octave_500"]
     boxes = {box.get_label() for box in recording.plot().axes[0].get_children()}
     assert "Tolerance, rubber ball, own limits" in boxes
     (row,) = [one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"]
@@ -326,7 +326,7 @@ def test_peaks_of_noise_are_not_exact() -> None:
         np.testing.assert_equal(found.estimates["peaks"].value, expected)
         peaks = next(d for d in found.assess().criteria if d.name == "peak_count")
         known = "conforms" if expected == 1 else "does not conform"
-        assert peaks.result == (known if np.isfinite(expected) else "undecided")
+        assert peaks.conforms == (known if np.isfinite(expected) else "undecided")
         assert any("noise" in warning for warning in found.warnings) == np.isnan(expected)
 
 
@@ -362,7 +362,7 @@ def test_restitution_of_a_slower_bounce_is_not_assessed() -> None:
     recording = thud.read_recording(FOLDER / "three_drops.flac", config=config)
     assert np.isnan(recording.restitution)
     (decision,) = [d for d in recording.assess().criteria if d.name == "restitution"]
-    assert decision.result == "undecided"
+    assert decision.conforms == "undecided"
     assert (
         sum(bool(re.search(r"second impact.* 0\.8", warning)) for warning in recording.warnings)
         == 3

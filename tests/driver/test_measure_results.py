@@ -185,7 +185,7 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
         np.testing.assert_array_equal(found["third_level"], recording.levels("third"))
         np.testing.assert_array_equal(found["octave_drop_level"], recording.average().drops)
         assert list(found["file_sha256"].values) == [one.checksum for one in recording.origins]
-        assert found.attrs["verdict"] == recording.assess().result
+        assert found.attrs["verdict"] == recording.assess().conforms
         assert found.attrs["thud"] == thud.__version__
         assert found.attrs["laboratory"].startswith("Ωmega")
         assert found.attrs["instruments"] == "plate\namplifier, K-1"

@@ -645,7 +645,7 @@ def with_levels(level: Estimate, band: int = 0, **others: Any) -> str:  # noqa: 
         **others,
     }  # fmt: skip
     verdict = assess_levels(levels, **options)
-    return verdict.result
+    return verdict.conforms
 
 
 def test_verdict_has_a_guard_band_on_both_sides() -> None:
@@ -674,10 +674,10 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
     assert [(d.lower, d.upper) for d in verdict.criteria] == [
         (c.lower, c.upper) for c in expected.criteria
     ]
-    assert [d.result for d in verdict.criteria] == [
+    assert [d.conforms for d in verdict.criteria] == [
         *["conforms"] * 7, "does not conform", *["undecided"] * 2,
     ]  # fmt: skip
-    assert verdict.result == "does not conform"
+    assert verdict.conforms == "does not conform"
     assert not verdict
     first = verdict.criteria[0]
     assert (first.margin, first.probability) == (1.0, 1.0)
@@ -737,7 +737,7 @@ def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
 
 
 def _assess_level(quantity: Estimate) -> str:
-    return assess_levels([quantity, *NOMINAL[1:]]).criteria[0].result
+    return assess_levels([quantity, *NOMINAL[1:]]).criteria[0].conforms
 
 
 def test_energy_of_bands_adds_up_to_neighbours() -> None:

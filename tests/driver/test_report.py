@@ -235,7 +235,7 @@ def numbers(recording: Recording) -> list[list[str]]:
             risk = 100 * (1 - decision.probability)
             text = f"{risk:.{1 if risk >= 1 else 2}f} %" if risk >= 0.01 else "< 0.01 %"
             cells.append("> 99.9 %" if text == "100.0 %" else text)
-        rows.append([*cells, decision.result])
+        rows.append([*cells, decision.conforms])
     return rows
 
 
@@ -255,7 +255,7 @@ def test_page_holds_the_numbers_of_the_table(written: tuple[Recording, Path]) ->
         assert places == sorted(places)
         line = " ".join(value for value in values if value)
         assert line in printed
-    assert recording.assess().result in printed.lower()
+    assert recording.assess().conforms in printed.lower()
     assert recording.origins[0].checksum in printed
     assert thud.__version__ in printed
     for words in ("Signature", "Place and date", "report.json", "Force on the floor", "31.5"):
@@ -367,14 +367,14 @@ def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> Non
 
     data = json.loads((folder / "report.json").read_text(), parse_constant=refuse)
     verdict = recording.assess()
-    assert data["verdict"] == verdict.result
+    assert data["verdict"] == verdict.conforms
     for row, decision in zip(data["criteria"], verdict.criteria, strict=True):
         known = not np.isnan(decision.value)
         assert row["value"] == (decision.value if known else None)
         stated = bool(decision.estimate.contributions)
         assert row["expanded_uncertainty"] == (decision.estimate.expanded if stated else None)
         assert (row["lower"], row["upper"]) == (decision.lower, decision.upper)
-        assert row["verdict"] == decision.result
+        assert row["verdict"] == decision.conforms
         assert row["limits_of_standard"]
     assert len(data["drops"]) == len(recording.drops)
     assert [one["sha256"] for one in data["files"]] == [o.checksum for o in recording.origins]

@@ -488,7 +488,6 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     "change",
     [
         {"bound": 0.0}, {"bound": -0.1}, {"peaks": 1.5}, {"identity": {}}, {"length": np.zeros(2)},
-        {"numerical_errors": np.zeros((0, 7))}, {"numerical_errors": np.zeros((32, 6))},
         {"region": np.array([[1.1, 0.9], [2.0, 3.0]])}, {"length": np.ones(3)},
         {"case": thud.Case(model=None)}, {"outputs": {"elastic_level": 5, "peak_force": 7}},
         *({name: np.full(shape, np.nan)} for name, shape in (

@@ -31,11 +31,11 @@ again = (
     thud.read_results(folder / "outputs/mine"),
 )
 verdict: thud.Verdict = thud.assess_levels([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
-missed: list[thud.Criterion] = [one for one in verdict.criteria if not one.conforms]
+missed: list[thud.Criterion] = [one for one in verdict.criteria if not one]
 unknown = thud.Unknowns(key=["friction"], low=[0.0], high=[0.5], reason=["not measured"])
 standard = thud.Case(ball=thud.Ball.standard(), model=thud.FiniteElement(), unknowns=unknown)
-likely: thud.ModelVerdict = thud.assess(standard)
-ranges: list[thud.ModelCriterion] = [one for one in likely.criteria if one.range]
+likely: thud.Verdict = thud.assess(standard)
+ranges: list[thud.Criterion] = [one for one in likely.criteria if one.range]
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count)
 press = thud.Compression(gas="isothermal")
 pressed: thud.CompressionCurve = thud.compress(ball, "modal_ball", points=5, gas=press.gas)

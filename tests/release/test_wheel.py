@@ -114,8 +114,3 @@ def test_a_newcomer_gets_figure_3_and_a_verdict(tmp_path: Path) -> None:
     recordings = sorted(map(str, (tmp_path / "inputs/recordings").glob("drop_*.wav")))
     told = driver("measure", *recordings, "--config", "inputs/recordings/lab.toml")
     assert "does not conform" in told
-
-
-def test_wheel_holds_the_surrogate_of_the_standard_ball() -> None:
-    verdict = thud.assess(thud.Case(ball=thud.Ball.standard(), model=thud.FiniteElement()))
-    assert "surrogate" in verdict.method

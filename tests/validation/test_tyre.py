@@ -16,7 +16,7 @@ TYRE = thud.read_case(INPUTS / "tyre.nml")
 
 def test_two_masses_conform() -> None:
     impact = thud.solve(TYRE)
-    assert impact.assess().conforms
+    assert impact.assess()
     assert impact.energy_residual < 1e-9
     # The published case is the default of the model.
     assert thud.TwoMass() == TYRE.model
@@ -24,7 +24,7 @@ def test_two_masses_conform() -> None:
 
 def test_one_mass_on_hertz_s_force_does_not() -> None:
     impact = thud.solve(thud.read_case(INPUTS / "tyre_one_mass.nml"))
-    met = [criterion.conforms for criterion in impact.assess().criteria[:5]]
+    met = [bool(criterion) for criterion in impact.assess().criteria[:5]]
     assert met == [False, False, False, True, False]
 
 
@@ -32,7 +32,7 @@ def test_one_mass_on_the_patch_conforms_too() -> None:
     # docs/lumped_models.md: it is the law of the patch that Hertz's force lacks, not the belt.
     model = replace(TYRE.model, belt_frequency=2e3, carcass_stiffness=4.6e4, contact_damping=0.055)
     impact = thud.solve(replace(TYRE, model=model))
-    assert impact.assess().conforms
+    assert impact.assess()
     np.testing.assert_allclose(impact.levels(), [47.8, 41.2, 22.0, 13.1, 4.1], atol=0.06)
 
 

@@ -34,6 +34,7 @@ from thud.cli.screen import print_error, print_notes, print_path, print_results,
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
+from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
     import argparse
@@ -97,65 +98,33 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
             verbose=options.verbose, progress=not options.quiet,
         )  # fmt: skip
         print_notes(map(text, answer.get("messages", {}).values()))
-        contents = _figures(answer, options)
-        sentence, files = _model_verdict(answer)
-        results.write_into(folder, contents | files)
+        results.write_into(folder, _figures(answer, options))
     if not options.quiet:
-        print_results(f"{text(answer['table'])}{sentence}".removesuffix("\n"))
+        print_results(text(answer["table"]).removesuffix("\n"))
         print_path("  Results", f"{results.folder}\n")
     return bool(answer["conforms"])
 
 
-def _model_verdict(answer: Bundle) -> tuple[str, dict[str, bytes]]:
-    """Return the verdict over what is not known of a case in one line, and its file, if any."""
-    if "samples" not in answer:
-        return "", {}
-    from thud.studies.bundled_surrogate import find_unknowns
-    from thud.studies.model_assessment import assess_impact
-    from thud.studies.model_verdict import FILE
-
-    case = Case.from_text(text(answer["case"]))
-    verdict = assess_impact(new_impact(case, answer))
-    if verdict:
-        print_notes(verdict.warnings)
-        return f"\n  {verdict.message}", {FILE: verdict.to_csv().encode()}
-    if find_unknowns(case)[0]:
-        return "\n  Verdict over what is not known: run thud-driver assess", {}
-    return "", {}
-
-
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
-    from thud.level.assessment import VERDICTS
-    from thud.studies.directory import StudyDirectory
-    from thud.studies.model_assessment import assess
-    from thud.studies.model_verdict import FILE
+    from thud.studies.calibrated_set import assess
 
     case = read_case(options.case)
-    folder = Path(options.output or Path("outputs", f"{case.name}_unknowns"))
-    verdict = assess(
-        case,
-        folder,
-        progress=shows_progress(quiet=options.quiet),
-        replace_files=options.replace,
-    )
-    folder.mkdir(parents=True, exist_ok=True)
-    StudyDirectory(folder, (options.case,)).write({FILE: verdict.to_csv().encode()})
-    print_notes(verdict.warnings)
-    print_results(verdict.message if options.quiet else str(verdict))
+    results = results_of(options, f"{case.name}_verdict", (options.case,), case.name)
+    results.require()
+    verdict = assess(case, progress=shows_progress(quiet=options.quiet))
+    results.write({"verdict.csv": verdict.to_csv().encode()})
     if not options.quiet:
-        print_path("Results", folder)
-    return NOT_CONFORMING if options.check and verdict.result != VERDICTS[0] else 0
+        print_results("\n".join([format_rows(verdict.rows()), *verdict.notes]))
+        print_path("Results", results.folder)
+    return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0
 
 
 ASSESS = Command(
     "assess a case over what is not known of its source",
     (
         argument("case", type=file_of("case"), metavar="CASE.nml", help="namelist file"),
-        *output(
-            "the verdict and the drops that train a surrogate, where an interrupted training "
-            "resumes (default: outputs/<case name>_unknowns)"
-        ),
+        *output("the verdict (default: outputs/<case name>_verdict)"),
         argument(
             "--check",
             action="store_true",
@@ -165,7 +134,6 @@ ASSESS = Command(
         QUIET,
     ),
     assess_case,
-    "drops that train a surrogate are kept",
 )
 
 
@@ -214,7 +182,7 @@ def compare_cases(options: argparse.Namespace) -> int:
     print_notes(page.warnings)
     paths = results.write(page.files())
     if not options.quiet:
-        print_results("\n".join([format_rows(page.rows()), *page.reasons]))
+        print_results(format_rows(page.rows()))
         print_path("Page", paths[-1])
     return 0
 

@@ -22,6 +22,7 @@ from thud.cli.command import (
     results_of,
 )
 from thud.cli.screen import print_notes, print_path, print_results, shows_progress
+from thud.level.assessment import VERDICTS
 from thud.level.levels import SOURCES
 from thud.recordings.channel import channel_of
 
@@ -85,7 +86,7 @@ def measure(options: argparse.Namespace) -> int:
     print_notes((*recording.own_warnings, *recording.outliers, *messages))
     if not options.quiet:
         print_path("Results", folder)
-    return NOT_CONFORMING if options.check and not verdict else 0
+    return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0
 
 
 def _single(values: list[str] | None) -> list[str] | str | None:

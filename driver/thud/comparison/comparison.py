@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import chain, combinations, count
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -22,14 +22,12 @@ from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Page
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
-from thud.impact.impact import Impact
 from thud.level.assessment import VERDICTS
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_figure, comparison_html
 from thud.plot.save_figures import page_files
-from thud.studies.model_assessment import assess_impacts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +35,6 @@ if TYPE_CHECKING:
     from thud.base._schema import LevelsForce, LimitsSource
     from thud.base.quantity import Quantity
     from thud.level.assessment import Criterion
-    from thud.studies.model_verdict import ModelVerdict
 
 # Endings of namelist files; all other files are read as recordings.
 NAMELISTS = (".nml", ".namelist", "")
@@ -57,24 +54,22 @@ class Comparison(Displayed, Page):
         The compared force, ``"floor"`` or ``"elastic"``; None: the assessed force of each case.
     source : str
         Impact source whose limits apply.
-    model_verdicts : dict of str to ModelVerdict
-        Verdicts over what is not known, by the names of impacts that have one; impacts with equal
-        verdicts share one.
     """
 
     impacts: dict[str, ImpactResult]
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
-    model_verdicts: dict[str, ModelVerdict] = field(default_factory=dict)
     _command = "compare"
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of all impacts and their verdicts, each after the name of its impact."""
-        lists = [(name, impact.warnings) for name, impact in self.impacts.items()]
-        lists += [(name, verdict.warnings) for name, verdict in self.model_verdicts.items()]
-        return [f"{name}: {warning}" for name, warnings in lists for warning in warnings]
+        """Warnings of all impacts, each after the name of its impact."""
+        return [
+            f"{name}: {warning}"
+            for name, impact in self.impacts.items()
+            for warning in impact.warnings
+        ]
 
     def __repr__(self) -> str:
         """Return the names of the compared impacts."""
@@ -83,8 +78,7 @@ class Comparison(Displayed, Page):
     def rows(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
 
-        Each impact has a column; then each verdict over what is not known has one with the ranges;
-        the last column has the limits.
+        Each impact has a column; the last column has the limits.
         """
         impacts = self.impacts.values()
         verdicts = [impact.assess(self.source, self.force) for impact in impacts]
@@ -101,40 +95,12 @@ class Comparison(Displayed, Page):
         ]
         if any(times):
             rows.append(("computing time, ms", *(f"{1e3 * t:.3g}" if t else "" for t in times)))
-        results = [
-            (self.model_verdicts.get(name) or verdict).result
-            for name, verdict in zip(self.impacts, verdicts, strict=True)
-        ]
-        rows.append(("verdict", *results))
+        rows.append(("verdict", *(verdict.conforms for verdict in verdicts)))
         # The criteria are the rows after the first three; the verdict is the last row.
         blank = [""] * (len(rows) - 4 - len(criteria))
         limits = (row[0].shown_limits for row in criteria)
-        columns = [
-            [
-                "range (95 %)",
-                "",
-                "",
-                *(c.range for c in v.criteria),
-                *blank,
-                f"conformity {v.shown_probability}",
-            ]
-            for v in self._shared_verdicts()
-        ]
-        columns.append([f"limits, {self.source.replace('_', ' ')}", "", "", *limits, *blank, ""])
-        return [(*row, *cells) for row, *cells in zip(rows, *columns, strict=True)]
-
-    def _shared_verdicts(self) -> list[ModelVerdict]:
-        """Return the different verdicts over what is not known."""
-        return list({id(verdict): verdict for verdict in self.model_verdicts.values()}.values())
-
-    @property
-    def reasons(self) -> list[str]:
-        """Verdicts over what is not known, with the names of their impacts."""
-        result = []
-        for verdict in self._shared_verdicts():
-            names = [name for name, own in self.model_verdicts.items() if own is verdict]
-            result.append(f"Over what is not known of {' and '.join(names)}: {verdict.reason}")
-        return result
+        column = [f"limits, {self.source.replace('_', ' ')}", "", "", *limits, *blank, ""]
+        return [(*row, cell) for row, cell in zip(rows, column, strict=True)]
 
     def figure(self) -> Figure:
         """Return forces and levels as a matplotlib figure."""
@@ -142,7 +108,7 @@ class Comparison(Displayed, Page):
 
     def html(self) -> str:
         """Return a page with interactive plots and the table as self-contained HTML."""
-        return comparison_html(self.impacts, self.force, self.source, self.rows(), self.reasons)
+        return comparison_html(self.impacts, self.force, self.source, self.rows())
 
     def files(self) -> dict[str, bytes]:
         """Return ``comparison.svg`` and ``comparison.html`` by name."""
@@ -159,9 +125,9 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
     if np.isnan(criterion.value):
         return "unknown"
     conforms, fails, _ = VERDICTS
-    if criterion.result == conforms:
+    if criterion.conforms == conforms:
         state = ""
-    elif criterion.result == fails:
+    elif criterion.conforms == fails:
         state = "low" if criterion.value < criterion.lower else "high"
     else:
         state = "undecided"
@@ -254,14 +220,7 @@ def compare(
             solved[name] = item
     _require_same_drop(solved)
     limits = common_source(solved, source)
-    assessed = {
-        name: impact
-        for name, impact in solved.items()
-        if isinstance(impact, Impact)
-        and impact.case.limits.source == limits
-        and force in {None, impact.case.levels.force}
-    }
-    result = Comparison(solved, run_times, force, limits, assess_impacts(assessed))
+    result = Comparison(solved, run_times, force, limits)
     for warning in result.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=2)
     return result

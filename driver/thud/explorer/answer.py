@@ -17,7 +17,6 @@ from thud.explorer.criteria import (
     criterion_facts,
     model_headline,
     room_headline,
-    unknowns_text,
 )
 from thud.explorer.messages import in_words
 from thud.explorer.models import MODEL_FACTS
@@ -31,7 +30,6 @@ from thud.level.levels import BANDWIDTHS, get_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.report.predicted_floor import contribution_title, octave_texts
-from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -116,21 +114,7 @@ def answer_case(case: Case) -> Answer:
     # A warning states that the error is unknown.
     if not math.isnan(error):
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
-    verdict = assess_impact(impact)
-    answer["headline"] = model_headline(case, assessed, verdict)
-    if verdict:
-        answer["model_verdict"] = {
-            "result": RESULTS[verdict.result],
-            "reason": verdict.reason,
-            "unknowns": unknowns_text(verdict),
-        }
-        answer["warnings"] += verdict.warnings
-        for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True):
-            scale = criterion.criterion.quantity.display_scale
-            entry["range"] = criterion.range
-            if criterion.range:
-                entry["ends"] = [scale * criterion.low, scale * criterion.high]
-            entry["result"] = RESULTS[criterion.result]
+    answer["headline"] = model_headline(assessed)
     on_floor = impact.on_floor
     answer["motion"] = motion_of(on_floor or impact)
     answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
@@ -162,7 +146,7 @@ def common_answer(
             },
         },
         "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
-        "result": RESULTS[verdict.result],
+        "result": RESULTS[verdict.conforms],
         "numbers": _numbers(source),
         "warnings": [],
     }
@@ -199,7 +183,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
         "uncertainty_name": criterion.uncertainty_name,
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
-        "result": RESULTS[criterion.result],
+        "result": RESULTS[criterion.conforms],
         **criterion_facts(criterion.name, source),
     }
 

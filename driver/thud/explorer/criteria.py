@@ -6,23 +6,16 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import RATINGS
-from thud.base.units import scaled
-from thud.case.keys import humanize
-from thud.explorer.form import fields_by_key
-from thud.explorer.messages import lower
 from thud.level.assessment import VERDICTS
 from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
-from thud.studies.bundled_surrogate import range_without_defaults
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from thud.base._schema import LimitsSource, RoomRequiredRating
-    from thud.case.case import Case
     from thud.floors.prediction import RoomPrediction
     from thud.level.assessment import Criterion, Verdict
-    from thud.studies.model_verdict import ModelCriterion, ModelVerdict
 
 # Code of the result of a verdict or of a requirement; the page reads no words.
 RESULTS = {verdict: verdict.replace(" ", "_") for verdict in VERDICTS}
@@ -82,7 +75,7 @@ def recording_headline(
     level names the largest contribution to its uncertainty; `excluded` is a sentence on what the
     uncertainty lacks, and `is_stated` whether the source is stated.
     """
-    result = RESULTS[verdict.result]
+    result = RESULTS[verdict.conforms]
     parts = [excluded, _standard(verdict)]
     largest = largest_contribution(verdict)
     if result == "undecided" and largest:
@@ -90,50 +83,35 @@ def recording_headline(
     if not is_stated:
         parts.append("The source is not stated: these limits are assumed.")
     detail = " ".join(filter(None, parts))
-    return _headline(verdict, verdict.result, detail, shown)
+    return _headline(verdict, verdict.conforms, detail, shown)
 
 
 def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
     """Return the title of the first undecided level and its largest contribution, if any."""
     for entry in verdict.criteria:
         parts = [part for part in entry.estimate.contributions if part.counted]
-        if entry.result_if_stated == VERDICTS[2] and entry.unit == "dB" and parts:
+        if entry.conforms_if_stated == VERDICTS[2] and entry.unit == "dB" and parts:
             return entry.quantity.title, max(parts, key=lambda part: part.uncertainty).name
     return None
 
 
-def model_headline(
-    case: Case, verdict: Verdict, ranges: ModelVerdict | None = None
-) -> dict[str, str]:
-    """Return the headline of the verdict on the source of a case, see `_headline`.
-
-    The verdict over what is not known, `ranges`, goes before that of the values of the model.
-    """
-    if ranges is None:
-        detail = f"{_without_ranges(case)} {_standard(verdict)}"
-        words = f"{verdict.result} by this model"
-        return _headline(verdict, words, detail)
-    result = RESULTS[ranges.result]
-    names = [_label(entry.key) for entry in ranges.unknowns]
+def model_headline(verdict: Verdict) -> dict[str, str]:
+    """Return the headline of the verdict on a source by the values of its model."""
     detail = (
-        f"Probability of conformity {ranges.shown_probability} over the ranges of "
-        f"{_joined(names)}, whatever the fields state within them. {_standard(verdict)}"
+        "Values of this model only, from which others may differ; thud-driver assess counts what "
+        f"is not known of the source. {_standard(verdict)}"
     )
-    entries = [entry for entry in ranges.criteria if entry.result == ranges.result]
-    causes = {entry.criterion.quantity.title: _range_text(entry) for entry in entries}
-    if result == "conforms":
-        return _texts(result, ranges.result, f"{_closest(verdict)} {detail}")
-    return _texts(result, ranges.result, detail, *_listed(causes))
+    return _headline(verdict, f"{verdict.conforms} by this model", detail)
 
 
 def _headline(
     verdict: Verdict, words: str, detail: str, shown: Mapping[str, str] | None = None
 ) -> dict[str, str]:
     """Return the headline of a verdict by its values, with their causes or the closest limit."""
-    result = RESULTS[verdict.result]
+    result = RESULTS[verdict.conforms]
     if result == "conforms":
         return _texts(result, words, f"{_closest(verdict)} {detail}")
-    entries = [entry for entry in verdict.criteria if entry.result == verdict.result]
+    entries = [entry for entry in verdict.criteria if entry.conforms == verdict.conforms]
     causes = {e.quantity.title: _cause(e, shown or {}) for e in entries if not math.isnan(e.value)}
     unknown = [entry.quantity.title for entry in entries if math.isnan(entry.value)]
     return _texts(result, words, detail, *_listed(causes, unknown))
@@ -146,40 +124,6 @@ def _texts(result: str, words: str, detail: str, why: str = "", also: str = "") 
 
 def _standard(verdict: Verdict) -> str:
     return f"Limits of the {verdict.source.replace('_', ' ')}: {STANDARDS[verdict.source]}."
-
-
-def _without_ranges(case: Case) -> str:
-    """Return why the verdict on a case has no range, as a sentence."""
-    text = (
-        "Values of this model only, from which others may differ; what is not known of the source "
-        "is not counted"
-    )
-    if case.unknowns:
-        return f"{text}; thud-driver assess counts the stated unknowns."
-    outside = range_without_defaults(case)
-    if outside is None:
-        return f"{text}."
-    key, *limits = outside
-    field = next(item for (_, name), item in fields_by_key().items() if name == key)
-    low, high = (f"{scaled(end, -field['power']):g}" for end in limits)
-    ends = f"{low} to {high} {field['unit']}".rstrip()
-    return f"{text}; its ranges are known for {lower(field['label'])} {ends}."
-
-
-def _label(key: str) -> str:
-    """Return the label of a key for the middle of a sentence."""
-    labels = (item["label"] for (_, name), item in fields_by_key().items() if name == key)
-    return lower(next(labels, humanize(key)))
-
-
-def unknowns_text(ranges: ModelVerdict) -> str:
-    """Return the ranges of the unknowns of a verdict, such as ``"friction 0 to 1"``."""
-    parts = []
-    for entry in ranges.unknowns:
-        unit, size = entry.shown_unit
-        text = f"{_label(entry.key)} {entry.low / size:g} to {entry.high / size:g} {unit}"
-        parts.append(text.rstrip())
-    return ", ".join(parts)
 
 
 def room_headline(prediction: RoomPrediction) -> dict[str, str]:
@@ -234,7 +178,7 @@ def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
     """Return name, value and limit of a criterion that is not met or not decided."""
     quantity = criterion.quantity
     value, expanded = criterion.value, criterion.estimate.expanded
-    if criterion.result == VERDICTS[1]:
+    if criterion.conforms == VERDICTS[1]:
         is_low = value < criterion.lower
         limit = criterion.lower if is_low else criterion.upper
         word = "below" if is_low else "above"
@@ -244,21 +188,13 @@ def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
             text = f"{quantity.show(value)} {quantity.display_unit}".rstrip()
         text = shown.get(criterion.name, text)
         return f"{quantity.title} {text}, {word} {limit * quantity.display_scale:g}"
-    if criterion.result_if_stated != criterion.result:
+    if criterion.conforms_if_stated != criterion.conforms:
         missing = " and ".join(criterion.estimate.not_stated)
         return f"{quantity.title} {_shown(criterion, value)}, uncertainty of {missing} not stated"
     if not math.isfinite(expanded):
         return f"{quantity.title} {_shown(criterion, value)}, uncertainty not known"
     low, high = _number(criterion, value - expanded), _shown(criterion, value + expanded)
     return f"{quantity.title} {low} to {high}, limits {criterion.shown_limits}"
-
-
-def _range_text(entry: ModelCriterion) -> str:
-    """Return name, range and limits of a criterion over what is not known."""
-    quantity = entry.criterion.quantity
-    value = entry.range or _number(entry.criterion, entry.criterion.value)
-    unit = f" {quantity.display_unit}" if quantity.display_unit else ""
-    return f"{quantity.title} {value}{unit}, limits {entry.criterion.shown_limits}"
 
 
 def _number(criterion: Criterion, value: float) -> str:

@@ -26,6 +26,6 @@ def decisive_warnings(effects: Mapping[str, float], criteria: Sequence[Criterion
 
 def _distance(criterion: Criterion) -> float:
     """Return the change of a level, dB, that changes its verdict; infinite if it is undecided."""
-    if criterion.result_if_stated == VERDICTS[2]:
+    if criterion.conforms_if_stated == VERDICTS[2]:
         return math.inf
     return abs(criterion.margin) - criterion.estimate.expanded

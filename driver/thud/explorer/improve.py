@@ -28,7 +28,6 @@ from thud.level.assessment import VERDICTS, get_criteria
 from thud.level.rating import meets
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
-from thud.studies.model_assessment import assess_impact
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
@@ -77,8 +76,7 @@ LEVEL_MARGIN = 0.1
 OTHER_MARGIN = 0.02
 NOTE = (
     f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % "
-    "of the range to those of other criteria, besides the numerical error. The search aims at the "
-    "verdict on the values of the model, not at that over what is not known of the source."
+    "of the range to those of other criteria, besides the numerical error."
 )
 # Words of a fit whose residuals exceed the uncertainty.
 UNEXPLAINED = "the model does not explain the data"
@@ -97,16 +95,8 @@ def improve(values: Values) -> Work:
         return (yield from _improve_floor(case))
     impact = compute(case)
     verdict = impact.assess()
-    if verdict:
-        ranges = assess_impact(impact)
-        none = "The source conforms already."
-        if ranges and ranges.result != VERDICTS[0]:
-            none = (
-                "The values of the fields conform already. The verdict over what is not known, "
-                f"{ranges.result} ({ranges.shown_probability}), is that of all values in its "
-                "ranges: only narrower ranges (&unknowns) can change it."
-            )
-        return {"changes": [], "none": none, "note": NOTE}
+    if verdict.conforms == VERDICTS[0]:
+        return {"changes": [], "none": "The source conforms already.", "note": NOTE}
     model = case.model.name if case.model else ""
     names = _facts(model).tuned
     changes = []
@@ -116,14 +106,11 @@ def improve(values: Values) -> Work:
             changes.append(change)
     changes.sort(key=lambda change: abs(math.log(change["factor"])))
     for change in changes:
-        changed = with_values(case, {change["key"].partition(".")[2]: change["value"]})
-        ranges = assess_impact(compute(changed))
-        over = f"; {ranges.result} over what is not known" if ranges else ""
-        change["text"] += f": conforms by these values{over}"
+        change["text"] += ": conforms by these values"
     if changes:
         return {"changes": changes, "none": "", "note": NOTE}
     labels = ", ".join(lower(_field(case, name)["label"]) for name in names)
-    headline = model_headline(case, verdict)
+    headline = model_headline(verdict)
     reason = "".join(headline[part] for part in ("words", "why", "also"))
     none = (
         f"No change of a single parameter makes the source conform: tried {labels}, each from half "
@@ -336,7 +323,7 @@ def _conforms(case: Case, name: str, value: float) -> bool:
         verdict = compute(with_values(case, {name: value})).assess()
     except ThudError:
         return False
-    return verdict.conforms and all(map(_has_margin, verdict.criteria))
+    return verdict.conforms == VERDICTS[0] and all(map(_has_margin, verdict.criteria))
 
 
 def _has_margin(criterion: Criterion) -> bool:

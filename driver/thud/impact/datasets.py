@@ -22,6 +22,7 @@ from thud.impact.quantities import (
     SAMPLE_RESULTS,
     sample_results,
 )
+from thud.level.assessment import VERDICTS
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
 
@@ -55,7 +56,7 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
         variables[name] = (bands, levels, attributes(SAMPLE_RESULTS[name]))
     for name in schema.IMPACT_QUANTITIES:
         variables[name] = ((), getattr(impact, name), attributes(schema.QUANTITIES[name]))
-    conforms = impact.assess().conforms
+    conforms = impact.assess().conforms == VERDICTS[0]
     variables["conforms"] = ((), conforms, attributes(SAMPLE_RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     warnings = {"warnings": "\n".join(impact.warnings)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,8 @@ from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
 from thud.base.quantity import Quantity
-from thud.level.estimate import NUMERICAL_ERROR, Estimate
+from thud.base.tables import csv_text
+from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
 
 if TYPE_CHECKING:
@@ -28,10 +30,60 @@ if TYPE_CHECKING:
 VERDICTS = ("conforms", "does not conform", "undecided")
 _MAX_PEAKS = 2**31
 _BISECTIONS = 40
+_SPREAD_COLUMNS = (
+    "criterion", "value", "range", "limits", "probability (95 %)", "main unknown", "result",
+)  # fmt: skip
+
+
+def wilson_interval(inside: int, count: int) -> tuple[float, float]:
+    """Return Wilson's score interval (95 %) of a probability, valid also if none or all conform."""
+    square = NORMAL_FACTOR**2
+    middle = (inside + square / 2) / (count + square)
+    half = math.sqrt(inside * (count - inside) / count + square / 4) * NORMAL_FACTOR
+    half /= count + square
+    return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+class Outcome(Displayed):
+    """Base of criteria and verdicts: true if it conforms, false if it does not.
+
+    Attributes
+    ----------
+    counts : tuple of int or None
+        Number of drops within the limits, and of all drops, over what is not known of the source;
+        None: one source.
+    """
+
+    counts: tuple[int, int] | None
+
+    @property
+    @abstractmethod
+    def conforms(self) -> str:
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"``."""
+
+    def __bool__(self) -> bool:
+        """Return whether it conforms; raise InputError if that is undecided."""
+        if self.conforms == VERDICTS[2]:
+            refuse("an undecided verdict is neither true nor false", f"conforms == {VERDICTS[0]!r}")
+        return self.conforms == VERDICTS[0]
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Wilson's interval (95 %) of the probability that a drop conforms, if many were made."""
+        return self.counts and wilson_interval(*self.counts)
+
+    def _by_counts(self) -> str:
+        """Return whether all drops conform, none does, or some do."""
+        inside, count = self.counts or (0, 0)
+        return VERDICTS[0] if inside == count else VERDICTS[2] if inside else VERDICTS[1]
+
+    def _shown_interval(self) -> str:
+        ends = dict.fromkeys(f"{100 * end:.0f}" for end in self.interval or ())
+        return f"{' to '.join(ends)} %"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Criterion(Displayed):
+class Criterion(Outcome):
     """Quantity of a source and the range that the standards require.
 
     Attributes
@@ -42,12 +94,21 @@ class Criterion(Displayed):
         Value of the source with its uncertainty; levels in dB re 1 N and 1 s.
     lower, upper : float
         Limits of the range, which includes them.
+    range : tuple of float or None
+        Minimum and maximum over what is not known of the source; None: one source.
+    counts : tuple of int or None
+        Number of drops within the limits, and of all drops.
+    main_unknown : str
+        Unknown with the largest rank correlation to the value; empty if the value does not vary.
     """
 
     name: str
     estimate: Estimate
     lower: float
     upper: float
+    range: tuple[float, float] | None = None
+    counts: tuple[int, int] | None = None
+    main_unknown: str = ""
 
     @property
     def value(self) -> float:
@@ -78,17 +139,21 @@ class Criterion(Displayed):
         return " to ".join(dict.fromkeys(ends))
 
     @property
-    def result(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"undecided"`` at 95 % confidence.
+    def conforms(self) -> str:
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"``.
 
-        The guard band is the expanded uncertainty (JCGM 106). An upper bound cannot conform, and an
-        uncertainty that lacks a contribution which is not stated decides nothing.
+        Over what is not known of a source: whether all drops conform, none does, or some do. Else
+        at 95 % confidence: the guard band is the expanded uncertainty (JCGM 106); an upper bound
+        cannot conform, and an uncertainty that lacks a contribution which is not stated decides
+        nothing.
         """
-        return VERDICTS[2] if self.estimate.not_stated else self.result_if_stated
+        if self.counts:
+            return self._by_counts()
+        return VERDICTS[2] if self.estimate.not_stated else self.conforms_if_stated
 
     @property
-    def result_if_stated(self) -> str:
-        """`result` if what is not stated contributed up to `allowance`."""
+    def conforms_if_stated(self) -> str:
+        """`conforms` if what is not stated contributed up to `allowance`."""
         value, expanded = self.value, self.estimate.expanded
         conforms, fails, undecided = VERDICTS
         if math.isnan(value) or not math.isfinite(expanded):
@@ -102,17 +167,12 @@ class Criterion(Displayed):
         return conforms if inside else undecided
 
     @property
-    def conforms(self) -> bool:
-        """Whether the criterion is met."""
-        return self.result == VERDICTS[0]
-
-    @property
     def allowance(self) -> float:
-        """Largest standard uncertainty by what is not stated with which `result_if_stated` holds.
+        """Largest standard uncertainty by what is not stated with which `conforms_if_stated` holds.
 
         Zero if that is undecided.
         """
-        if self.result_if_stated == VERDICTS[2]:
+        if self.conforms_if_stated == VERDICTS[2]:
             return 0.0
         # Half an interval is narrower than two standard uncertainties of any freedom.
         low, high, distance = 0.0, abs(self.margin), abs(self.margin)
@@ -129,7 +189,12 @@ class Criterion(Displayed):
 
     @property
     def probability(self) -> float:
-        """Probability that the true value lies within the limits (JCGM 106, 7.2)."""
+        """Probability that the true value lies within the limits (JCGM 106, 7.2).
+
+        Over what is not known of a source: the fraction of its drops.
+        """
+        if self.counts:
+            return self.counts[0] / self.counts[1]
         estimate = self.estimate
         if estimate.upper_bound or estimate.not_stated:
             return math.nan
@@ -144,11 +209,25 @@ class Criterion(Displayed):
     def __repr__(self) -> str:
         """Return value, limits and result."""
         name, value, _, limits, result = self._row()
+        if self.range:
+            value, result = f"{self._shown_range() or value}", self.conforms
         return f"<Criterion, {name}: {f'{value} {result}'.strip()}, allowed {limits}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        return [("criterion", "value", self.uncertainty_name, "limits", "result"), self._row()]
+        if self.range is None:
+            return [("criterion", "value", self.uncertainty_name, "limits", "result"), self._row()]
+        shown = self._shown_range()
+        probability = self._shown_interval() if shown else ""
+        values = (self.quantity.label, self.quantity.show(self.value), shown, self.shown_limits)
+        return [_SPREAD_COLUMNS, (*values, probability, self.main_unknown, self.conforms)]
+
+    def _shown_range(self) -> str:
+        """Return the range in the display unit; empty if its ends are equal."""
+        quantity = self.quantity
+        digits = max(quantity.decimals - 1, 1)
+        ends = [f"{end * quantity.display_scale:z.{digits}f}" for end in self.range or ()]
+        return " to ".join(ends) if len(set(ends)) > 1 else ""
 
     def _row(self) -> tuple[str, ...]:
         name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
@@ -158,14 +237,14 @@ class Criterion(Displayed):
         value = f"{self.value:.4g} {self.unit}".strip()
         expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
         expanded = expanded.replace("nan", "unknown")
-        result = self.result
+        result = self.conforms
         if result == VERDICTS[1]:
             result = "too low" if self.value < self.lower else "too high"
         return name, value, expanded, limits, result
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verdict(Displayed):
+class Verdict(Outcome):
     """Result of an assessment.
 
     Attributes
@@ -174,39 +253,74 @@ class Verdict(Displayed):
         Source whose limits apply.
     criteria : tuple of Criterion
         Octave levels, contact time, restitution, number of peaks, mass, drop height.
+    counts : tuple of int or None
+        Number of drops that meet all criteria, and of all drops, over what is not known of the
+        source; None: one source.
+    unknowns, fixed : tuple of str
+        Keys that differ among the drops, and keys of the calibrated set that the case fixes.
+    notes : tuple of str
+        How the drops were made.
     """
 
     source: LimitsSource
     criteria: tuple[Criterion, ...]
+    counts: tuple[int, int] | None = None
+    unknowns: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
-    def result(self) -> str:
-        """``"does not conform"`` if any criterion fails, else ``"undecided"`` if any is."""
-        results = {criterion.result for criterion in self.criteria}
+    def conforms(self) -> str:
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"``.
+
+        Over what is not known of a source: whether all drops conform, none does, or some do. Else
+        it does not conform if any criterion fails, and is undecided if any other is.
+        """
+        if self.counts:
+            return self._by_counts()
+        results = {criterion.conforms for criterion in self.criteria}
         return next(
             result for result in (VERDICTS[1], VERDICTS[2], VERDICTS[0]) if result in results
         )
 
     @property
-    def conforms(self) -> bool:
-        """Whether all criteria are met."""
-        return self.result == VERDICTS[0]
-
-    def __bool__(self) -> bool:
-        """Return whether all criteria are met."""
-        return self.conforms
+    def probability(self) -> float:
+        """Fraction of the drops that meet all criteria; NaN for one source."""
+        return self.counts[0] / self.counts[1] if self.counts else math.nan
 
     def __repr__(self) -> str:
         """Return the result and the criteria that cause it."""
-        names = [criterion.name for criterion in self.criteria if criterion.result == self.result]
-        causes = "" if self.conforms else f" in {', '.join(names)}"
-        return f"<Verdict, {self.source}: {self.result}{causes}>"
+        entries = [entry for entry in self.criteria if entry.conforms != VERDICTS[0]]
+        if not self.counts:
+            entries = [entry for entry in entries if entry.conforms == self.conforms]
+        causes = f" in {', '.join(entry.name for entry in entries)}" if entries else ""
+        share = "; {} of {} drops conform".format(*self.counts) if self.counts else ""
+        return f"<Verdict, {self.source}: {self.conforms}{causes}{share}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         header, *_ = self.criteria[0].rows()
         rows = [criterion.rows()[1] for criterion in self.criteria]
-        return [header, *rows, ("all criteria", "", "", "", self.result)]
+        if not self.counts:
+            return [header, *rows, ("all criteria", "", "", "", self.conforms)]
+        all_of_them = ("all criteria", "", "", "", self._shown_interval(), "", self.conforms)
+        return [header, *rows, all_of_them]
+
+    def to_csv(self) -> str:
+        """Return the criteria as CSV, SI units, levels in dB; the last row is that of all."""
+        columns = (
+            "criterion", "unit", "value", "low", "high", "lower_limit", "upper_limit",
+            "probability_low", "probability_high", "main_unknown", "result",
+        )  # fmt: skip
+        rows = [
+            (
+                c.name, c.unit, c.value, *(c.range or ("", "")), c.lower, c.upper,
+                *(c.interval or ("", "")), c.main_unknown, c.conforms,
+            )
+            for c in self.criteria
+        ]  # fmt: skip
+        ends = self.interval or ("", "")
+        return csv_text([columns, *rows, ("all", *("",) * 6, *ends, "", self.conforms)])
 
 
 @check_arguments

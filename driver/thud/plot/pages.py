@@ -212,12 +212,10 @@ def comparison_html(
     force: LevelsForce | None,
     source: LimitsSource,
     table: Sequence[Sequence[str]],
-    reasons: Sequence[str] = (),
 ) -> str:
     """Return a page of interactive plots and the table, readable on any screen.
 
-    The table is rows of text, header row first; the reasons are verdicts over what is not known,
-    one sentence each.
+    The table is rows of text, header row first.
     """
     forces: list[dict[str, Any]] = []
     levels: dict[BandSet, list[dict[str, Any]]] = {"octave": [], "third": []}
@@ -240,8 +238,7 @@ def comparison_html(
     return html_page(
         "Comparison of models and recordings",
         "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
-        "are the tolerances of the standards, which one-third-octave bands do not have."
-        + "".join(f" {reason}." for reason in reasons),
+        "are the tolerances of the standards, which one-third-octave bands do not have.",
         table,
         plots,
     )

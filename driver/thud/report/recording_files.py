@@ -92,12 +92,12 @@ def verdict_text(recording: Recording) -> str:
         "conforms": f"The source conforms to the limits of the {name}",
         "does not conform": f"The source does not conform to the limits of the {name}",
         "undecided": f"The result is undecided by the limits of the {name}",
-    }[assessment.result]
+    }[assessment.conforms]
     has_own_limits = any(
         not criterion["limits_of_standard"] for criterion in criteria_data(recording)
     )
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
-    return f"{sentence} at 95 %: {count_verdicts(d.result for d in assessment.criteria)}.{note}"
+    return f"{sentence} at 95 %: {count_verdicts(d.conforms for d in assessment.criteria)}.{note}"
 
 
 def uncertainty_text(recording: Recording) -> str:

@@ -14,16 +14,14 @@ from threadpoolctl import threadpool_limits
 from thud.base.checks import refuse
 from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
-from thud.case.case import impact_only
-from thud.case.keys import find_key, with_values
-from thud.impact.compute import compute
+from thud.case.keys import find_key
 from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.directory import StudyDirectory, require_version
 from thud.studies.parameter import Parameter
 from thud.studies.samples import SampleStudy
 from thud.studies.sampling import unit_samples
-from thud.studies.trained_surrogate import ERROR_DROPS, SMOOTHNESS, Surrogate, read_surrogate
+from thud.studies.trained_surrogate import SMOOTHNESS, Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,7 +94,6 @@ def train(study: SampleStudy, results: StudyDirectory | None, options: RunOption
         label, error = surrogate.worst
         errors.append(f"{error:.3g} dB with {stop}")
         if error <= plan.error:
-            surrogate = replace(surrogate, numerical_errors=_numerical_errors(surrogate))
             if results:
                 results.write({name: surrogate.to_bytes()})
             return surrogate
@@ -106,16 +103,6 @@ def train(study: SampleStudy, results: StudyDirectory | None, options: RunOption
         f"more drops than {plan.size} ([surrogate] size), or a larger error"
     )
     raise NumericalError(message)
-
-
-def _numerical_errors(surrogate: Surrogate) -> Values:
-    """Return the numerical errors of the first drops, which samples of studies do not have."""
-    low, high = surrogate.region.T
-    cases = (
-        with_values(surrogate.case, dict(zip(surrogate.keys, values.tolist(), strict=True)))
-        for values in low + surrogate.points[:ERROR_DROPS] * (high - low)
-    )
-    return np.array([compute(impact_only(case)).numerical_error.assessed for case in cases])
 
 
 def surrogate_name(study: SampleStudy) -> str:
@@ -179,7 +166,6 @@ def _learn(
         case=drops.case, keys=tuple(p.name for p in drops.parameters), region=region,
         outputs=outputs, bound=plan.error, peaks=int(peaks[0]), identity=identity, points=points,
         length=np.ones(len(region)), weights=blank, mean=blank[0], scale=blank[0], residuals=blank,
-        numerical_errors=np.empty((0, 0)),
     )  # fmt: skip
     unknown = [
         n for n, v in zip(surrogate.labels, values.T, strict=True) if not np.isfinite(v).all()

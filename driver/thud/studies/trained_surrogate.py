@@ -55,13 +55,7 @@ SMOOTHNESS = 2.5
 MIN_DROPS = 64
 # The time of the training grows with the third power of the number of drops.
 MAX_DROPS = 8192
-# Number of drops whose numerical errors are computed; these stand for those of all.
-ERROR_DROPS = 32
-# Number of assessed quantities with a numerical error: octave levels, contact time, restitution.
-_ASSESSED_COUNT = 7
-_ARRAYS = (
-    "region", "points", "length", "weights", "mean", "scale", "residuals", "numerical_errors",
-)  # fmt: skip
+_ARRAYS = "region", "points", "length", "weights", "mean", "scale", "residuals"
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +92,6 @@ class Surrogate(StudyResult):
         Mean and standard deviation of each number over the drops, dB.
     residuals : ndarray, shape (n_drop, n_number)
         Leave-one-out residuals: prediction minus result, dB.
-    numerical_errors : ndarray, shape (n, 7)
-        Numerical errors of the first drops: octave levels, dB, contact time, s, and restitution;
-        NaN if unknown.
     """
 
     case: Case
@@ -116,7 +107,6 @@ class Surrogate(StudyResult):
     mean: Values
     scale: Values
     residuals: Values
-    numerical_errors: Values
 
     def __repr__(self) -> str:
         """Return the keys and the largest error of an assessed number."""
@@ -201,10 +191,6 @@ class Surrogate(StudyResult):
         """Return the errors of a quantity, dB, shape (count,)."""
         result: Values = self._split(self.errors[np.newaxis])[name][0]
         return result
-
-    def residuals_of(self, name: str) -> Values:
-        """Return the leave-one-out residuals of a quantity, dB, shape (n_drop, count)."""
-        return self._split(self.residuals)[name]
 
     def mean_square(self, name: str) -> Values:
         """Return the mean squares of the held-out errors of a quantity, dB2, shape (count,)."""
@@ -327,7 +313,6 @@ class Surrogate(StudyResult):
             "region": (keys, 2), "points": (drops, keys), "length": (keys,),
             "weights": (drops, numbers), "mean": (numbers,), "scale": (numbers,),
             "residuals": (drops, numbers),
-            "numerical_errors": (len(self.numerical_errors), _ASSESSED_COUNT),
         }  # fmt: skip
         if any(getattr(self, name).shape != shape for name, shape in shapes.items()):
             return False
@@ -337,7 +322,6 @@ class Surrogate(StudyResult):
         ))  # fmt: skip
         return bool(
             drops > 0
-            and len(self.numerical_errors) > 0
             and self.assessed.any()
             and (low <= high).all()
             and (self.length > 0).all()

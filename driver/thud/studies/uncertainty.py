@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
-from scipy.stats import binomtest
 
 from thud.base.checks import refuse
 from thud.impact.quantities import RATING
-from thud.level.assessment import octave_limits
+from thud.level.assessment import octave_limits, wilson_interval
 from thud.level.levels import get_bands
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study_result import SampleResult
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
     from thud.studies.parameter import Parameter
     from thud.studies.samples import SampleStudy
     from thud.studies.study import Source
-
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +70,7 @@ class Uncertainty(SampleResult):
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson's score interval of the probability, 95 %; valid also if none or all conform."""
-        result = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
-        return result.low, result.high
+        return wilson_interval(self.conforming, self.computed)
 
     @property
     def surrogate_range(self) -> tuple[float, float] | None:

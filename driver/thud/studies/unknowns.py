@@ -67,31 +67,6 @@ class Unknown:
         return np.clip(result, self.low, self.high)
 
 
-# What is not known of the standard rubber ball, for finite elements. docs/verdict.md shows it.
-STANDARD_BALL = (
-    Unknown(
-        "fractional_order", *ORDER_RANGE, 0.0,
-        "filled rubbers 0.2 to 0.5, Kelvin-Voigt 1 (docs/finite_elements.md); no measurement known",
-    ),
-    Unknown(
-        "friction", 0.0, 1.0, 0.0,
-        "frictionless to rubber on a dry floor; no measurement with this ball known",
-    ),
-    Unknown(
-        "youngs_modulus", 1.87e6, 2.29e6, 0.0,
-        "2.08 MPa inferred from published free modes, 10 % for hardness; no measurement known",
-    ),
-    Unknown(
-        "loss_factor", 0.075, 0.21, 0.0,
-        "restitution within the limits of the standards, 0.7 to 0.9, for every order and friction",
-    ),
-    Unknown(
-        "poisson_ratio", 0.49, 0.5, 0.0,
-        "nearly incompressible rubber; 0.49 allows for fillers and pores; no measurement known",
-    ),
-)  # fmt: skip
-
-
 def stated_unknowns(case: Case) -> tuple[Unknown, ...]:
     """Return the unknowns that a case states."""
     stated = case.unknowns

@@ -39,9 +39,9 @@ export function showWarnings({ answer: { warnings, open_warnings: open = [] } })
   byId("warnings").replaceChildren(...warnings.map((warning) => element("li", {}, ...withSymbols(warning))));
 }
 
-/** Return the low and high end of a criterion: the range of a model or the uncertainty of a recording. */
-function endsOf({ value, uncertainty, ends }) {
-  return ends ?? (uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : []);
+/** Return the low and high end of a criterion by its uncertainty. */
+function endsOf({ value, uncertainty }) {
+  return uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : [];
 }
 
 /** Show force and levels of variants; options: third octaves, and differences to the first variant. */
@@ -135,8 +135,7 @@ function missedSide(criterion) {
 function showCriteria(variants) {
   const cell = (criterion) => {
     const value = element("td", { class: `value ${criterion.result}` }, valueTextOf(criterion));
-    if (criterion.uncertainty && !criterion.range) value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertaintyText(criterion)}`));
-    if (criterion.range) value.append(" ", element("small", {}, `(${criterion.range})`));
+    if (criterion.uncertainty) value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertaintyText(criterion)}`));
     return value;
   };
   const margin = (criterion) => {
@@ -155,11 +154,9 @@ function showCriteria(variants) {
     element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Criterion"), element("th", { scope: "col" }, "Limits"), ...heads)),
     element("tbody", {}, ...rows));
   byId("criteria_section").classList.toggle("half", Boolean(variants[0].answer.motion) && variants.length < 3);
-  const unknowns = variants.map(({ answer }) => answer.model_verdict?.unknowns).find(Boolean);
-  const ranges = unknowns ? `In parentheses: the range (95 %) over what is not known: ${unknowns}. ` : "";
-  const names = new Set(variants.flatMap(({ answer }) => answer.criteria).filter(({ uncertainty, range }) => uncertainty && !range).map((criterion) => criterion.uncertainty_name));
+  const names = new Set(variants.flatMap(({ answer }) => answer.criteria).filter(({ uncertainty }) => uncertainty).map((criterion) => criterion.uncertainty_name));
   const uncertainties = names.size ? `±: ${[...names].map((name) => UNCERTAINTIES[name]).join("; ")}. ` : "";
-  byId("criteria_text").textContent = `${ranges}${uncertainties}${variants[0].answer.criteria[0].standard ?? ""}`;
+  byId("criteria_text").textContent = `${uncertainties}${variants[0].answer.criteria[0].standard ?? ""}`;
 }
 
 /** Return the name of a criterion, which shows its explanation on hover and focus. */

@@ -1,0 +1,235 @@
+"""Verdict on a source over what is not known of its material: the calibrated set."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base._schema import STANDARD_BALL, FiniteElement, ModalBall
+from thud.base.checks import refuse, require_kind
+from thud.case.case import Case, check_case
+from thud.case.keys import value_in
+from thud.impact.ensemble import solve_many
+from thud.impact.impact import Impact
+from thud.level.assessment import Verdict, assess_levels
+from thud.level.levels import peak_count
+from thud.studies.sampling import unit_samples
+from thud.studies.unknowns import blocked_case, stated_unknowns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from thud.studies.unknowns import Unknown
+
+    Values = NDArray[np.float64]
+    Columns = dict[str, Values]
+
+# Equally likely parameters of the standard ball, made by `./bootstrap calibrate`.
+FILE = "standard_ball.csv"
+# Mesh with which the elements were calibrated: its numerical error is part of the parameters.
+MESH = {"radial_elements": 6, "polar_elements": 48}
+# Number of drops over the unknowns of a case, and their seed.
+SAMPLES = 256
+_SEED = 0
+# Maximum fraction of drops without results.
+_MAX_FAILED = 0.1
+# Keys that a damping law does not use.
+_UNUSED = {
+    "none": ("loss_factor", "fractional_order"),
+    "kelvin_voigt": ("fractional_order",),
+    "constant_loss": ("fractional_order",),
+    "prony": ("loss_factor", "fractional_order"),
+}
+_CALIBRATION = "that the standard ball conforms is put in by the calibration, not found"
+# Relative differences of values that do not vary.
+_ROUNDING = 1e-9
+
+
+@cache
+def calibrated_set(model: str) -> Mapping[str, Values]:
+    """Return equally likely parameters of the standard ball by key; empty: a model without them."""
+    lines = (resources.files("thud.studies") / FILE).read_text("utf-8").splitlines()
+    rows = csv.DictReader(line for line in lines if not line.startswith("#"))
+    entries = [row for row in rows if row.pop("model") == model]
+    keys = [key for key, value in entries[0].items() if value] if entries else []
+    return {key: np.array([float(entry[key]) for entry in entries]) for key in keys}
+
+
+def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
+    """Assess a source over what is not known of it.
+
+    Not known of a ball by finite elements or modes is its material: each set of parameters of the
+    standard ball that agrees with the standards makes a drop on a rigid floor. The modulus of a
+    case multiplies that of the sets by its ratio to the default; other parameters that the case
+    states replace those of the sets. ``Case.unknowns`` adds or replaces ranges; other models need
+    it (docs/verdict.md).
+
+    Parameters
+    ----------
+    case
+        The case, or an impact of it; its drop on the rigid floor is assessed.
+    progress
+        Show a progress bar.
+
+    Returns
+    -------
+    Verdict
+        With ranges, probabilities and main unknowns.
+
+    Raises
+    ------
+    InputError
+        If nothing is known to vary, or too many drops have no results.
+    """
+    require_kind("case", case, Case | Impact)
+    if isinstance(case, Impact):
+        case = case.case
+    check_case(case)
+    stated = stated_unknowns(case)
+    sets = calibrated_set(case.model.name if case.model else "")
+    if not sets and not stated:
+        models = ", ".join(repr(model.name) for model in (ModalBall, FiniteElement))
+        refuse(
+            "nothing is known to vary with this source model",
+            f"&unknowns with key, low, high and reason, or model = {models}",
+        )
+    varied, fixed = _varied_set(case, sets)
+    case = _calibrated_mesh(blocked_case(case, stated).resolved())
+    if stated:
+        varied = _samples(case, varied, stated)
+        fixed = tuple(key for key in fixed if key not in varied)
+    # The first drop is that of the case.
+    columns = {key: np.append(value_in(case, key) or 0.0, v) for key, v in varied.items()}
+    values = _criteria(case, columns, progress=progress)
+    failed = np.isnan(values).any(axis=1)
+    columns = {key: column[~failed] for key, column in columns.items()}
+    lost = f"; {failed.sum()} have no result" if failed.any() else ""
+    notes = (
+        f"{len(values) - 1} drops{lost}; range: minimum and maximum, without numerical error",
+        "probability: Wilson interval (95 %)",
+        f"not known: {', '.join(columns)}",
+        f"fixed by the case: {', '.join(fixed)}" if fixed else "",
+        _CALIBRATION if sets else "",
+    )
+    return _verdict(case, columns, values[~failed], fixed, tuple(filter(None, notes)))
+
+
+def _varied_set(case: Case, sets: Mapping[str, Values]) -> tuple[Columns, tuple[str, ...]]:
+    """Return the parameters of the sets for a case, and the keys that the case fixes."""
+    model, result = case.model, dict(sets)
+    if not (sets and model):
+        return result, ()
+    stated = {key for key in sets if _is_stated(case, key)}
+    stated |= set(_UNUSED.get(getattr(model, "viscosity", ""), ()))
+    stated |= {"loss_factor"} if _is_stated(case, "loss_frequency") else set()
+    if "youngs_modulus" in stated and case.ball.youngs_modulus:
+        ratio = case.ball.youngs_modulus / STANDARD_BALL[model.name, "youngs_modulus"]
+        result["youngs_modulus"] = ratio * sets["youngs_modulus"]
+    fixed = tuple(key for key in sets if key in stated and key != "youngs_modulus")
+    return {key: column for key, column in result.items() if key not in fixed}, fixed
+
+
+def _is_stated(case: Case, key: str) -> bool:
+    return getattr(case.model, key, getattr(case.ball, key, None)) is not None
+
+
+def _calibrated_mesh(case: Case) -> Case:
+    """Return a case of elements with the mesh of the calibration, unless it states one."""
+    model = case.model
+    if not isinstance(model, FiniteElement):
+        return case
+    keys = {key: number for key, number in MESH.items() if not getattr(model, key)}
+    return replace(case, model=replace(model, snapshot_interval=0.0, **keys))  # type: ignore[arg-type]
+
+
+def _samples(case: Case, sets: Columns, unknowns: tuple[Unknown, ...]) -> Columns:
+    """Return random sets, in which random values of the unknowns replace their keys."""
+    points = unit_samples("random", len(unknowns) + 1, SAMPLES, _SEED, 0, SAMPLES)
+    rows = points[:, -1]
+    result = {key: column[(rows * len(column)).astype(int)] for key, column in sets.items()}
+    for i, unknown in enumerate(unknowns):
+        middle = float(value_in(case, unknown.key) or 0.0)
+        result[unknown.key] = unknown.quantiles(points[:, i], middle)
+    return result
+
+
+def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
+    """Return the criteria of drops, shape (n, n_criterion); NaN: no result.
+
+    Raise InputError if the first drop, or too many of them, have none.
+    """
+    drops = solve_many(columns, case, forces=True, progress=progress)
+    failed = drops.status != 0
+    if failed[0] or failed.mean() > _MAX_FAILED:
+        refuse(
+            f"{failed.sum()} of {failed.size} drops have no result ({drops.reason[failed][0]})",
+            "a source, and ranges of &unknowns, whose drops have results",
+        )
+    force = case.levels.force
+    forces = drops.elastic_force if force == "elastic" else drops.floor_force
+    assert forces is not None  # noqa: S101 - `forces` was asked for
+    peaks = [
+        np.nan if lost else peak_count(history, drops.sample_rate)
+        for history, lost in zip(forces, failed, strict=True)
+    ]
+    others = [columns.get(key, value_in(case, key)) for key in ("mass", "height")]
+    return np.column_stack(
+        [
+            drops.levels[force, "octave"], drops.contact_time, drops.restitution, peaks,
+            *(np.broadcast_to(np.asarray(other, dtype=float), failed.size) for other in others),
+        ]
+    )  # fmt: skip
+
+
+def _verdict(
+    case: Case, columns: Columns, values: Values, fixed: tuple[str, ...], notes: tuple[str, ...]
+) -> Verdict:
+    """Return the verdict by the criteria of drops, of which the first is that of the case."""
+    octaves, others = np.split(values[0], [5])
+    contact_time, restitution, peaks, mass, height = others.tolist()
+    plain = assess_levels(
+        octaves, contact_time, restitution, peaks, mass, height, case.limits.source
+    )
+    drops = values[1:]
+    limits = np.array([(criterion.lower, criterion.upper) for criterion in plain.criteria])
+    inside = (drops >= limits[:, 0]) & (drops <= limits[:, 1])
+    criteria = tuple(
+        replace(
+            criterion,
+            range=(float(drops[:, i].min()), float(drops[:, i].max())),
+            counts=(int(inside[:, i].sum()), len(drops)),
+            main_unknown=_main_unknown(columns, drops[:, i]),
+        )
+        for i, criterion in enumerate(plain.criteria)
+    )
+    counts = int(inside.all(axis=1).sum()), len(drops)
+    return replace(
+        plain, criteria=criteria, counts=counts, unknowns=tuple(columns), fixed=fixed, notes=notes
+    )
+
+
+def _main_unknown(columns: Columns, values: Values) -> str:
+    """Return the unknown with the largest rank correlation; empty if the values do not vary."""
+    if np.ptp(values) <= _ROUNDING * np.abs(values).max():
+        return ""
+    ranks = _ranks(values)
+    sizes = {
+        key: abs(float(np.corrcoef(_ranks(column[1:]), ranks)[0, 1]))
+        for key, column in columns.items()
+        if np.ptp(column[1:]) > 0
+    }
+    return max(sizes, key=lambda key: sizes[key], default="")
+
+
+def _ranks(values: Values) -> Values:
+    """Return the ranks of values; equal values have their mean rank."""
+    _, inverse, counts = np.unique(values, return_inverse=True, return_counts=True)
+    ranks: Values = (np.cumsum(counts) - (counts - 1) / 2)[inverse]
+    return ranks
