@@ -1,4 +1,4 @@
-"""The first figure of the documentation: the ball of the paper, and by finite elements."""
+"""The first figure of the documentation: the standard ball by three models."""
 
 from __future__ import annotations
 
@@ -6,8 +6,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import thud
-from thud.plot.impact_figures import draw_forces, draw_levels
-from thud.plot.style import LEVEL, legend_above, new_figure, own_style
+from thud.level.assessment import octave_limits
+from thud.plot.impact_figures import SMALLEST, draw_forces, draw_tolerance
+from thud.plot.style import (
+    legend_above,
+    line_style,
+    marker_style,
+    new_figure,
+    octave_axis,
+    own_style,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,27 +23,34 @@ if TYPE_CHECKING:
 INPUTS = Path(__file__).parents[2] / "inputs"
 CASES = {
     "shell of the paper": "rubber_ball_100cm",
-    "elements, order 0.3": "rubber_ball_fe",
-    "elements, Kelvin–Voigt": "rubber_ball_fe_viscous",
+    "modal ball": "rubber_ball_modal",
+    "finite elements": "rubber_ball_fe",
 }
 
 
 @own_style()
 def flagship() -> Figure:
-    """Draw force on the floor and octaves of the three cases of `./bootstrap run`."""
+    """Draw the assessed forces of `./bootstrap run`, and their levels from the nominal ones."""
     impacts = {
         name: thud.solve(thud.read_case(INPUTS / f"{case}.nml")) for name, case in CASES.items()
     }
     figure = new_figure(2.1)
     history, octaves = figure.subplots(1, 2)
-    draw_forces(history, impacts, "floor")
-    history.set_ylabel("Force on the floor, kN")
+    draw_forces(history, impacts, None)
+    history.set_ylabel("Assessed force, kN")
     history.set_xlabel("Time, ms")
     history.set_xticks([0, 10, 20])
     history.locator_params(axis="y", nbins=4)
-    draw_levels({"octave": octaves}, impacts, "floor", "rubber_ball")
+    lower, upper = octave_limits("rubber_ball")
+    nominal = (lower + upper) / 2
+    draw_tolerance(octaves, lower - nominal, upper - nominal, "rubber ball")
+    for i, (name, impact) in enumerate(impacts.items()):
+        octaves.plot(
+            impact.levels() - nominal, label=name, **line_style(i), **marker_style(i, SMALLEST)
+        )
+    octave_axis(octaves)
     octaves.tick_params(axis="x", labelrotation=90)
     octaves.set_xlabel("Octave, Hz")
-    octaves.set_ylabel(LEVEL.replace("Force exposure l", "L"))
+    octaves.set_ylabel("Level − nominal, dB")
     legend_above(octaves)
     return figure

@@ -2,7 +2,7 @@
 
 .venv/bin/python inputs/recordings/make_recordings.py
 
-drops the ball of ../rubber_ball_fe.nml from scattered heights, adds the plate's first resonance,
+drops the ball of ball.nml from scattered heights, adds the plate's first resonance,
 offset, drift, mains hum and noise, and writes the files of this directory. Nothing here was
 measured.
 """
@@ -21,7 +21,7 @@ import thud
 
 HERE = Path(__file__).parent
 LABEL = "Synthetic recording, not a measurement; made by make_recordings.py of thud"
-MODEL = thud.read_case(HERE.parent / "rubber_ball_fe.nml")
+MODEL = thud.read_case(HERE / "ball.nml")
 GRAVITY = MODEL.drop.gravity
 # Sample rates of the model and of the files, Hz.
 FINE, RATE, RATE_LONG = 192e3, 48000, 24000
@@ -144,7 +144,7 @@ def main() -> None:
     hum = ", ".join(f'"{frequency:g} Hz" = {size}' for frequency, size in HUM.items())
     head = f"""# {LABEL}.
 # True values of the recordings in this directory, without the added disturbances: the force on the
-# floor of the ball of ../rubber_ball_fe.nml. In the sound files {FULL_SCALE:g} V are full scale and
+# floor of the ball of ball.nml. In the sound files {FULL_SCALE:g} V are full scale and
 # compression is negative; the tables are in newtons, {EXCERPT:g} s from {FIRST - 0.04:g} s on.
 
 calibration = "{FULL_SCALE:g} V/FS, 0.5 mV/pC, 4 pC/N"

