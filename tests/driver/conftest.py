@@ -110,7 +110,7 @@ def executable() -> str:
 @pytest.fixture(scope="session")
 def shell() -> thud.Impact:
     """Return the impact of the standard drop by the model of the paper."""
-    return thud.solve()
+    return thud.solve(model="hollow_sphere")
 
 
 @pytest.fixture(scope="session")
