@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
 
 import numpy as np
@@ -11,6 +10,7 @@ from conftest import REPOSITORY
 from scipy.stats import binomtest
 
 from thud.base._schema import STANDARD_BALL
+from thud.studies.calibrated_set import calibrated_set
 
 SCRIPT = REPOSITORY / "driver/calibrate_standard_ball.py"
 SPEC = importlib.util.spec_from_file_location("calibrate_standard_ball", SCRIPT)
@@ -27,12 +27,6 @@ MISFIT = {"finite_element": 1.0, "modal_ball": 1.1}
 ROUNDING = 0.02
 
 
-def bundled_sets(model: str) -> dict[str, np.ndarray]:
-    lines = calibrate.FILE.read_text(encoding="utf-8").splitlines()
-    rows = [row for row in csv.DictReader(lines[1:]) if row.pop("model") == model]
-    return {key: np.array([float(row[key]) for row in rows]) for key in rows[0] if rows[0][key]}
-
-
 def default_ball(model: str) -> dict[str, float]:
     keys = [key for key in calibrate.FREE[model] if key != "friction"]
     return {key: STANDARD_BALL[model, key] for key in keys}
@@ -40,7 +34,7 @@ def default_ball(model: str) -> dict[str, float]:
 
 @pytest.mark.parametrize("model", calibrate.MODELS)
 def test_sets_agree_with_the_standards(model: str) -> None:
-    sets = bundled_sets(model)
+    sets = calibrated_set(model)
     assert sets.keys() == calibrate.PRIORS[model].keys()
     assert {len(values) for values in sets.values()} == {calibrate.COUNT}
     assert calibrate.accept(calibrate.solve(model, sets)).all()
@@ -70,7 +64,7 @@ def test_default_is_the_least_misfit(model: str) -> None:
 def test_command_makes_the_sets() -> None:
     sets, drawn = calibrate.draw_sets("modal_ball", calibrate.COUNT, progress=False)
     assert drawn == DRAWN["modal_ball"]
-    for key, values in bundled_sets("modal_ball").items():
+    for key, values in calibrated_set("modal_ball").items():
         np.testing.assert_array_equal(sets[key], values)
 
 

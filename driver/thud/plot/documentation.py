@@ -6,7 +6,11 @@ from dataclasses import replace
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
 from thud.base._schema import (
+    STANDARD_BALL,
     Ball,
     Drop,
     FiniteElement,
@@ -16,13 +20,17 @@ from thud.base._schema import (
     Levels,
     Plate,
 )
+from thud.case.case import Case
 from thud.floors.impedance import ball_impedance
 from thud.impact.compression import compress
+from thud.impact.ensemble import solve_many
 from thud.impact.free_modes import free_modes
 from thud.impact.solve import solve
 from thud.plot.ball_figures import compression, loss_factor, mode_shapes, motion
 from thud.plot.floor_figures import ball_impedances, draw_floor, floor_mobilities
 from thud.plot.impact_figures import force_history, level_changes, levels
+from thud.plot.style import COLORS, WIDTH, new_figure, own_style
+from thud.studies.calibrated_set import calibrated_set
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -182,6 +190,33 @@ def _draw_impedances() -> Figure:
     return ball_impedances(sources, floors)
 
 
+@own_style()
+def _draw_standard_ball() -> Figure:
+    """Draw the sets of the standard ball by finite elements, and the default ball as a cross."""
+    sets = {
+        key: np.append(values, STANDARD_BALL["finite_element", key])
+        for key, values in calibrated_set("finite_element").items()
+    }
+    drops = solve_many(sets, Case(model=FiniteElement(radial_elements=6, polar_elements=48)))
+    level = drops.levels["floor", "octave"][:, -1]
+    figure = new_figure(1.8 * WIDTH)
+    panels = (
+        ("Order of the damping law", sets["fractional_order"], "Loss factor at 74 Hz",
+         sets["loss_factor"], "500 Hz level, force on the floor, dB", level),
+        ("Modulus of elasticity, MPa", 1e-6 * sets["youngs_modulus"], "Contact time, ms",
+         1e3 * drops.contact_time, "Coefficient of friction", sets["friction"]),
+    )  # fmt: skip
+    for axes, (x_label, x, y_label, y, label, color) in zip(
+        figure.subplots(2), panels, strict=True
+    ):
+        limits = {"vmin": color.min(), "vmax": color.max()}
+        points = axes.scatter(x[:-1], y[:-1], c=color[:-1], s=16, linewidths=0, **limits)
+        axes.scatter(x[-1:], y[-1:], c=color[-1:], marker="X", s=60, edgecolors=COLORS[1], **limits)
+        axes.set(xlabel=x_label, ylabel=y_label)
+        figure.colorbar(points, ax=axes, location="top", label=label, ticks=MaxNLocator(4))
+    return figure
+
+
 FIGURES = {
     "figure2_force_history": _draw_heights,
     "figure3_levels": _draw_shell,
@@ -197,5 +232,6 @@ FIGURES = {
     "loss_factor": _draw_laws,
     "modal_families": _draw_families,
     "momentum_flux": _draw_fluxes,
+    "standard_ball": _draw_standard_ball,
     "tyre_levels": _draw_tires,
 }
