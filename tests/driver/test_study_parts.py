@@ -435,7 +435,7 @@ def answering() -> Surrogate:
         thud.Case(model=thud.HollowSphere()), ("height", "mass"),
         np.array([[0.9, 1.1], [2.0, 3.0]]), names, 0.1, 1, {"thud": thud.__version__},
         np.random.default_rng(1).random((64, 2)), np.ones(2), np.zeros((64, 12)), mean, np.ones(12),
-        np.random.default_rng(2).normal(0, 0.02, (64, 12)), np.zeros((32, 7)),
+        np.random.default_rng(2).normal(0, 0.02, (64, 12)),
     )  # fmt: skip
 
 
