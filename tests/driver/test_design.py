@@ -73,7 +73,7 @@ def test_standard_ball_is_marked() -> None:
     assert axes.get_xlabel() == "Wall thickness, mm"
     assert axes.get_ylabel() == "Young's modulus, MPa"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["Octave limits", "All criteria met", "Paper's ball"]
+    assert labels == ["Octave limits", "All criteria met", "Standard ball"]
     assert bar.get_ylabel() == "Margin (force on the floor), dB"
 
 

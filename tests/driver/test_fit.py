@@ -48,7 +48,7 @@ def test_known_parameters_come_back() -> None:
     )
     assert fit.values == pytest.approx({"youngs_modulus": 1.8e6, "height": 1.1}, rel=SOLVED)
     assert fit.converged
-    assert fit.case.ball == replace(TRUTH, youngs_modulus=fit.values["youngs_modulus"])
+    assert fit.case.ball == replace(TRUTH.ball, youngs_modulus=fit.values["youngs_modulus"])
 
 
 def test_confidence_below_rounding_has_intervals_without_width() -> None:
@@ -372,10 +372,10 @@ def test_parameters_that_are_not_identifiable_are_named(
 
 
 def test_parameter_without_effect_is_named() -> None:
-    case = thud.Case(model=thud.ModalBall())
+    case = thud.Case(model=thud.ModalBall(damping_law="constant"))
     with pytest.warns(thud.FitWarning, match=naming("loss_frequency")):
         fit = thud.fit(thud.solve(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
-    assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
+    assert fit.values["youngs_modulus"] == pytest.approx(1.56e6, rel=1e-6)
     assert np.isfinite(fit.standard_errors["youngs_modulus"])
 
 
@@ -485,7 +485,9 @@ def test_estimated_deviation_of_levels_is_that_of_their_residuals() -> None:
     assert fit.noise == pytest.approx(np.sqrt(rest @ rest / 4))
     modulus, step = fit.values["youngs_modulus"], 1e2
     high, low = (
-        thud.solve(replace(TRUTH, youngs_modulus=modulus + change)).levels(force="floor")
+        thud.solve(replace(TRUTH, ball=thud.Ball(youngs_modulus=modulus + change))).levels(
+            force="floor"
+        )
         for change in (step, -step)
     )
     slope = np.linalg.norm(high - low) / (2 * step)

@@ -36,7 +36,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         (RECORD, ["mass"], {"confidence": 95.0}, naming("confidence", 95.0, 0, 1)),
         (RECORD, ["mass"], {"starts": 0}, naming("starts", 0, 1)),
         (RECORD, ["mass"], {"case": thud.Case(model=None)}, naming("&model")),
-        (RECORD, {"height": 1e5}, {}, naming("start", "&drop: height", 100000.0)),
+        (RECORD, {"height": 1e5}, {}, naming("start", "&ball: youngs_modulus")),
         ((RECORD[0], RECORD[1][:-1]), ["mass"], {}, naming("target", "ForceTarget")),
         (1.0, ["mass"], {}, naming("target", "ForceTarget")),
         (

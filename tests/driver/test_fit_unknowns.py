@@ -204,7 +204,7 @@ def test_levels_that_do_not_fit_have_wider_intervals() -> None:
     fit = quiet_fit(thud.LevelTarget(levels, 0.5, force="floor"), ["youngs_modulus"], SHELL)
     assert fit.warnings
     assert fit.widened == pytest.approx(np.sqrt(fit.reduced_chi_square))
-    double = quiet_fit(thud.LevelTarget(levels, 100.0, force="floor"), ["youngs_modulus"])
+    double = quiet_fit(thud.LevelTarget(levels, 100.0, force="floor"), ["youngs_modulus"], SHELL)
     assert double.widened == 1
     ratio = double.standard_errors["youngs_modulus"] / fit.standard_errors["youngs_modulus"]
     assert ratio == pytest.approx(200 / fit.widened, rel=1e-3)

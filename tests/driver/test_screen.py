@@ -184,7 +184,7 @@ def test_numbers_of_the_solver_are_shown_if_asked_for(
 def test_colors_are_those_of_the_terminal(
     executable: str, case_file: CaseFile, tmp_path: Path
 ) -> None:
-    case_file(MINIMAL.replace("&ball", "&ball youngs_modulus = 2.08e6"), "ball.nml")
+    case_file(MINIMAL.replace("&ball", "&ball poisson_ratio = 0.4"), "ball.nml")
     commands = ([executable, "ball.nml"], [sys.executable, "-m", "thud", "run", "--no-figures"])
     for command in (commands[0], [*commands[1], "ball.nml"]):
         printed = on_terminal(*command, folder=tmp_path)
@@ -198,7 +198,7 @@ def test_colors_are_those_of_the_terminal(
             command, cwd=tmp_path, check=True, text=True, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, env=os.environ | {"TERM": "xterm-256color"},
         ).stdout  # fmt: skip
-        assert re.search(r"(?m)^thud(-driver)?: .* needs .* MPa$", log)
+        assert re.search(r"(?m)^thud(-driver)?: .* poisson_ratio = 0\.4, rubbers have", log)
         assert not re.search(r"[\x00-\x09\x0b-\x1f]", log)
 
 
@@ -215,7 +215,7 @@ def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
     assert re.search(r"\r100%\|.*\| 4/4 \[\d\d:\d\d<\d\d:\d\d, .*sample/s\]", printed)
     shutil.rmtree(tmp_path / "outputs")
     log = subprocess.run(command, cwd=tmp_path, check=True, text=True, capture_output=True)
-    assert re.fullmatch(r"s: 4 samples of hollow_sphere, about [\d.]+ MB on disk\n", log.stderr)
+    assert re.fullmatch(r"s: 4 samples of modal_ball, about [\d.]+ MB on disk\n", log.stderr)
 
 
 def test_verdicts_in_broken_cells_have_a_color(monkeypatch: pytest.MonkeyPatch) -> None:

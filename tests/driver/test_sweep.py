@@ -396,7 +396,7 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         thud.sweep(many, tmp_path)
     spread = {"low": 1, "high": 2, "count": 10**6}
     many = {"name": "a", "parameters": dict.fromkeys(("height", "mass", "gravity"), spread)}
-    with pytest.raises(thud.InputError, match=naming("a.nc", "4e+14 MB")):
+    with pytest.raises(thud.InputError, match=naming("a.nc", "1.11e+15 MB")):
         thud.sweep(many, tmp_path, allow_large=True)
     assert not (tmp_path / "a.partial").exists()
 
@@ -632,7 +632,7 @@ def test_command_writes_figure_and_table(
     names = ["sweep.nc", "sweep.svg"]
     assert names_in(folder) == names
     printed = capsys.readouterr()
-    assert re.search(naming(80, "modal_ball", "0.085 MB"), printed.err)
+    assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
     assert "peak force, N" in printed.out
     assert "Results: outputs/sweep" in printed.out
 

@@ -22,7 +22,7 @@ NOMINAL = np.array([39, 31, 23, 17, 12.5])
 
 
 def draw(**study: Any) -> Figure:  # noqa: ANN401 - of a study
-    return draw_sweep(thud.sweep(study))
+    return draw_sweep(thud.sweep({"fixed": {"model": "hollow_sphere"}, **study}))
 
 
 def curves(axes: Axes) -> np.ndarray:

@@ -27,7 +27,7 @@ SMALL: dict[str, Any] = {
 
 def test_small_tolerances_propagate_linearly() -> None:
     result = thud.uncertainty(SMALL)
-    standard = thud.Ball()
+    standard = thud.Case().resolved().ball
     # By parameter: its standard deviation, and that of the temperature for the modulus.
     spread = {
         "wall_thickness": 5e-5,

@@ -137,15 +137,6 @@ def test_answer_outside_the_theory_raises_a_warning(words: str, case_file: CaseF
     assert [bool(re.search(words, warning)) for warning in found].count(True) == 1, found
 
 
-def test_free_modes_with_the_modulus_of_the_shell_raise_a_warning() -> None:
-    with pytest.warns(thud.PlausibilityWarning, match=naming("'finite_element'", "2.08 MPa")):
-        found = thud.free_modes()
-    assert len(found.warnings) == 1
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        thud.free_modes(thud.Ball.standard())
-
-
 @pytest.mark.usefixtures("working_directory")
 def test_run_names_the_groups_that_are_left_out(
     case_file: CaseFile, capsys: pytest.CaptureFixture[str]

@@ -147,7 +147,7 @@ def _covers(covered: dict[str, int], count: int) -> bool:
 def pulse(quiet: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time, s, and force, N, of the truth with quiet on both sides."""
     ball = thud.Ball(youngs_modulus=TRUTH["youngs_modulus"])
-    impact = thud.solve(ball, thud.Drop(TRUTH["height"]), duration=0.026)
+    impact = thud.solve(ball, thud.Drop(TRUTH["height"]), duration=0.026, model="hollow_sphere")
     force = impact.floor_force[: int(impact.contact_time * RATE) + 2]
     room = round(quiet * RATE)
     force = np.pad(force, room)
@@ -159,7 +159,7 @@ def tally(name: str, seeds: int, quiet: float = QUIET) -> Tally:
     time, force = pulse(quiet)
     covered, silent = dict.fromkeys(TRUTH, 0), dict.fromkeys(TRUTH, 0)
     quiet_fits = 0
-    case = thud.Case(sampling=thud.Sampling(duration=0.026))
+    case = thud.Case(sampling=thud.Sampling(duration=0.026), model=thud.HollowSphere())
     for seed in range(seeds):
         random = np.random.default_rng([seed, *name.encode()])
         record = time, force + DISTURBANCES[name](time, random)

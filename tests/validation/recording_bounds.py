@@ -46,7 +46,7 @@ RATES = (8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3)
 SHAPES = {
     "half sine": ("", 0.4),
     "shell": ("rubber_ball_100cm", 0.18),
-    "modal": ("rubber_ball_modal", 0.14),
+    "modal": ("comparison/3_modes", 0.14),
     "viscous elements": ("rubber_ball_fe_viscous", 0.14),
     "fractional elements": ("recordings/ball", 0.14),
 }
