@@ -267,7 +267,8 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
         1e3 * impact.floor_velocity.max(), rel=0.05
     )
     numbers = {name: value for name, value, _ in answer["floor"]["numbers"]}
-    change = 20 * np.log10(impact.peak_force / thud.solve().peak_force)
+    blocked = thud.solve(model="hollow_sphere")
+    change = 20 * np.log10(impact.peak_force / blocked.peak_force)
     assert numbers["peak force relative to rigid floor"] == pytest.approx(change)
     assert [row[0] for row in answer["floor"]["rows"]] == ["31.5", "63", "125", "250", "500"]
     assert len(answer["room"]["level"]) == 12

@@ -169,7 +169,7 @@ def test_duration_that_a_message_allows_is_accepted(modulus: float) -> None:
         new_case({"model": {"name": "finite_element"}, "ball": {"youngs_modulus": modulus}}),
         model=thud.FiniteElement(radial_elements=2, polar_elements=16),
     )
-    with pytest.raises(thud.ThudError, match="ends before contact 1") as raised:
+    with pytest.raises(thud.ThudError, match=r"is too short|ends before contact 1") as raised:
         compute(case)
     (shortest,) = re.findall(r"at least ([\d.]+) s$", str(raised.value))
     assert len(shortest.lstrip("0.")) <= 3

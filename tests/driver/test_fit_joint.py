@@ -37,7 +37,7 @@ CASE = thud.Case(
 )
 TRUTH = {"youngs_modulus": 1.8e6, "mass": 2.5}
 STUDY = """
-fixed.duration = 0.03
+fixed = { duration = 0.03, model = "hollow_sphere" }
 
 [[target]]
 file = "drop_1.csv"

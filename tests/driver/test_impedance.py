@@ -92,7 +92,8 @@ def test_tangent_has_the_damping_of_a_damped_source(linear: thud.BallImpedance) 
     velocity = swing * (np.cos(omega * time) - decay / omega * np.sin(omega * time))
     source = replace(
         thud.solve(model="hollow_sphere"), time=time, deflection=deflection, velocity=velocity,
-        impact_velocity=1.0, floor_force=stiffness * deflection + damping * velocity, sample_rate=rate,
+        impact_velocity=1.0, sample_rate=rate,
+        floor_force=stiffness * deflection + damping * velocity,
     )  # fmt: skip
     # The acceleration is a central difference.
     assert _tangent(source) == pytest.approx((mass, stiffness, damping), rel=1e-4)

@@ -71,7 +71,7 @@ def test_contact_on_a_light_floor_ends_with_its_last_touch(name: str) -> None:
     assert impact.floor_work < 2.5 / 2 * impact.impact_velocity**2 * (1 - impact.restitution**2)
     if name == "finite_element":
         assert impact.floor_work == pytest.approx(2.10, abs=0.01)
-        assert impact.levels(force="floor")[0] == pytest.approx(38.0, abs=0.05)
+        assert impact.levels(force="floor")[0] == pytest.approx(37.94, abs=0.05)
         assert impact.max_deflection == pytest.approx(0.018, abs=0.0005)
     for duration in (0.03, 0.04):
         with pytest.raises(thud.InputError, match=r"&sampling: duration .* ends "):

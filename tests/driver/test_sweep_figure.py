@@ -92,7 +92,8 @@ def test_every_set_has_the_nominal_levels_of_its_source_and_its_assessed_force()
     sources, forces = ["rubber_ball", "tyre"], ["elastic", "floor"]
     for force in forces:
         figure = draw(
-            fixed={"force": force}, parameters={"source": {"values": sources}, "height": HEIGHTS}
+            fixed={"model": "hollow_sphere", "force": force},
+            parameters={"source": {"values": sources}, "height": HEIGHTS},
         )
         for axes, source in zip(figure.axes, sources, strict=True):
             impact = thud.solve(model="hollow_sphere")
@@ -136,7 +137,7 @@ def test_figure_is_a_column_wide(tmp_path: Any) -> None:  # noqa: ANN401 - a pat
 
 def test_case_with_a_room_is_drawn(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
-    case.write_text("&model /\n&floor name = 'plate' /\n&plate /\n&room /\n")
+    case.write_text("&model name='hollow_sphere' /\n&floor name = 'plate' /\n&plate /\n&room /\n")
     thickness = {"values": [0.14, 0.18, 0.22], "unit": "m"}
     figure = draw(case=str(case), parameters={"plate.thickness": thickness})
     (axes,) = figure.axes

@@ -258,9 +258,9 @@ contains
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) then
             text = text//newline//mark//'&'//trim(fields(i)%group)//newline
          end if
-         text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline//mark//'   '
+         text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline
          if (mark == '' .and. fields(i)%is_empty()) text = text//'! '
-         text = text//trim(fields(i)%key)//' = '//value//newline
+         text = text//mark//'   '//trim(fields(i)%key)//' = '//value//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
       end do
    end subroutine describe_keys
