@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ import thud
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+solve_shells = partial(thud.solve_many, model="hollow_sphere")
 RATE = 44100
 SETS = 32_768
 STREAMED = int(os.environ.get("THUD_BENCH_STREAMED", "500000"))
@@ -98,7 +100,7 @@ def heyoka_rate(count: int = 2048) -> float | None:
                     break
         return float(integrator.time[-1])
 
-    expected = thud.solve_many({"height": heights(count)}).contact_time[-1]
+    expected = solve_shells({"height": heights(count)}).contact_time[-1]
     print(f"  (heyoka's contact time differs by {abs(run() - expected):.1e} s)")
     return count / best(run)
 
@@ -221,7 +223,7 @@ def stream(count: int, path: Path, chunk: int = 50_000) -> None:
     with path.open("wb") as file:
         for first in range(0, count, chunk):
             n = min(chunk, count - first)
-            found = thud.solve_many({
+            found = solve_shells({
                 "height": random.uniform(0.9, 1.1, n),
                 "youngs_modulus": random.uniform(1.4e6, 1.8e6, n),
                 "wall_thickness": random.uniform(0.030, 0.034, n),
@@ -267,7 +269,7 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
         *,
         levels: bool = True,
     ) -> float:
-        return best(lambda: thud.solve_many(drops, threads=threads, levels=levels), 7, clock)
+        return best(lambda: solve_shells(drops, threads=threads, levels=levels), 7, clock)
 
     bare, whole = run(levels=False), run()
     marching, complete = SETS / bare, SETS / whole
@@ -286,7 +288,7 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
     report(name, levels, "SciPy ZoomFFT, 64 lines per band", zoom_rate())
     one, two = (SETS / run(threads, clock=time.perf_counter) for threads in (1, 2))
     report("ensemble, two threads", two, "one thread", one)
-    steps = float(np.sum(thud.solve_many(drops, levels=False).contact_time)) * RATE
+    steps = float(np.sum(solve_shells(drops, levels=False).contact_time)) * RATE
     flops, limit = FLOPS_PER_STEP * steps / bare, dgemm_rate()
     print(f"trajectories: {FLOPS_PER_STEP:.0f} flops per step, {flops / 1e9:.1f} Gflop/s, "
           f"{100 * flops / limit:.0f} % of DGEMM's {limit / 1e9:.1f} Gflop/s")  # fmt: skip
