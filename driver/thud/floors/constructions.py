@@ -102,10 +102,10 @@ class Construction(Displayed):
         Parameters
         ----------
         source
-            Case whose ball, drop, model and room are used; by default that of a room below which no
-            source is named: a rubber ball that conforms, and a room of 50 m3 with 0.5 s. The floor
-            takes length and width of its room, or of its floor if the room does not state both or
-            is in a corner of the floor, unless the construction is not allowed with these.
+            Case whose ball, drop, model and room are used; by default the standard ball, and a room
+            as large as the floor, 2.5 m high, with 0.5 s. The floor takes length and width of its
+            room, or of its floor if the room does not state both or is in a corner of the floor,
+            unless the construction is not allowed with these.
 
         Raises
         ------
@@ -113,8 +113,7 @@ class Construction(Displayed):
             If `source` is not a case.
         """
         require_kind("source", source, Case | None)
-        if source is None:
-            source = Case(room=Room())
+        source = source or Case(room=Room())
         # The ceiling of the source is not part of this construction.
         ceiling = {key: getattr(Room(), key) for key in CEILING_KEYS} | self.room
         result = replace(

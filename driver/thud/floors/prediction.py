@@ -328,30 +328,29 @@ def predict_level(
     Parameters
     ----------
     source
-        Impact of any model, or a recording; by default that of `Case(floor=floor, room=room)`,
-        whose source conforms to the standards.
+        Impact of any model, or a recording; by default that of `Case(floor=floor, room=room)`, the
+        standard ball.
     floor, room
-        Floor and room; by default those of the impact's case. A construction also describes the
-        ceiling of the room.
+        Floor and room; by default those of the impact's case, else `Room()`, as large as the floor
+        and 2.5 m high. A construction also describes the ceiling of the room.
 
     Raises
     ------
     InputError
-        If the floor or the room is missing or out of range.
+        If the floor is missing, or floor or room are out of range.
     """
     require_kind("source", source, ImpactResult | None)
-    if isinstance(floor, Construction):
-        known = Case() if source is None else source.case
-        built = floor.case(replace(known, room=room or known.room))
-        floor, room = built.floor, built.room if room or known.room else None
-    if source is None and floor is not None and room is not None:
-        source = compute(Case(floor=floor, room=room))
     case = Case() if source is None else source.case
-    floor, room = floor or case.floor, room or case.room
-    if source is None or floor is None or room is None:
-        refuse(
-            f"{'floor' if floor is None else 'room'} is missing", "a floor, such as Plate, and Room"
-        )
+    room = room or case.room or Room()
+    if isinstance(floor, Construction):
+        case = floor.case(replace(case, room=room))
+        floor, room = case.floor, case.room
+    floor = floor or case.floor
+    if floor is None or room is None:
+        refuse("floor is missing", "a floor, such as Plate")
+    if source is None:
+        source = compute(Case(floor=floor, room=room))
+    case = source.case
     floor_case = replace(case, modes=None, floor=floor, room=room)
     impact, level = _on_floor(source, floor_case)
     if (floor, room) == (case.floor, case.room):
