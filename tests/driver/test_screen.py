@@ -35,7 +35,7 @@ COLOR_ENDS = "\x1b[0m"
 MEANINGLESS = re.compile(r"(?<![\d.])(?:[-−]0(?:\.0+)?|0\.000+)(?![\d.])")
 # Names of commands with arguments; they are run in a directory with a copy of the inputs.
 COMMANDS = {
-    "assess": "assess inputs/rubber_ball_fe.nml",
+    "assess": "assess inputs/rubber_ball_modal.nml",
     "assess unknowns": "assess inputs/rubber_ball_unknowns.nml",
     "calibrate": "calibrate inputs/recordings/drop_1.csv --mass 2.5",
     "compare": "compare inputs/rubber_ball_100cm.nml inputs/recordings/drop_1.csv "
