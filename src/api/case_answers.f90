@@ -33,7 +33,8 @@ contains
       call bundle%add_text('compiler', trim(get_compiler()))
    end subroutine describe_library
 
-   !> The input of the namelist file `path`, with every key but calibrated ones that it does not state. It may have a room without a floor.
+   !> The input of the namelist file `path`, which may have a room without a floor: every key but calibrated ones that it
+   !> does not state.
    subroutine answer_effective_case(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle

@@ -39,7 +39,7 @@ settings.load_profile("thud")
 
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
-MINIMAL = "&ball /\n&drop /\n&model /\n"
+MINIMAL = "&ball /\n&drop /\n&model name = 'hollow_sphere' /\n"
 RESULT_FILES = ["effective.nml", "force.csv", "levels.csv", "summary.nml", "thud.txt"]
 # How patterns of `naming` begin: at the begin of a message, in any case, over all its lines.
 NAMING = r"(?is)\A"
@@ -110,7 +110,7 @@ def executable() -> str:
 @pytest.fixture(scope="session")
 def shell() -> thud.Impact:
     """Return the impact of the standard drop by the model of the paper."""
-    return thud.solve()
+    return thud.solve(model="hollow_sphere")
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def test_defaults_are_those_of_the_library(case_file: CaseFile) -> None:
-    assert thud.read_case(case_file(MINIMAL)) == thud.Case(name="case")
+    assert thud.read_case(case_file("&model /")) == thud.Case(name="case")
 
 
 @pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)

@@ -23,7 +23,7 @@ MASS = {"mass": {"low": 2.4, "high": 2.6}}
 
 
 def results(impact: thud.Impact) -> list[Displayed]:
-    many = thud.solve_many({"mass": [2.5, -1.0]})
+    many = thud.solve_many({"mass": [2.0, -1.0]})
     judged = impact.assess()
     record = recorded(impact)
     modes = thud.free_modes(count=2)
@@ -57,14 +57,14 @@ def test_results_have_a_line_and_a_table(flagship: thud.Impact) -> None:
 
 def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
     assert repr(flagship.assess()) == "<Verdict, rubber_ball: conforms>"
-    shell = thud.solve().assess()
+    shell = thud.solve(model="hollow_sphere").assess()
     missed = "octave_125, octave_250, octave_500"
     assert repr(shell) == f"<Verdict, rubber_ball: does not conform in {missed}>"
     assert repr(shell.criteria[2]) == (
         "<Criterion, octave 125: 18.95 dB too low, allowed 21.5 to 24.5>"
     )
     assert shell.rows()[-1] == ("all criteria", "", "", "", "does not conform")
-    many = thud.solve_many({"mass": [2.5, -1.0]})
+    many = thud.solve_many({"mass": [2.0, -1.0]})
     assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 1 failed>"
     many = thud.solve_many({"mass": [-1.0, -2.0]})
     assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 2 failed>"

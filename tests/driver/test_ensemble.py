@@ -45,7 +45,7 @@ def single(parameters: dict[str, np.ndarray], i: int, **options: object) -> thud
     flux = str(one.pop("momentum_flux"))
     drop = thud.Drop(float(one.pop("height")), float(one.pop("gravity")))
     ball = thud.Ball(**{key: float(value) for key, value in one.items()})
-    return thud.solve(ball, drop, momentum_flux=flux, **options)  # type: ignore[arg-type]
+    return thud.solve(ball, drop, "hollow_sphere", momentum_flux=flux, **options)  # type: ignore[arg-type]
 
 
 def results(ensemble: thud.Ensemble) -> dict[object, np.ndarray]:
@@ -69,7 +69,9 @@ def assert_same_bits(
 
 def test_equals_the_single_solver() -> None:
     parameters = random_sets(80, 1)
-    ensemble = thud.solve_many(parameters, forces=True, bands="third", duration=0.2)
+    ensemble = thud.solve_many(
+        parameters, forces=True, bands="third", duration=0.2, model="hollow_sphere"
+    )
     assert not ensemble.status.any()
     assert ensemble.elastic_force is not None
     assert ensemble.floor_force is not None
@@ -92,11 +94,15 @@ def test_equals_the_single_solver() -> None:
 
 def test_fails_where_the_single_solver_fails() -> None:
     heights = np.geomspace(0.1, 500, 60)
-    ensemble = thud.solve_many({"height": heights, "momentum_flux": np.resize(FLUX, 60)})
+    ensemble = thud.solve_many(
+        {"height": heights, "momentum_flux": np.resize(FLUX, 60)}, model="hollow_sphere"
+    )
     assert 0 < np.count_nonzero(ensemble.status) < 60
     for height, flux, status in zip(heights, np.resize(FLUX, 60), ensemble.status, strict=True):
         try:
-            thud.solve(drop=thud.Drop(float(height)), momentum_flux=str(flux))
+            thud.solve(
+                drop=thud.Drop(float(height)), momentum_flux=str(flux), model="hollow_sphere"
+            )
         except thud.NumericalError as error:
             assert "&drop: height" in str(error)
             assert status == 2
@@ -112,18 +118,20 @@ def test_a_conforming_source_conforms() -> None:
                   "outer_radius": np.full(count, 0.06105),
                   "wall_thickness": np.full(count, 0.0244), "mass": np.full(count, 2.59),
                   "gauge_pressure": np.full(count, 17.8e3)}  # fmt: skip
-    ensemble = thud.solve_many(parameters)
+    ensemble = thud.solve_many(parameters, model="hollow_sphere")
     assert 5 < np.count_nonzero(ensemble.floor_conforms) < count - 5
     for i in range(count):
         ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
-        impact = thud.solve(ball)
+        impact = thud.solve(ball, model="hollow_sphere")
         assert ensemble.conforms[i] == bool(impact.assess())
         assert ensemble.elastic_conforms[i] == bool(impact.assess(force="elastic"))
 
 
 def test_forces_beyond_the_memory_are_refused() -> None:
     with pytest.raises(thud.InputError, match=naming("forces", 10000000, 441000)):
-        thud.solve_many({"height": np.ones(10_000_000)}, duration=10.0, forces=True)
+        thud.solve_many(
+            {"height": np.ones(10_000_000)}, duration=10.0, forces=True, model="hollow_sphere"
+        )
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
@@ -131,23 +139,26 @@ def test_threads_and_order_change_no_bit(threads: int) -> None:
     parameters = random_sets(301, 2)
     parameters["height"][::17] = 500.0
     parameters["mass"][5] = np.nan
-    reference = thud.solve_many(parameters, threads=1, duration=0.1)
-    assert_same_bits(reference, thud.solve_many(parameters, threads=threads, duration=0.1))
+    reference = thud.solve_many(parameters, threads=1, duration=0.1, model="hollow_sphere")
+    assert_same_bits(
+        reference, thud.solve_many(parameters, threads=threads, duration=0.1, model="hollow_sphere")
+    )
     order = np.random.default_rng(3).permutation(301)
     shuffled = {key: values[order] for key, values in parameters.items()}
-    found = thud.solve_many(shuffled, threads=threads, duration=0.1)
+    found = thud.solve_many(shuffled, threads=threads, duration=0.1, model="hollow_sphere")
     assert_same_bits(reference, found, order)
     part = {key: values[order[:45]] for key, values in parameters.items()}
-    found = thud.solve_many(part, threads=threads, duration=0.1)
+    found = thud.solve_many(part, threads=threads, duration=0.1, model="hollow_sphere")
     assert_same_bits(reference, found, order[:45])
 
 
 def test_invalid_samples_are_marked_and_leave_the_others() -> None:
     parameters = random_sets(40, 4)
-    for i in (9, 11, 13):  # the standard ball, whose ways to fail are known
-        for key, value in (vars(thud.Ball()) | vars(thud.Drop())).items():
+    for i in (9, 11, 13):  # the paper's ball, whose ways to fail are known
+        ball = thud.Case(model=thud.HollowSphere()).resolved().ball
+        for key, value in (vars(ball) | vars(thud.Drop())).items():
             parameters[key][i] = value
-    clean = thud.solve_many(parameters, threads=1)
+    clean = thud.solve_many(parameters, threads=1, model="hollow_sphere")
     broken = {key: values.copy() for key, values in parameters.items()}
     broken["outer_radius"][3] = -1
     broken["wall_thickness"][7] = 1
@@ -155,7 +166,7 @@ def test_invalid_samples_are_marked_and_leave_the_others() -> None:
     broken["youngs_modulus"][11] = 1e11
     broken["mass"][13] = 500
     broken["poisson_ratio"][15] = np.inf
-    ensemble = thud.solve_many(broken, threads=1)
+    ensemble = thud.solve_many(broken, threads=1, model="hollow_sphere")
     bad = [3, 7, 9, 11, 13, 15]
     assert ensemble.status[bad].tolist() == [1, 1, 2, 1, 1, 1]
     expected = (
@@ -177,9 +188,12 @@ def test_invalid_samples_are_marked_and_leave_the_others() -> None:
 
 
 def test_forces_are_kept_of_records_of_one_length() -> None:
-    ensemble = thud.solve_many({"substeps": [1, 2]}, forces=True)
+    ensemble = thud.solve_many({"substeps": [1, 2]}, forces=True, model="hollow_sphere")
     assert ensemble.elastic_force is not None
-    assert ensemble.elastic_force.shape == (2, thud.solve().force("elastic").size)
+    assert ensemble.elastic_force.shape == (
+        2,
+        thud.solve(model="hollow_sphere").force("elastic").size,
+    )
 
 
 def test_case_without_impact_is_refused() -> None:
@@ -189,7 +203,7 @@ def test_case_without_impact_is_refused() -> None:
 
 
 def test_forces_of_invalid_samples_are_nan() -> None:
-    ensemble = thud.solve_many({"height": [1.0, 900.0]}, forces=True)
+    ensemble = thud.solve_many({"height": [1.0, 900.0]}, forces=True, model="hollow_sphere")
     assert ensemble.elastic_force is not None
     assert np.isnan(ensemble.elastic_force[1]).all()
     assert np.isfinite(ensemble.elastic_force[0]).all()
@@ -197,12 +211,12 @@ def test_forces_of_invalid_samples_are_nan() -> None:
 
 
 def test_too_few_samples() -> None:
-    ensemble = thud.solve_many({"youngs_modulus": 7e10}, substeps=200)
+    ensemble = thud.solve_many({"youngs_modulus": 7e10}, substeps=200, model="hollow_sphere")
     assert re.search(naming("&sampling: sample_rate", "44100.0 Hz"), ensemble.reason[0])
 
 
 def test_an_empty_batch_is_empty() -> None:
-    ensemble = thud.solve_many({"height": []}, bands="third")
+    ensemble = thud.solve_many({"height": []}, bands="third", model="hollow_sphere")
     assert len(ensemble) == 0
     assert ensemble.levels["elastic", "third"].shape == (0, 15)
     assert ensemble.reason.size == 0
@@ -210,8 +224,8 @@ def test_an_empty_batch_is_empty() -> None:
 
 def test_without_levels_the_rest_is_the_same() -> None:
     parameters = random_sets(50, 6)
-    whole = thud.solve_many(parameters)
-    bare = thud.solve_many(parameters, levels=False)
+    whole = thud.solve_many(parameters, model="hollow_sphere")
+    bare = thud.solve_many(parameters, levels=False, model="hollow_sphere")
     np.testing.assert_array_equal(bare.contact_time, whole.contact_time)
     np.testing.assert_array_equal(bare.impulse, whole.impulse)
     assert np.isnan(bare.elastic_octaves).all()
@@ -220,10 +234,15 @@ def test_without_levels_the_rest_is_the_same() -> None:
 
 
 def test_scalars_and_defaults() -> None:
-    ensemble = thud.solve_many({})
+    ensemble = thud.solve_many({}, model="hollow_sphere")
     assert len(ensemble) == 1
-    assert ensemble.contact_time[0] == pytest.approx(thud.solve().contact_time, rel=1e-12)
-    assert ensemble.contact_time[0] == thud.solve_many({}, thud.Case()).contact_time[0]
+    assert ensemble.contact_time[0] == pytest.approx(
+        thud.solve(model="hollow_sphere").contact_time, rel=1e-12
+    )
+    assert (
+        ensemble.contact_time[0]
+        == thud.solve_many({}, thud.Case(model=thud.HollowSphere())).contact_time[0]
+    )
 
 
 @pytest.mark.parametrize(
@@ -232,7 +251,7 @@ def test_scalars_and_defaults() -> None:
         (
             {"radius": 1},
             {},
-            naming("'radius'", "hollow_sphere", "&ball", "&drop"),
+            naming("'radius'", "modal_ball", "&ball", "&drop"),
         ),
         ({"height": [1, 2], "mass": [1, 2, 3]}, {}, naming("height (2,)", "mass (3,)")),
         ({"height": [[1]]}, {}, naming("height", "2 dimensions")),
@@ -240,8 +259,8 @@ def test_scalars_and_defaults() -> None:
         ({"height": ["one"]}, {}, naming("height", "real")),
         ({"height": [1j]}, {}, naming("height", "real")),
         ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, naming("height", "masked")),
-        ({"momentum_flux": "some"}, {}, naming("momentum_flux", "'some'", "'none'")),
-        ({"momentum_flux": ["none", "some"]}, {}, naming("'some'")),
+        ({"damping_law": "some"}, {}, naming("damping_law", "'some'", "'rising'")),
+        ({"damping_law": ["rising", "some"]}, {}, naming("'some'")),
         ([1], {}, naming("parameters", [1])),
         (np.ones(2), {}, naming("parameters")),
         ({}, {"threads": 0}, naming("threads", 0, 1, 1024)),
@@ -251,7 +270,7 @@ def test_scalars_and_defaults() -> None:
         ({"density": 1.0}, {}, naming("'density'", "studies")),
         ({"bands": "third"}, {}, naming("bands")),
         ({"source": ["tyre"]}, {"source": "tyre"}, naming("'source'")),
-        ({1: [1.0]}, {}, naming(1, "hollow_sphere", "&ball")),
+        ({1: [1.0]}, {}, naming(1, "modal_ball", "&ball")),
         ({"height": np.broadcast_to(1.0, 10**13)}, {}, naming("parameters", "memory")),
         ({"duration": [0.05, 0.1]}, {"forces": True}, naming("forces", "sampling")),
         ({}, {"bands": "fifth"}, naming("bands", "'fifth'", "'third'")),
@@ -288,7 +307,7 @@ def test_bad_input_is_named(parameters: object, options: dict[str, object], word
 )
 def test_any_input_gives_numbers_or_a_clear_error(parameters: dict[str, object]) -> None:
     try:
-        ensemble = thud.solve_many(parameters, threads=1)  # type: ignore[arg-type]
+        ensemble = thud.solve_many(parameters, threads=1, model="hollow_sphere")  # type: ignore[arg-type]
     except thud.InputError:
         return
     assert np.isfinite(ensemble.elastic_octaves[ensemble.status == 0]).all()
@@ -324,7 +343,7 @@ def test_threads_are_the_processors_of_the_process(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(ensemble, "_compute", watched)
     # Of this process, 0, and of no other.
     monkeypatch.setattr("os.sched_getaffinity", {0: {1, 4, 5}}.__getitem__)
-    thud.solve_many({"mass": [2.4, 2.5]})
+    thud.solve_many({"mass": [2.4, 2.5]}, model="hollow_sphere")
     assert widths == [3]
 
 
@@ -352,12 +371,13 @@ def test_levels_differ_from_single_drops_by_the_rounding_of_their_energy() -> No
     # Small, heavy balls: their contacts are long, and hold little energy at 500 Hz.
     ball = {"outer_radius": 0.055, "wall_thickness": 0.002, "height": 0.3}
     masses = np.array([1.0, 2.0, 4.0])
-    many = thud.solve_many({**ball, "mass": masses})
+    many = thud.solve_many({**ball, "mass": masses}, model="hollow_sphere")
     ratios = []
     for i in np.flatnonzero(many.status == 0):
         single = thud.solve(
             thud.Ball(outer_radius=0.055, wall_thickness=0.002, mass=masses[i]),
             thud.Drop(height=0.3),
+            model="hollow_sphere",
         )
         for force in ("elastic", "floor"):
             levels = single.levels(force=force)
@@ -373,10 +393,15 @@ def test_levels_differ_from_single_drops_by_the_rounding_of_their_energy() -> No
 
 def test_shells_that_need_shorter_steps_equal_single_drops() -> None:
     columns = {"youngs_modulus": [99.5e6, 60e6, 150e6, 1.6e6], "height": [8.77, 8.77, 4.0, 1.0]}
-    many = thud.solve_many(columns, sample_rate=8000.0)
+    many = thud.solve_many(columns, sample_rate=8000.0, model="hollow_sphere")
     shortened = []
     for i, (modulus, height) in enumerate(zip(*columns.values(), strict=True)):
-        single = thud.solve(thud.Ball(youngs_modulus=modulus), thud.Drop(height), sample_rate=8e3)
+        single = thud.solve(
+            thud.Ball(youngs_modulus=modulus),
+            thud.Drop(height),
+            sample_rate=8e3,
+            model="hollow_sphere",
+        )
         shortened.append("shortened_time_step" in single.model_quantities)
         for force in ("elastic", "floor"):
             levels = many.levels[force, "octave"][i]
@@ -405,7 +430,7 @@ def test_levels_of_long_contacts_are_those_of_single_drops() -> None:
 
 def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     parameters = random_sets(50, 4)
-    whole = thud.solve_many(parameters, bands="third", forces=True)
+    whole = thud.solve_many(parameters, bands="third", forces=True, model="hollow_sphere")
     sizes = []
     compute = ensemble._compute  # noqa: SLF001
 
@@ -417,24 +442,26 @@ def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     for most, expected in ((16, [16, 16, 16, 2]), (50, [50]), (25, [25, 25])):
         sizes.clear()
         monkeypatch.setattr(ensemble, "_MAX_SAMPLES", most)
-        parts = thud.solve_many(parameters, bands="third", forces=True)
+        parts = thud.solve_many(parameters, bands="third", forces=True, model="hollow_sphere")
         assert_same_bits(whole, parts)
         np.testing.assert_array_equal(parts.floor_force, whole.floor_force)
         assert sizes == expected
     # A call takes about a second: one set at least.
     monkeypatch.setattr(ensemble, "_CALL_TIME", 0.0)
     sizes.clear()
-    thud.solve_many({"height": [1.0, 1.1]})
+    thud.solve_many({"height": [1.0, 1.1]}, model="hollow_sphere")
     assert sizes == [1, 1]
 
 
 def test_levels_and_forces_are_kept_by_their_names() -> None:
-    found = thud.solve_many({"height": [0.8, 1.0]}, bands="third", forces=True)
+    found = thud.solve_many(
+        {"height": [0.8, 1.0]}, bands="third", forces=True, model="hollow_sphere"
+    )
     assert list(found.levels) == [
         (force, bands) for bands in ("octave", "third") for force in ("elastic", "floor")
     ]
     for i, height in enumerate((0.8, 1.0)):
-        impact = thud.solve(drop=thud.Drop(height))
+        impact = thud.solve(drop=thud.Drop(height), model="hollow_sphere")
         for (force, bands), levels in found.levels.items():
             assert levels[i] == pytest.approx(impact.levels(bands, force=force), abs=1e-6)
         for force in ("elastic", "floor"):
@@ -442,7 +469,7 @@ def test_levels_and_forces_are_kept_by_their_names() -> None:
             assert kept == pytest.approx(impact.force(force), abs=1e-6)  # type: ignore[arg-type]
             met = getattr(found, f"{force}_conforms")[i]
             assert met == bool(impact.assess(force=force))  # type: ignore[arg-type]
-    assert list(thud.solve_many({"height": 1.0}).levels) == [
+    assert list(thud.solve_many({"height": 1.0}, model="hollow_sphere").levels) == [
         ("elastic", "octave"),
         ("floor", "octave"),
     ]
@@ -485,7 +512,7 @@ def test_samples_state_what_studies_state() -> None:
     assert any("statistical predictions" in note for note in found.notes)
     # Nothing is said of a source without levels, or of a room that is not there.
     unknown = thud.solve_many({"height": [1.0]}, case, levels=False)
-    bare = thud.solve_many({"height": [0.5]})
+    bare = thud.solve_many({"height": [0.5]}, model="hollow_sphere")
     assert not unknown.warnings
     assert not bare.warnings
     assert len(bare.notes) == 1
@@ -508,26 +535,28 @@ def test_keywords_replace_those_of_the_case() -> None:
     # The options of the case are those of its model only.
     assert thud.solve_many({}, case, model="hollow_sphere").case.model == case.model
     assert thud.solve_many({}, case, model="modal_ball").case.model == thud.ModalBall()
-    assert thud.solve_many({}).case.model == thud.HollowSphere()
-    assert thud.solve_many({}, threads=1024).status.tolist() == [0]
+    assert thud.solve_many({}, model="hollow_sphere").case.model == thud.HollowSphere()
+    assert thud.solve_many({}, threads=1024, model="hollow_sphere").status.tolist() == [0]
 
 
 def test_choices_are_those_of_their_words() -> None:
     words = np.array(["none", "retarding", "momentum_balance", "none"])
-    found = thud.solve_many({"momentum_flux": words})
+    found = thud.solve_many({"momentum_flux": words}, model="hollow_sphere")
     for word, peak in zip(words, found.peak_force, strict=True):
-        assert peak == pytest.approx(thud.solve(momentum_flux=str(word)).peak_force, rel=1e-9)
+        assert peak == pytest.approx(
+            thud.solve(momentum_flux=str(word), model="hollow_sphere").peak_force, rel=1e-9
+        )
 
 
 def test_columns_of_a_table_are_parameters() -> None:
     pandas = pytest.importorskip("pandas", reason="the extra studies is not installed")
     columns = {"height": [0.5, 1.0], "momentum_flux": ["retarding", "none"]}
     # Rows have any index.
-    found = thud.solve_many(pandas.DataFrame(columns, index=[7, 7]))
-    expected = thud.solve_many(columns)
+    found = thud.solve_many(pandas.DataFrame(columns, index=[7, 7]), model="hollow_sphere")
+    expected = thud.solve_many(columns, model="hollow_sphere")
     assert list(found.parameters) == list(expected.parameters)
     np.testing.assert_array_equal(found.restitution, expected.restitution)
     with pytest.raises(thud.InputError, match=naming("'heigth'", "'height'")):
-        thud.solve_many(pandas.DataFrame({"heigth": [1.0]}))
+        thud.solve_many(pandas.DataFrame({"heigth": [1.0]}), model="hollow_sphere")
     # Without columns there is the drop of the case.
-    assert len(thud.solve_many(pandas.DataFrame())) == 1
+    assert len(thud.solve_many(pandas.DataFrame(), model="hollow_sphere")) == 1

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import thud
 from thud.explorer.answer import answer_case, new_case
 from thud.explorer.models import model_facts
 from thud.explorer.motion import _response as response, mises_stress, motion_of
@@ -79,9 +78,8 @@ def test_stress_of_a_uniform_compression_is_that_of_theory() -> None:
     start = np.stack([r, z], axis=-1)
     stretch = 0.7
     position = start * np.array([stretch**-0.5, stretch])
-    ball = thud.Ball(youngs_modulus=2e6, poisson_ratio=0.5)
     for share in (0.0, 0.3):
-        found = mises_stress(start, position[None], ball, share)
+        found = mises_stress(start, position[None], 2e6 / 3, share)
         modulus = 2e6 / 3 * (1 - share + share / stretch)
         assert found == pytest.approx(abs(modulus * (stretch**2 - 1 / stretch)), rel=1e-9)
         assert found.shape == (1, 3, 4)

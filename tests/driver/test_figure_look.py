@@ -101,7 +101,7 @@ def test_long_names_of_many_cases_stay_outside_of_the_axes(shell: thud.Impact, c
 
 def test_levels_are_drawn_at_their_bands() -> None:
     """Shifted markers would change the slopes of the lines between them."""
-    impacts = {f"{i}": thud.solve() for i in range(4)}
+    impacts = {f"{i}": thud.solve(model="hollow_sphere") for i in range(4)}
     (axes,) = plot.levels(impacts).axes
     lines = [line for line in axes.lines if line.get_label() in impacts]
     sizes = [line.get_markersize() for line in lines]
@@ -160,7 +160,9 @@ def limits(impact: thud.Impact | thud.Recording) -> tuple[float, float]:
 
 
 def test_time_axis_is_that_of_the_contact_whatever_the_length_of_the_record() -> None:
-    short, long = (thud.solve(duration=duration) for duration in (0.025, 1.0))
+    short, long = (
+        thud.solve(duration=duration, model="hollow_sphere") for duration in (0.025, 1.0)
+    )
     contact = 1e3 * long.contact_time
     assert limits(long) == limits(short)
     assert limits(long)[0] == 0

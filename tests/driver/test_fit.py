@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     FailWhere = Callable[[Callable[[float], bool]], None]
 
 RATE = 44100.0
-TRUTH = thud.Ball(youngs_modulus=1.8e6)
+SHELL = thud.Case(model=thud.HollowSphere())
+TRUTH = thud.Case(ball=thud.Ball(youngs_modulus=1.8e6), model=thud.HollowSphere())
 MODAL = thud.Case(model=thud.ModalBall(damping_law="rising"))
 COARSE = thud.FiniteElement(radial_elements=2, polar_elements=16, snapshot_interval=0.0)
 # Least squares end where a step or a gain is 1e-8; near a perfect fit the last step squares that
@@ -40,14 +41,23 @@ def noisy_record(impact: thud.Impact, noise: float, seed: int) -> tuple[np.ndarr
 
 
 def test_known_parameters_come_back() -> None:
-    fit = thud.fit(thud.solve(TRUTH, thud.Drop(1.1)), ["youngs_modulus", "height"])
+    fit = thud.fit(
+        thud.solve(replace(TRUTH, drop=thud.Drop(1.1))),
+        ["youngs_modulus", "height"],
+        case=SHELL,
+    )
     assert fit.values == pytest.approx({"youngs_modulus": 1.8e6, "height": 1.1}, rel=SOLVED)
     assert fit.converged
     assert fit.case.ball == replace(TRUTH, youngs_modulus=fit.values["youngs_modulus"])
 
 
 def test_confidence_below_rounding_has_intervals_without_width() -> None:
-    fit = thud.fit(thud.solve(TRUTH), ["youngs_modulus", "height"], confidence=1e-17)
+    fit = thud.fit(
+        thud.solve(TRUTH),
+        ["youngs_modulus", "height"],
+        confidence=1e-17,
+        case=SHELL,
+    )
     for name, (low, high) in fit.intervals().items():
         assert low == high == fit.values[name]
 
@@ -127,14 +137,14 @@ def test_time_of_first_touch_is_found_between_samples() -> None:
     frequency = np.fft.rfftfreq(3000, 1 / RATE)
     whole = np.concatenate([impact.floor_force, np.zeros(3000 - len(impact.time))])
     moved = np.fft.irfft(np.fft.rfft(whole) * np.exp(-2j * np.pi * frequency * late), 3000)
-    fit = thud.fit((time, moved), ["youngs_modulus"])
+    fit = thud.fit((time, moved), ["youngs_modulus"], case=SHELL)
     assert fit.time_shift == pytest.approx(late, abs=1e-10)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
 
 def test_other_sampling_rates_are_no_hindrance() -> None:
-    target = thud.solve(TRUTH, sample_rate=96000.0, substeps=2)
-    fit = thud.fit(target, ["youngs_modulus"])
+    target = thud.solve(replace(TRUTH, sampling=thud.Sampling(96000.0, substeps=2)))
+    fit = thud.fit(target, ["youngs_modulus"], case=SHELL)
     # The sums over samples differ by the bend at release, at most slope/8 times the interval
     # squared in an impulse of 21 N s; a change of E by 1 changes the spectrum by about itself.
     slope = np.abs(np.diff(target.floor_force)).max() * 96000
@@ -150,7 +160,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, cou
     # leaves these quantiles once in 10 000 times.
     confidence = 0.9
     truth = {"youngs_modulus": 1.8e6, "height": 1.1, "time_shift": 220 / RATE - 0.1}
-    case = thud.Case(sampling=thud.Sampling(duration=0.026))
+    case = thud.Case(sampling=thud.Sampling(duration=0.026), model=thud.HollowSphere())
     impact = thud.solve(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
     impact = replace(impact, floor_force=np.append(impact.floor_force, np.zeros(2000)))
     starts = {"youngs_modulus": 1.8e6, "height": 1.1}
@@ -253,7 +263,7 @@ def test_parameters_are_lost_by_size_and_by_error_of_the_derivatives() -> None:
 
 def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
     def range_of(**given: object) -> Range:
-        case = thud.Case(drop=thud.Drop(2.0))
+        case = thud.Case(drop=thud.Drop(2.0), model=thud.HollowSphere())
         return get_ranges(case, bound_parameters(case, given))[0]  # type: ignore[arg-type]
 
     plain = range_of(height=None)
@@ -266,13 +276,19 @@ def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
     assert narrow.start == pytest.approx(2.0 - 0.01 / 4)
     # A start at 0 has no scale of its own: a tenth of the range is one.
     given = {"poisson_ratio": thud.Parameter(start=0.0, low=-0.2, high=0.3)}
-    (zero,) = get_ranges(thud.Case(), bound_parameters(thud.Case(), given))
+    (zero,) = get_ranges(
+        SHELL,
+        bound_parameters(SHELL, given),
+    )
     assert zero.scale == pytest.approx(0.05)
 
 
 def test_starts_are_the_given_one_and_a_latin_hypercube_over_the_spread() -> None:
     given = {"height": thud.Parameter(2.0), "mass": thud.Parameter(2.5, 2.0, 4.0)}
-    ranges = get_ranges(thud.Case(), bound_parameters(thud.Case(), given))
+    ranges = get_ranges(
+        SHELL,
+        bound_parameters(SHELL, given),
+    )
     first, *others = search._starts(ranges, 9, 0)  # noqa: SLF001
     assert first == pytest.approx([1.0, 1.0])
     # Of height from half to double, of mass inside its limits: one in each eighth.
@@ -282,7 +298,7 @@ def test_starts_are_the_given_one_and_a_latin_hypercube_over_the_spread() -> Non
 
 @pytest.mark.parametrize("at", [-0.002, 0.1, 0.14])
 def test_search_starts_where_record_and_impact_correlate(at: float) -> None:
-    impact = thud.solve(TRUTH, duration=0.03)
+    impact = thud.solve(replace(TRUTH, sampling=thud.Sampling(duration=0.03)))
     time = np.arange(int(0.2 * RATE)) / RATE
     force = np.interp(time - at, impact.time, impact.floor_force, left=0, right=0)
     target = thud.ForceTarget((time + 3.0, force), window=(3.0, 3.2)).misfit()
@@ -292,7 +308,7 @@ def test_search_starts_where_record_and_impact_correlate(at: float) -> None:
 
 
 def test_derivatives_by_time_and_gain_are_those_of_the_residual() -> None:
-    impact = thud.solve(TRUTH, duration=0.03)
+    impact = thud.solve(replace(TRUTH, sampling=thud.Sampling(duration=0.03)))
     time = np.arange(int(0.1 * RATE)) / RATE
     force = np.interp(time - 0.02, impact.time, impact.floor_force, left=0, right=0)
     target = thud.ForceTarget((time, 1.1 * force), noise=2.0, gain=0.05).misfit()
@@ -312,12 +328,18 @@ def test_derivatives_by_time_and_gain_are_those_of_the_residual() -> None:
 
 
 def test_noise_is_estimated_from_the_residuals() -> None:
-    fit = quiet_fit(noisy_record(thud.solve(TRUTH), 5.0, 3), ["youngs_modulus"])
+    fit = quiet_fit(
+        noisy_record(thud.solve(TRUTH), 5.0, 3),
+        ["youngs_modulus"],
+        case=SHELL,
+    )
     # A standard deviation from n residuals has the relative error 1 / sqrt(2 n).
     assert fit.noise == pytest.approx(5.0, rel=4 / np.sqrt(2 * fit.degrees_of_freedom))
     assert fit.reduced_chi_square == pytest.approx(1.0)
     given = quiet_fit(
-        thud.ForceTarget(noisy_record(thud.solve(TRUTH), 5.0, 3), noise=5.0), ["youngs_modulus"]
+        thud.ForceTarget(noisy_record(thud.solve(TRUTH), 5.0, 3), noise=5.0),
+        ["youngs_modulus"],
+        case=SHELL,
     )
     assert given.reduced_chi_square == pytest.approx((fit.noise / 5.0) ** 2)
     assert given.values == pytest.approx(fit.values)
@@ -342,7 +364,7 @@ def test_parameters_that_are_not_identifiable_are_named(
 ) -> None:
     target = thud.ForceTarget(noisy_record(thud.solve(TRUTH), 5.0, 1), offset=False)
     with pytest.warns(thud.FitWarning, match=words):
-        fit = thud.fit(target, parameters)
+        fit = thud.fit(target, parameters, case=SHELL)
     others = set(fit.names) - {"time_shift"}
     assert all(fit.standard_errors[name] == np.inf for name in others)
     assert np.isfinite(fit.standard_errors["time_shift"])
@@ -399,12 +421,12 @@ def test_contact_time_is_reported_between_samples() -> None:
 def test_model_that_cannot_follow_is_reported() -> None:
     record = noisy_record(thud.solve(MODAL), 5.0, 1)
     with pytest.warns(thud.FitWarning, match=naming("model", "force")):
-        thud.fit(thud.ForceTarget(record, offset=False), ["youngs_modulus"])
+        thud.fit(thud.ForceTarget(record, offset=False), ["youngs_modulus"], case=SHELL)
     with (
         pytest.warns(thud.FitWarning, match=naming("model", "force")),
         pytest.warns(thud.FitWarning, match=naming("uncertainty")),
     ):
-        thud.fit(thud.ForceTarget(record, noise=5.0, offset=False), ["youngs_modulus"])
+        thud.fit(thud.ForceTarget(record, noise=5.0, offset=False), ["youngs_modulus"], case=SHELL)
 
 
 @pytest.mark.parametrize(("low", "high", "limit"), [(1e6, 1.7e6, 1.7), (1.9e6, 3e6, 1.9)])
@@ -419,7 +441,7 @@ def test_limits_hold_and_are_reported(
         return compute(case)
 
     monkeypatch.setattr(misfit, "compute", watched)
-    fit = quiet_fit(target, limited)
+    fit = quiet_fit(target, limited, case=SHELL)
     # Also of the differences that are the derivatives.
     assert low * (1 - 1e-12) <= min(asked) < max(asked) <= high * (1 + 1e-12)
     assert re.search(naming("youngs_modulus", f"{limit} MPa"), fit.warnings[0])
@@ -429,31 +451,35 @@ def test_limits_hold_and_are_reported(
 def test_intervals_end_at_the_limits() -> None:
     record = noisy_record(thud.solve(TRUTH), 5.0, 3)
     limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.8e6)}
-    fit = quiet_fit(record, limited)
+    fit = quiet_fit(record, limited, case=SHELL)
     low, high = fit.intervals(0.999999)["youngs_modulus"]
     assert low < fit.values["youngs_modulus"] <= high == pytest.approx(1.8e6, rel=1e-12)
     assert fit.summary()["parameters"]["youngs_modulus"]["interval"][1] <= 1.8e6 * (1 + 1e-12)
-    free = quiet_fit(record, ["youngs_modulus"])
+    free = quiet_fit(record, ["youngs_modulus"], case=SHELL)
     assert free.intervals(0.999999)["youngs_modulus"][1] > 1.8e6
     assert np.isinf(free.limits[free.names.index("time_shift")]).all()
 
 
 def test_table_says_what_the_standard_deviations_are() -> None:
     record = noisy_record(thud.solve(TRUTH), 5.0, 3)
-    found = str(quiet_fit(record, ["youngs_modulus"]))
+    found = str(quiet_fit(record, ["youngs_modulus"], case=SHELL))
     assert re.search(r"standard deviation [45]\.\d+ N, estimated", found)
-    found = str(quiet_fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"]))
+    found = str(quiet_fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"], case=SHELL))
     assert "standard deviation 5 N, given" in found
     levels = thud.solve(TRUTH).levels(force="floor")
-    found = str(quiet_fit(thud.LevelTarget(levels, [1, 1, 2, 2, 3]), ["youngs_modulus"]))
+    found = str(
+        quiet_fit(thud.LevelTarget(levels, [1, 1, 2, 2, 3]), ["youngs_modulus"], case=SHELL)
+    )
     assert "standard deviations given" in found
-    found = str(quiet_fit(thud.LevelTarget(levels + 0.1 * np.eye(5)[0]), ["youngs_modulus"]))
+    found = str(
+        quiet_fit(thud.LevelTarget(levels + 0.1 * np.eye(5)[0]), ["youngs_modulus"], case=SHELL)
+    )
     assert re.search(r"standard deviation 0\.0\d+ dB, estimated", found)
 
 
 def test_estimated_deviation_of_levels_is_that_of_their_residuals() -> None:
     levels = thud.solve(TRUTH).levels(force="floor") + 0.1 * np.eye(5)[0]
-    fit = quiet_fit(thud.LevelTarget(levels), ["youngs_modulus"])
+    fit = quiet_fit(thud.LevelTarget(levels), ["youngs_modulus"], case=SHELL)
     rest = fit.targets[0].impact.levels(force="floor") - levels
     # Five levels, less one parameter.
     assert fit.noise == pytest.approx(np.sqrt(rest @ rest / 4))
@@ -501,7 +527,7 @@ def test_search_goes_on_from_far_and_where_the_model_fails(
     target = thud.solve(TRUTH)
     if fails:
         fail_where(fails)
-    fit = thud.fit(target, {"youngs_modulus": start}, starts=starts)
+    fit = thud.fit(target, {"youngs_modulus": start}, starts=starts, case=SHELL)
     if fails and starts == 1:
         assert fit.failures
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
@@ -512,7 +538,7 @@ def test_model_that_fails_around_the_best_place(fail_where: FailWhere) -> None:
     with pytest.raises(
         thud.NumericalError, match=naming("youngs_modulus", "2e+06", "out of the model")
     ):
-        thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
+        thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6}, case=SHELL)
 
 
 @pytest.mark.slow
@@ -532,22 +558,32 @@ def test_best_of_several_starts_counts() -> None:
 def test_large_ball_is_valid_in_fixed_and_fit() -> None:
     # The wall is thicker than the default ball.
     ball = thud.Ball(outer_radius=0.2, wall_thickness=0.1, mass=20.0)
-    fit = thud.fit(thud.solve(ball), {"wall_thickness": 0.11}, thud.Case(ball=ball))
+    fit = thud.fit(
+        thud.solve(ball, model="hollow_sphere"),
+        {"wall_thickness": 0.11},
+        thud.Case(ball=ball, model=thud.HollowSphere()),
+    )
     assert fit.values["wall_thickness"] == pytest.approx(0.1, rel=SOLVED)
     starts = {"wall_thickness": 0.11, "outer_radius": 0.2}
-    quiet_fit(thud.solve(ball), starts, thud.Case(ball=thud.Ball(mass=20.0)))
-    fixed = {"outer_radius": 0.2, "wall_thickness": 0.1, "mass": 20}
+    quiet_fit(
+        thud.solve(ball, model="hollow_sphere"),
+        starts,
+        thud.Case(ball=thud.Ball(mass=20.0), model=thud.HollowSphere()),
+    )
+    fixed = {"model": "hollow_sphere", "outer_radius": 0.2, "wall_thickness": 0.1, "mass": 20}
     found = thud.sweep({"fixed": fixed, "parameters": {"height": {"values": [1]}}}).dataset
-    assert float(found["contact_time"][0]) == pytest.approx(thud.solve(ball).contact_time)
+    assert float(found["contact_time"][0]) == pytest.approx(
+        thud.solve(ball, model="hollow_sphere").contact_time
+    )
 
 
 def test_units_of_parameters_are_those_of_studies() -> None:
     limited = {"youngs_modulus": thud.Parameter(1.5, 1, 5, unit="MPa")}
-    fit = quiet_fit(thud.solve(TRUTH), limited)
+    fit = quiet_fit(thud.solve(TRUTH), limited, case=SHELL)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
     np.testing.assert_allclose(fit.limits, [[1e6, 5e6]])
     table = {"youngs_modulus": {"start": 1.5, "low": 1, "high": 5, "unit": "MPa"}}
-    assert quiet_fit(thud.solve(TRUTH), table).values == fit.values
+    assert quiet_fit(thud.solve(TRUTH), table, case=SHELL).values == fit.values
 
 
 def test_contact_times_that_jump_hide_no_parameter() -> None:
@@ -573,4 +609,4 @@ def test_record_of_too_many_values_is_refused_before_it_takes_the_memory() -> No
     time = np.arange(100_000) / 1e4
     target = thud.ForceTarget((time, np.exp(-((time - 5) ** 2) / 1e-5)), window=(0.0, 10.0))
     with pytest.raises(thud.InputError, match=naming("25000 values", 8000)):
-        thud.fit(target, ["youngs_modulus"])
+        thud.fit(target, ["youngs_modulus"], case=SHELL)

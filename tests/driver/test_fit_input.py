@@ -8,7 +8,7 @@ from conftest import naming
 
 import thud
 
-IMPACT = thud.solve(duration=0.03)
+IMPACT = thud.solve(duration=0.03, model="hollow_sphere")
 RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=1323)
 
 

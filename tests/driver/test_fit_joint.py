@@ -30,7 +30,11 @@ QUIET = 1000
 # A miss by four standard errors has a probability of 6e-5.
 FAR = 4.0
 # From 0.1 m contacts are the longest.
-CASE = thud.Case(ball=thud.Ball(youngs_modulus=1.8e6), sampling=thud.Sampling(duration=0.03))
+CASE = thud.Case(
+    ball=thud.Ball(youngs_modulus=1.8e6),
+    sampling=thud.Sampling(duration=0.03),
+    model=thud.HollowSphere(),
+)
 TRUTH = {"youngs_modulus": 1.8e6, "mass": 2.5}
 STUDY = """
 fixed.duration = 0.03
@@ -48,6 +52,8 @@ gain = 0.02
 youngs_modulus = { start = 1.6, unit = "MPa" }
 mass = { start = 2.4 }
 """
+
+SHELL = thud.Case(model=thud.HollowSphere())
 
 
 def record(case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0) -> Record:
@@ -230,9 +236,9 @@ def test_bad_records_are_named(folder: Path, old: str, new: str, words: str) -> 
 
 
 def test_lists_of_something_else_are_refused() -> None:
-    for targets in ([], [3], [thud.solve()]):
+    for targets in ([], [3], [thud.solve(model="hollow_sphere")]):
         with pytest.raises(thud.InputError, match=naming("target", "list")):
-            thud.fit(targets, ["youngs_modulus"])  # type: ignore[arg-type]
+            thud.fit(targets, ["youngs_modulus"], case=SHELL)  # type: ignore[arg-type]
     for given in ([], [3]):
         with pytest.raises(thud.InputError, match=naming("table", "[target]")):
             thud.read_study({"target": given, "parameters": {"mass": {}}}, "fit")

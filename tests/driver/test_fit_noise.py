@@ -42,7 +42,7 @@ from fit_disturbances import DISTURBANCES, QUIET, RATE, TRUTH, pulse
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-CASE = thud.Case(sampling=thud.Sampling(duration=0.026))
+CASE = thud.Case(sampling=thud.Sampling(duration=0.026), model=thud.HollowSphere())
 # A miss by four standard errors has a probability of 6e-5.
 FAR = 4.0
 
@@ -360,7 +360,9 @@ def test_pulse_is_found_on_an_offset() -> None:
     time, force = record("offset of 20 N")
     first, stop = find_pulse(force, RATE)
     # All of the contact, and no more than 5 ms of the quiet on each side.
-    contact = thud.solve(thud.Ball(youngs_modulus=1.8e6), thud.Drop(1.1)).contact_time
+    contact = thud.solve(
+        thud.Ball(youngs_modulus=1.8e6), thud.Drop(1.1), model="hollow_sphere"
+    ).contact_time
     assert QUIET - 0.005 < time[first] < QUIET
     assert QUIET + contact < time[stop] < QUIET + contact + 0.005
 
@@ -430,7 +432,9 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
     time, force = record("white noise")
     louder = time, 1.02 * force
     known = {"youngs_modulus": 1.8e6}
-    case = thud.Case(drop=thud.Drop(TRUTH["height"]), sampling=CASE.sampling)
+    case = thud.Case(
+        drop=thud.Drop(TRUTH["height"]), sampling=CASE.sampling, model=thud.HollowSphere()
+    )
     free = thud.fit(thud.ForceTarget(louder, gain=np.inf), known, case)
     assert abs(free.values["gain"] - 1.02) < FAR * free.standard_errors["gain"]
     assert free.standard_errors["gain"] < 1e-3

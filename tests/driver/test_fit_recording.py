@@ -30,6 +30,9 @@ COARSE = thud.FiniteElement(
 )
 CASE = thud.Case(ball=thud.Ball(youngs_modulus=2.08e6), model=COARSE)
 STUDY = """
+[case.model]
+name = "hollow_sphere"
+
 [target]
 file = "record.wav"
 {more}
@@ -37,6 +40,8 @@ file = "record.wav"
 [parameters]
 youngs_modulus = {{ start = 1.4, unit = "MPa" }}
 """
+
+SHELL = thud.Case(model=thud.HollowSphere())
 
 
 def pulse(impact: thud.Impact) -> np.ndarray:
@@ -129,7 +134,7 @@ def test_slow_noise_of_fast_records_has_weights(shell: thud.Impact) -> None:
     )
     record = thud.Recording.from_array(force, 96e3)
     target = ForceTarget(record, below=355.0)
-    found = thud.fit(target, ["youngs_modulus"])
+    found = thud.fit(target, ["youngs_modulus"], case=SHELL)
     modulus, error = found.values["youngs_modulus"], found.standard_errors["youngs_modulus"]
     assert abs(modulus - shell.case.ball.youngs_modulus) < 5 * error
 
@@ -159,8 +164,8 @@ def two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     write(
         tmp_path / "record.wav",
-        thud.solve(),
-        thud.solve(thud.Ball(youngs_modulus=1.8e6)),
+        thud.solve(model="hollow_sphere"),
+        thud.solve(thud.Ball(youngs_modulus=1.8e6), model="hollow_sphere"),
     )
     return tmp_path
 

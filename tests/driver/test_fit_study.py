@@ -24,6 +24,9 @@ STUDIES = REPOSITORY / "inputs/studies"
 # What make_targets.py has put into the targets.
 TRUTH = {"youngs_modulus": 1.75e6, "loss_factor": 0.18}
 STUDY = """
+[case.model]
+name = "hollow_sphere"
+
 [target]
 file = "record.csv"
 
@@ -36,7 +39,7 @@ FIT = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
 @pytest.fixture(autouse=True)
 def in_directory_with_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    impact = thud.solve(duration=0.03)
+    impact = thud.solve(duration=0.03, model="hollow_sphere")
     table = np.column_stack([impact.time + 0.2, impact.floor_force])
     np.savetxt("record.csv", table, delimiter=",")
     (tmp_path / "study.toml").write_text(STUDY)

@@ -20,6 +20,8 @@ from thud.studies.fitting.inference import misfit_ratio, posterior
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
 from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record
 
+SHELL = thud.Case(model=thud.HollowSphere())
+
 
 def miss(fit: thud.Fit) -> float:
     """Return the largest error over its standard error."""
@@ -67,7 +69,7 @@ def test_alternatives_differ_from_the_case_in_one_unknown() -> None:
     elastic = thud.Case(model=thud.FiniteElement(viscosity="none"))
     found = alternatives(elastic, UNKNOWNS, ())
     assert [entry.label for entry in found] == ["friction 1.0", "resistance 100000.0"]
-    assert not alternatives(thud.Case(), UNKNOWNS, ())
+    assert not alternatives(thud.Case(model=thud.HollowSphere()), UNKNOWNS, ())
 
 
 @pytest.mark.parametrize("name", ["order 0.7", "gravity"])
@@ -156,7 +158,9 @@ def test_alternative_that_cannot_be_computed_is_named(monkeypatch: pytest.Monkey
 @pytest.mark.parametrize("unknowns", ["friction", ["fricton"], 3])
 def test_unknowns_are_a_list_of_their_names(unknowns: object) -> None:
     with pytest.raises(thud.InputError, match=naming("unknowns")):
-        thud.fit(thud.solve(), ["youngs_modulus"], unknowns=unknowns)  # type: ignore[arg-type]
+        thud.fit(
+            thud.solve(model="hollow_sphere"), ["youngs_modulus"], unknowns=unknowns, case=SHELL
+        )  # type: ignore[arg-type]
 
 
 def test_records_share_their_unknowns() -> None:
@@ -182,7 +186,7 @@ def test_false_warnings_of_effects_are_rare() -> None:
 
 
 def test_files_state_unknowns(tmp_path: Path) -> None:
-    impact = thud.solve()
+    impact = thud.solve(model="hollow_sphere")
     table = np.column_stack([impact.time, impact.floor_force])
     np.savetxt(tmp_path / "record.csv", table, delimiter=",")
     text = "unknowns = {}\n[target]\nfile = 'record.csv'\n[parameters]\nyoungs_modulus = {{}}\n"
@@ -196,8 +200,8 @@ def test_files_state_unknowns(tmp_path: Path) -> None:
 
 def test_levels_that_do_not_fit_have_wider_intervals() -> None:
     """By the root of the reduced chi-square."""
-    levels = thud.solve().levels(force="floor") + 3 * np.array([1, -1, 1, -1, 1])
-    fit = quiet_fit(thud.LevelTarget(levels, 0.5, force="floor"), ["youngs_modulus"])
+    levels = thud.solve(SHELL).levels(force="floor") + 3 * np.array([1, -1, 1, -1, 1])
+    fit = quiet_fit(thud.LevelTarget(levels, 0.5, force="floor"), ["youngs_modulus"], SHELL)
     assert fit.warnings
     assert fit.widened == pytest.approx(np.sqrt(fit.reduced_chi_square))
     double = quiet_fit(thud.LevelTarget(levels, 100.0, force="floor"), ["youngs_modulus"])

@@ -91,7 +91,7 @@ def test_tangent_has_the_damping_of_a_damped_source(linear: thud.BallImpedance) 
     deflection = swing * np.sin(omega * time) / omega
     velocity = swing * (np.cos(omega * time) - decay / omega * np.sin(omega * time))
     source = replace(
-        thud.solve(), time=time, deflection=deflection, velocity=velocity, impact_velocity=1.0,
+        thud.solve(model="hollow_sphere"), time=time, deflection=deflection, velocity=velocity, impact_velocity=1.0,
         floor_force=stiffness * deflection + damping * velocity, sample_rate=rate,
     )  # fmt: skip
     # The acceleration is a central difference.
@@ -137,13 +137,13 @@ def test_limit_is_where_the_level_changes_by_1_db(shell: thud.Impact) -> None:
     limit = thud.ball_impedance(shell).limit()
     for band in (0, 2):
         floor = thud.InfinitePlate(resistance=float(limit[band]))
-        moved = thud.solve(floor=floor).on_floor
+        moved = thud.solve(floor=floor, model="hollow_sphere").on_floor
         assert moved is not None
         assert moved.difference()[band] == pytest.approx(-1.0, abs=0.02)
 
 
 def test_level_not_reached_is_nan_and_told() -> None:
-    found = thud.ball_impedance(thud.solve(), resistance=[1e5, 1e6])
+    found = thud.ball_impedance(thud.solve(model="hollow_sphere"), resistance=[1e5, 1e6])
     assert np.isnan(found.limit()).all()
     assert found.rows()[1][-1] == "100000 or less"
     with pytest.raises(thud.InputError, match=naming("decibels", 1e-06, 0.0027)):

@@ -35,13 +35,16 @@ WORK: dict[str, Callable[[], object]] = {
     "modes in contact": lambda: thud.solve(
         model="modal_ball", sample_rate=2e5, duration=1.0, substeps=400
     ),
-    "shell": lambda: thud.solve(sample_rate=4e6, substeps=1000, duration=0.025),
+    "shell": lambda: thud.solve(
+        sample_rate=4e6, substeps=1000, duration=0.025, model="hollow_sphere"
+    ),
     "batches": lambda: thud.solve_many(
         {"height": np.linspace(0.5, 1.5, 64)},
         threads=2,
         sample_rate=4e6,
         substeps=1000,
         duration=0.025,
+        model="hollow_sphere",
     ),
     "drops": lambda: thud.solve_many(
         {"height": np.linspace(0.5, 1.5, 40)},
@@ -89,13 +92,13 @@ def ended(process: subprocess.Popen[str], number: int) -> str:
 
 @pytest.mark.parametrize("work", WORK.values(), ids=WORK)
 def test_interrupt_ends_a_call_and_leaves_the_interpreter_whole(work: Callable[[], object]) -> None:
-    before = thud.solve().floor_force
+    before = thud.solve(model="hollow_sphere").floor_force
     interrupt(work)
-    assert np.array_equal(thud.solve().floor_force, before)
+    assert np.array_equal(thud.solve(model="hollow_sphere").floor_force, before)
 
 
 def test_numbers_after_an_interrupt_between_two_calls_are_right() -> None:
-    impact = thud.solve()
+    impact = thud.solve(model="hollow_sphere")
     before = low_pass(impact.floor_force, impact.sample_rate)
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
@@ -159,10 +162,12 @@ def test_ignored_interrupt_is_ignored() -> None:
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with sender(0.1):
-            found = thud.solve(sample_rate=1e6, substeps=40)
+            found = thud.solve(sample_rate=1e6, substeps=40, model="hollow_sphere")
     finally:
         signal.signal(signal.SIGINT, usual)
-    assert found.contact_time == pytest.approx(thud.solve().contact_time, rel=1e-6)
+    assert found.contact_time == pytest.approx(
+        thud.solve(model="hollow_sphere").contact_time, rel=1e-6
+    )
 
 
 def test_forked_process_does_not_wait_for_calls_of_its_parent() -> None:

@@ -98,7 +98,7 @@ def test_keys_of_one_name_are_told_apart_by_their_group() -> None:
     assert bare.peak_force[0] < 0.99 * named.peak_force[0]
     assert named.floor_work[0] > 1.1 * bare.floor_work[0]
     for name in ("plate.mass", "oscillator.volume", ".mass", "oscillator."):
-        with pytest.raises(thud.InputError, match=naming(name, "hollow_sphere", "oscillator")):
+        with pytest.raises(thud.InputError, match=naming(name, "modal_ball", "oscillator")):
             thud.solve_many({name: [1.0]}, case)
 
 

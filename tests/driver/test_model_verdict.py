@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from conftest import REPOSITORY, naming
-from scipy.stats import binomtest, spearmanr, truncnorm
+from scipy.stats import binomtest, spearmanr
 
 import thud
 from thud.base._schema import MODELS, STANDARD_BALL
@@ -19,95 +19,22 @@ from thud.base.tables import format_rows, wrap
 from thud.cli import main
 from thud.level.assessment import wilson_interval
 from thud.studies import calibrated_set
-from thud.studies.unknowns import Unknown
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-FRICTION = thud.Unknowns(("friction", "fractional_order"), (0.0, 0.2), (0.5, 1.0),
-                         reason=("it's dry", "not measured"))  # fmt: skip
-ELEMENTS = thud.Case(model=thud.FiniteElement(), unknowns=FRICTION)
 COARSE = thud.FiniteElement(radial_elements=2, polar_elements=16)
 LINEAR = thud.HuntCrossley(stiffness=61685.0, exponent=1.0, restitution=1.0)
-
-
-def linear(**unknowns: tuple[float, float]) -> thud.Case:
-    low, high = zip(*unknowns.values(), strict=True)
-    stated = thud.Unknowns(tuple(unknowns), low, high, reason=("an example",) * len(unknowns))
-    return thud.Case(model=LINEAR, unknowns=stated)
 
 
 def modulus(model: str, factor: float) -> float:
     return factor * STANDARD_BALL[model, "youngs_modulus"]
 
 
-# Unknowns of a case.
-
-
-def test_unknowns_survive_files(tmp_path: Path, executable: str) -> None:
-    case = replace(ELEMENTS, model=COARSE, unknowns=replace(FRICTION, standard_deviation=(0.1, 0)))
-    thud.write_case(case, tmp_path / "case.nml")
-    assert thud.read_case(tmp_path / "case.nml").unknowns == case.unknowns
-    subprocess.run([executable, "case.nml"], cwd=tmp_path, check=True, capture_output=True)
-    (echo,) = tmp_path.glob("outputs/*/effective.nml")
-    assert thud.read_case(echo).unknowns == case.unknowns
-
-
-@pytest.mark.parametrize(
-    ("changes", "named"),
-    [
-        ({"key": ("frction", "fractional_order")}, ("key", "frction", "friction")),
-        ({"key": ("friction", "friction")}, ("key", "friction", "twice")),
-        ({"key": ("sample_rate", "friction")}, ("key", "sample_rate")),
-        ({"low": (0.0,)}, ("low", "1", "2")),
-        ({"reason": ()}, ("reason", "0", "2")),
-        ({"key": ()}, ("key",)),
-        ({"standard_deviation": (0.1,)}, ("standard_deviation", "1", "2")),
-        ({"low": (-0.1, 0.2)}, ("low", "-0.1", "friction")),
-        ({"high": (0.5, 1.5)}, ("high", "1.5", "fractional_order")),
-        ({"low": (0.5, 0.2)}, ("low", "0.5", "friction")),
-        ({"low": (0.1, 0.2)}, ("low", "0.1", "friction", "outside")),
-    ],
-)
-def test_message_names_what_is_wrong_with_unknowns(
-    changes: dict[str, Any], named: tuple[str, ...]
-) -> None:
-    with pytest.raises(thud.InputError, match=naming("&unknowns", *named)):
-        thud.assess(replace(ELEMENTS, unknowns=replace(FRICTION, **changes)))
-
-
-@pytest.mark.parametrize("text", ["it is", "'a', b", "'a' 'b", "1, 2", f"'{'x' * 129}'"])
-def test_list_of_texts_needs_quotes(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "case.nml"
-    path.write_text(f"&unknowns key = {text} / &model name = 'finite_element' /")
-    with pytest.raises(thud.InputError, match=r"is not a list of up to 16|a quote is not closed"):
-        thud.read_case(path)
-
-
-def test_normal_distribution_is_truncated_and_a_wide_one_uniform() -> None:
-    fractions = np.linspace(0, 1, 11)
-    expected = truncnorm.ppf(fractions, (1.95 - 2.1) / 0.1, (2.3 - 2.1) / 0.1, 2.1, 0.1)
-    found = Unknown("youngs_modulus", 1.95, 2.3, 0.1, "").quantiles(fractions, 2.1)
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
-    for deviation in (2e3, 1e18):
-        values = Unknown("mass", 2.0, 3.0, deviation, "").quantiles(fractions, 2.5)
-        np.testing.assert_allclose(values, 2 + fractions, rtol=1e-6)
-
-
-def test_studies_and_fits_may_leave_the_ranges_of_unknowns() -> None:
-    unknowns = thud.Unknowns(key=("mass",), low=(2.4,), high=(2.6,), reason=("scales",))
-    case = thud.Case(unknowns=unknowns)
-    swept = thud.sweep({"case": case.to_namelist(), "parameters": {"mass": {"values": [1.0, 2.0]}}})
-    assert not swept.dataset["status"].any()
-
-
 @pytest.mark.parametrize("model", [thud.HollowSphere(), LINEAR, None])
 def test_nothing_is_known_to_vary_without_a_set(model: Any) -> None:  # noqa: ANN401
     with pytest.raises(thud.InputError, match=naming("&unknowns", "modal_ball", "finite_element")):
         thud.assess(thud.Case(model=model, modes=None if model else thud.Modes()))
-
-
-# Calibrated set.
 
 
 @pytest.mark.parametrize("model", ["modal_ball", "finite_element"])
@@ -186,7 +113,8 @@ def test_answer_is_the_same_in_every_process() -> None:
 
 def test_verdict_over_a_stiffness_is_that_of_a_closed_form() -> None:
     # A linear spring: the contact time is half a period, pi sqrt(mass / stiffness).
-    verdict = thud.assess(linear(stiffness=(5e4, 8e4)))
+    unknowns = thud.Unknowns(("stiffness",), (5e4,), (8e4,), reason=("an example",))
+    verdict = thud.assess(thud.Case(model=LINEAR, unknowns=unknowns))
     (contact,) = (c for c in verdict.criteria if c.name == "contact_time")
     ends = np.pi**2 * 2.5 / np.array([0.022, 0.018]) ** 2
     assert contact.interval
@@ -201,10 +129,13 @@ def test_verdict_over_a_stiffness_is_that_of_a_closed_form() -> None:
 
 def test_unknowns_replace_keys_of_the_set(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibrated_set, "SAMPLES", 64)
-    model = replace(COARSE, friction=0.3, viscosity="kelvin_voigt")
-    verdict = thud.assess(replace(ELEMENTS, model=model))
-    assert verdict.fixed == ()
-    assert set(verdict.unknowns) == calibrated_set.calibrated_set("finite_element").keys()
+    model = replace(COARSE, friction=0.3, viscosity="kelvin_voigt", loss_factor=0.2)
+    unknowns = thud.Unknowns(("friction", "fractional_order"), (0.2, 0.3), (0.4, 1.0),
+                             reason=("inclined plane", "not measured"))  # fmt: skip
+    verdict = thud.assess(thud.Case(model=model, unknowns=unknowns))
+    assert verdict.fixed == ("loss_factor",)
+    sets = calibrated_set.calibrated_set("finite_element")
+    assert set(verdict.unknowns) == sets.keys() - {"loss_factor"}
     assert verdict.counts
     assert verdict.counts[1] == 64
 

@@ -164,9 +164,9 @@ def test_loss_factors_follow_their_laws() -> None:
     rising, constant, fractional = (line.get_ydata() for line in axes.lines)
     assert rising[-1] / rising[0] == pytest.approx(100)
     np.testing.assert_allclose(constant, 0.2, rtol=3e-3)
-    # From 10 to 1000 Hz: p sin x**0.3/(1 + p cos (x**0.3 - 1)) with x = f/74 Hz and p = 0.2/sin.
-    power = np.array([10 / 74, 1000 / 74]) ** 0.3
-    expected = 0.2 * power / (1 + 0.2 / np.tan(0.15 * np.pi) * (power - 1))
+    # From 10 to 1000 Hz: p sin x**a/(1 + p cos (x**a - 1)) with x = f/74 Hz and p = 0.2/sin.
+    power = np.array([10 / 74, 1000 / 74]) ** 0.75
+    expected = 0.2 * power / (1 + 0.2 / np.tan(0.375 * np.pi) * (power - 1))
     np.testing.assert_allclose(fractional[[0, -1]], expected, rtol=0.02)
 
 

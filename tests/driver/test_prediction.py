@@ -521,47 +521,22 @@ def test_walls_take_their_power_from_the_losses_of_the_edges(shell: thud.Impact)
 
 def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile) -> None:
     """One rule for files, Python, tables of studies and samples."""
-    room: dict[str, Any] = {"floor": thud.Plate(), "room": thud.Room()}
-    impact = thud.solve(**room)
+    floor = thud.Plate()
+    impact = thud.solve(floor=floor, room=thud.Room())
     assert impact.assess()
     assert impact.on_floor is not None
     assert impact.on_floor.assess()
-    assert impact.case.model == thud.Case(**room).model == _schema.ROOM_SOURCE
-    found = thud.predict_level(**room)
+    found = thud.predict_level(floor=floor)
     assert not found.source_warnings
     assert impact.room_level is not None
     assert found.level == pytest.approx(impact.room_level.level, abs=1e-12)
     tables = {"floor": {"name": "plate"}, "room": {}}
-    assert tables_case(tables).model == _schema.ROOM_SOURCE
     assert thud.solve_many({}, tables_case(tables)).room_rating == pytest.approx(
         [found.rating.a_weighted], abs=1e-9
     )
-    for text in (
-        "&floor name = 'plate' /\n&room /\n",
-        "&model /\n&floor name = 'plate' /\n&room /\n",
-    ):
-        file = case_file(text)
-        assert thud.read_case(file).model == _schema.ROOM_SOURCE
-        assert thud.Case.from_text(text).model == _schema.ROOM_SOURCE
-    done = run(file, "-o", "out")
+    done = run(case_file("&floor name = 'plate' /\n&room /\n"), "-o", "out")
     assert found.rated_text in done.stdout
     assert "does not conform" not in done.stderr
-
-
-def test_named_and_stated_sources_of_a_room_are_kept(case_file: CaseFile) -> None:
-    room: dict[str, Any] = {"floor": thud.Plate(), "room": thud.Room()}
-    assert thud.Case(**room, model=thud.HollowSphere()).model == thud.HollowSphere()
-    assert replace(thud.Case(), **room).model == thud.HollowSphere()
-    assert thud.solve(**room, model="modal_ball").case.model == thud.ModalBall()
-    assert thud.Case(**room, model=None).model is None
-    # Options without a name are those of the modal ball.
-    expected = replace(_schema.ROOM_SOURCE, loss_factor=0.2)
-    assert thud.solve(**room, loss_factor=0.2).case.model == expected
-    text = "&modal_ball loss_factor = 0.2 /\n&floor name = 'plate' /\n&room /\n"
-    assert thud.read_case(case_file(text)).model == expected
-    assert thud.Case.from_text(text).model == expected
-    with pytest.raises(thud.InputError, match=naming("momentum_flux", "HollowSphere")):
-        thud.solve(**room, momentum_flux="none")
     with pytest.raises(thud.InputError, match=naming("floor is missing")):
         thud.predict_level()
 

@@ -52,7 +52,10 @@ def test_first_numeric_parameter_is_the_axis_and_texts_have_panels() -> None:
     assert [axes.get_title() for axes in figure.axes] == fluxes
     for axes, flux in zip(figure.axes, fluxes, strict=True):
         assert axes.get_xlabel() == "Height, cm"
-        drops = [thud.solve(drop=thud.Drop(height), momentum_flux=flux) for height in (0.5, 1.0)]
+        drops = [
+            thud.solve(drop=thud.Drop(height), momentum_flux=flux, model="hollow_sphere")
+            for height in (0.5, 1.0)
+        ]
         levels = [impact.levels() - NOMINAL for impact in drops]
         np.testing.assert_allclose(curves(axes), levels, atol=1e-6)
     assert "Panels: momentum flux" in words(figure)
@@ -78,7 +81,9 @@ def test_texts_alone_are_the_axis() -> None:
     fluxes = ["none", "retarding"]
     (axes,) = draw(parameters={"momentum_flux": {"values": fluxes}}).axes
     assert [text.get_text() for text in axes.get_xticklabels()] == fluxes
-    levels = [thud.solve(momentum_flux=flux).levels() - NOMINAL for flux in fluxes]
+    levels = [
+        thud.solve(momentum_flux=flux, model="hollow_sphere").levels() - NOMINAL for flux in fluxes
+    ]
     np.testing.assert_allclose(curves(axes), levels, atol=1e-6)
     assert axes.get_xlabel() == "Momentum flux"
 
@@ -90,13 +95,15 @@ def test_every_set_has_the_nominal_levels_of_its_source_and_its_assessed_force()
             fixed={"force": force}, parameters={"source": {"values": sources}, "height": HEIGHTS}
         )
         for axes, source in zip(figure.axes, sources, strict=True):
-            impact = thud.solve()
+            impact = thud.solve(model="hollow_sphere")
             limits = impact.assess(source).criteria[:5]
             nominal = [(limit.lower + limit.upper) / 2 for limit in limits]
             np.testing.assert_allclose(curves(axes)[1], impact.levels(force=force) - nominal)
     figure = draw(parameters={"force": {"values": forces}, "height": HEIGHTS})
     for axes, force in zip(figure.axes, forces, strict=True):
-        np.testing.assert_allclose(curves(axes)[1], thud.solve().levels(force=force) - NOMINAL)
+        np.testing.assert_allclose(
+            curves(axes)[1], thud.solve(model="hollow_sphere").levels(force=force) - NOMINAL
+        )
 
 
 @pytest.mark.parametrize(

@@ -211,7 +211,7 @@ def _sampling(case: thud.Case, chance: random.Random) -> thud.Sampling:
 
 
 def _rough_contact_time(case: thud.Case) -> float:
-    ball, model = case.ball, case.model
+    ball, model = case.resolved().ball, case.model
     if isinstance(model, thud.MeasuredModes):
         return 0.5 / min(model.frequency)
     if isinstance(model, thud.HuntCrossley):

@@ -80,7 +80,8 @@ def _energy(levels: np.ndarray) -> float:
 def _outside(impact: thud.Impact) -> dict[str, bool]:
     """Return which warnings an answer must have."""
     case = impact.case
-    ball, rate, radius = case.ball, case.sampling.sample_rate, case.ball.outer_radius
+    ball = case.resolved().ball
+    rate, radius = case.sampling.sample_rate, ball.outer_radius
     wall = case.model is not None and case.model.name in (
         "hollow_sphere",
         "modal_ball",

@@ -114,3 +114,7 @@ def test_a_newcomer_gets_figure_3_and_a_verdict(tmp_path: Path) -> None:
     recordings = sorted(map(str, (tmp_path / "inputs/recordings").glob("drop_*.wav")))
     told = driver("measure", *recordings, "--config", "inputs/recordings/lab.toml")
     assert "does not conform" in told
+
+
+def test_wheel_holds_the_calibrated_sets() -> None:
+    assert thud.assess(thud.Case()).counts == (32, 32)

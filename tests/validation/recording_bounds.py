@@ -41,14 +41,14 @@ from synthetic import HARMONICS, coloured_noise, noise_density
 NOISES = (60, 50, 40, 30, 20)
 COLOURS = ("white", "pink", "brown")
 RATES = (8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3)
-# Shapes of pulses: file of the model, and how often they are drawn. Both finite elements are the
-# standard ball, with the damping law of Kelvin and Voigt and with the fractional one.
+# Shapes of pulses: file of the model, and how often they are drawn. Both finite elements have
+# 2.08 MPa, with the damping law of Kelvin and Voigt and with a fractional one.
 SHAPES = {
     "half sine": ("", 0.4),
-    "shell": ("100cm", 0.18),
-    "modal": ("modal", 0.14),
-    "viscous elements": ("fe_viscous", 0.14),
-    "fractional elements": ("fe", 0.14),
+    "shell": ("rubber_ball_100cm", 0.18),
+    "modal": ("rubber_ball_modal", 0.14),
+    "viscous elements": ("rubber_ball_fe_viscous", 0.14),
+    "fractional elements": ("recordings/ball", 0.14),
 }
 FINE = 192_000.0
 HEIGHT, MASS, GRAVITY = 1.0, 2.5, 9.81
@@ -66,7 +66,7 @@ def pulse(shape: str) -> tuple[np.ndarray, float]:
     if not file:
         time = np.arange(int(0.02 * FINE) + 1) / FINE
         return 1500 * np.sin(np.pi * time / 0.02), 0.02
-    case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"rubber_ball_{file}.nml")
+    case = thud.read_case(Path(__file__).parents[2] / f"inputs/{file}.nml")
     impact = thud.solve(replace(case, sampling=thud.Sampling(FINE, 0.05)))
     last = int(np.ceil(impact.exact_contact_time * FINE)) + 1
     return impact.floor_force[:last], impact.exact_contact_time

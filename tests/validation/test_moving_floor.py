@@ -25,7 +25,11 @@ def test_small_drops_on_light_floors_are_those_of_the_modal_ball(
 ) -> None:
     floor = thud.InfinitePlate(resistance=resistance)
     elements = thud.FiniteElement(
-        snapshot_interval=0, radial_elements=6, polar_elements=48, loss_factor=0.143
+        snapshot_interval=0,
+        radial_elements=6,
+        polar_elements=48,
+        loss_factor=0.143,
+        fractional_order=0.3,
     )
     modes = thud.ModalBall(damping_law="fractional", loss_factor=0.143)
     found, expected = (

@@ -21,7 +21,9 @@ EIGHTHS = np.arange(1, 9) / 8
 
 @pytest.mark.parametrize("gas", ["vented", "isothermal", "adiabatic"])
 def test_shell_is_a_spring_and_a_gas_between_two_caps(gas: CompressionGas) -> None:
-    ball = thud.Ball(gauge_pressure=0.0 if gas == "vented" else 2e4)
+    ball = thud.Ball(
+        gauge_pressure=0.0 if gas == "vented" else 2e4, youngs_modulus=1.6e6, poisson_ratio=0.5
+    )
     curve = thud.compress(ball, "hollow_sphere", max_deflection=0.06, points=2001, gas=gas)
     radius, depth = ball.outer_radius, curve.deflection / 2
     stiffness = 8 * ball.youngs_modulus * ball.wall_thickness**2
@@ -48,7 +50,9 @@ def test_thin_spheres_tend_to_reissner() -> None:
     found = []
     for ratio in (0.1, 0.05, 0.025):
         wall = ratio * thud.Ball.outer_radius
-        ball = thud.Ball(wall_thickness=wall, mass=2.5 * ratio, poisson_ratio=0.3)
+        ball = thud.Ball(
+            wall_thickness=wall, mass=2.5 * ratio, poisson_ratio=0.3, youngs_modulus=1.6e6
+        )
         stiffness = 8 * ball.youngs_modulus * wall**2
         stiffness /= ball.outer_radius * np.sqrt(12 * (1 - 0.3**2))
         fine = thud.ModalBall(rings=133)
@@ -80,7 +84,7 @@ def test_small_compression_of_a_solid_sphere_is_hertz_s(
 ) -> None:
     # A cavity of 4 mm. The sphere departs from Hertz in proportion to the contact radius over its
     # own (0.05 to 0.15 here), so the ratio is extrapolated to none.
-    ball = thud.Ball(wall_thickness=0.085, poisson_ratio=0.3)
+    ball = thud.Ball(wall_thickness=0.085, poisson_ratio=0.3, youngs_modulus=1.6e6)
     modulus = 4 / 3 * ball.youngs_modulus / (1 - 0.3**2)
     curve = thud.compress(ball, model, max_deflection=4e-3, points=21)
     depth = curve.deflection[3:] / 2
@@ -94,7 +98,7 @@ def test_linear_modes_and_elements_agree_at_small_deflections(
     oracle: Callable[..., None],
 ) -> None:
     # Large strain takes 0.5 % off the force for each millimetre, in proportion: extrapolated.
-    ball = thud.Ball(poisson_ratio=0.49)
+    ball = thud.Ball(poisson_ratio=0.49, youngs_modulus=1.6e6)
     elements = thud.FiniteElement(polar_elements=192, viscosity="none")
     linear, large = (
         thud.compress(ball, model, max_deflection=8e-3, points=9, gas="adiabatic")
@@ -112,7 +116,7 @@ def test_large_compression_is_that_of_calculix(oracle: Callable[..., None]) -> N
     # 1.8, 1.6, 1.3, 1.0, 0.7, 0.4, 0.2 and 0.05 %: at 5 mm it is still too soft.
     reference = np.array([61.88, 153.00, 256.13, 366.98, 483.67, 604.62, 729.53, 856.59])
     elastic = thud.FiniteElement(viscosity="none")
-    curve = thud.compress(thud.Ball(poisson_ratio=0.49), elastic, points=9)
+    curve = thud.compress(thud.Ball(poisson_ratio=0.49, youngs_modulus=1.6e6), elastic, points=9)
     np.testing.assert_allclose(curve.deflection[1:], 0.04 * EIGHTHS, rtol=1e-12)
     oracle(
         "pressed ball at large strain by CalculiX: force",
@@ -138,7 +142,7 @@ def test_fractional_law_is_pressed_at_its_modulus_of_1_hz(
     # Its series ends at 5 Hz; docs/compression.md says 2 %.
     options: dict[str, Any] = {law: "fractional", "fractional_order": order}
     slow = replace(elastic, loss_factor=0.2, loss_frequency=74.0, **options)
-    ball = thud.Ball(poisson_ratio=0.49)
+    ball = thud.Ball(poisson_ratio=0.49, youngs_modulus=1.6e6)
     forces = [
         thud.compress(ball, model, max_deflection=1e-3, points=2).force[1]
         for model in (slow, elastic)

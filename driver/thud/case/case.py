@@ -80,7 +80,7 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
-    model = model or next(iter(MODELS))
+    model = next(iter(MODELS)) if model is None else model
     require_choice("&model: name", model, MODELS)
     require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
     return MODELS[model](**options)  # type: ignore[arg-type]

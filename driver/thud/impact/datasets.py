@@ -155,7 +155,7 @@ def case_attributes(case: Case) -> dict[str, str]:
         "model": case.model.name if case.model else "",
         "assessed_force": case.levels.force,
         "limits": case.limits.source,
-        "case": f"{case.to_namelist()}",
+        "case": f"{case.resolved().to_namelist()}",
         "thud_version": version(),
         "compiler": compiler(),
         "python_version": platform.python_version(),

@@ -210,7 +210,7 @@ class Criterion(Outcome):
         """Return value, limits and result."""
         name, value, _, limits, result = self._row()
         if self.range:
-            value, result = f"{self._shown_range() or value}", self.conforms
+            value, result = self._shown_range() or value, self.conforms
         return f"<Criterion, {name}: {f'{value} {result}'.strip()}, allowed {limits}>"
 
     def rows(self) -> list[tuple[str, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from functools import cache
+from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
@@ -52,7 +52,7 @@ _CALIBRATION = "that the standard ball conforms is put in by the calibration, no
 _ROUNDING = 1e-9
 
 
-@cache
+@lru_cache(maxsize=4)
 def calibrated_set(model: str) -> Mapping[str, Values]:
     """Return equally likely parameters of the standard ball by key; empty: a model without them."""
     lines = (resources.files("thud.studies") / FILE).read_text("utf-8").splitlines()

@@ -110,7 +110,7 @@ def sweep(
     --------
     >>> result = sweep({"parameters": {"height": {"values": [50, 100], "unit": "cm"}}})
     >>> result.dataset["contact_time"].round(4).values.tolist()
-    [0.0211, 0.0204]
+    [0.0203, 0.0196]
     """
     return KIND.run(study, output, **options)
 

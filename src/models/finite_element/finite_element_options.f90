@@ -50,9 +50,9 @@ module thud_finite_element_options
    real(wp), parameter :: slip_friction(2) = [0.33_wp, 0.95_wp]
 
    !> Largest changes by it from the default elements to finer ones among eight balls, dB, at the octaves that the velocity
-   !> of shear waves per radius makes those of the standard ball; the change is taken as proportional to the element size.
+   !> of shear waves per radius makes those of `slip_ball`; the change is taken as proportional to the element size.
    real(wp), parameter :: slip_error(octave_count) = [0.05_wp, 0.2_wp, 0.4_wp, 2.0_wp, 2.0_wp]
-   type(ball_type), parameter :: standard_ball = ball_type(youngs_modulus=2.08e6_wp)
+   type(ball_type), parameter :: slip_ball = ball_type(youngs_modulus=2.08e6_wp)
 
    !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
    real(wp), parameter :: thin_wall = 0.25_wp, high_friction = 0.3_wp
@@ -262,9 +262,9 @@ contains
       if (.not. slips .or. is_viscous(options%material)) return
       automatic = get_element_counts(ball, mesh_options_type())
       mesh = get_element_counts(ball, options%mesh)
-      scale = get_shear_rate(ball)/get_shear_rate(standard_ball)
+      scale = get_shear_rate(ball)/get_shear_rate(slip_ball)
       do i = 1, octave_count
-         ! The octave of the standard ball that corresponds to this one; octaves are 10**0.3 apart.
+         ! The octave of `slip_ball` that corresponds to this one; octaves are 10**0.3 apart.
          octave = min(real(octave_count, wp), max(1.0_wp, i - log10(scale)/0.3_wp))
          below = min(int(octave), octave_count - 1)
          error(i) = slip_error(below) + (octave - below)*(slip_error(below + 1) - slip_error(below))

@@ -50,6 +50,7 @@ def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
 
     Entries of lists are counted from 1, as in a namelist: ``"frequency(1)"``.
     """
+    case = case.resolved()
     model = case.model
     if model is None:
         refuse("&model is missing", "a case with a source model")
