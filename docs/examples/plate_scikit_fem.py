@@ -122,7 +122,7 @@ def read_force(path: str | None) -> tuple[np.ndarray, float]:
     if path is None:
         import thud
 
-        impact = thud.solve(thud.Ball(youngs_modulus=2.08e6), model="finite_element")
+        impact = thud.solve(model="finite_element")
         return impact.floor_force, 1 / impact.sample_rate
     # The first row that is no comment holds the titles.
     time, force = np.genfromtxt(path, delimiter=",", comments="#")[1:].T

@@ -125,9 +125,8 @@ def modal_ball() -> Figure:
 def finite_elements() -> Figure:
     """Draw the mesh of the standard ball at rest and at its largest deflection, and what acts."""
     impact = thud.solve(
-        thud.Ball.standard(), model="finite_element", radial_elements=4, polar_elements=32,
-        snapshot_interval=1e-3,
-    )  # fmt: skip
+        model="finite_element", radial_elements=4, polar_elements=32, snapshot_interval=1e-3
+    )
     motion = impact.motion
     i = int(np.argmin(abs(motion.time - impact.time[np.argmax(impact.deflection)])))
     # Half sections in units of the radius.

@@ -147,7 +147,7 @@ def test_figures_of_the_paper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         *("figure2_force_history", "figure3_levels", "figure4_free_modes", "figure5_motion"),
         *("finite_element_force", "finite_element_levels"),
         *("floor_chipboard", "floor_mobilities", "floor_motion", "loss_factor"),
-        *("modal_families", "momentum_flux", "tyre_levels"),
+        *("modal_families", "momentum_flux", "standard_ball", "tyre_levels"),
     )
     drawn = names_in(tmp_path / "drawn")
     assert drawn == sorted([*(f"{name}.svg" for name in names), "thud.txt"])

@@ -4,13 +4,16 @@ program drop
       get_octaves, modal_ball_type, sampling_type, solve_drop, wp
    implicit none
    type(modal_ball_type) :: model
+   type(ball_type) :: ball
    type(force_history_type) :: history
    type(error_type), allocatable :: error
    type(band_type), allocatable :: bands(:)
    real(wp), allocatable :: level(:)
    integer :: i
 
-   call solve_drop(model, ball_type(), drop_type(height=1.0_wp), sampling_type(), history, error)
+   ! The modulus of the standard ball depends on the model.
+   ball = ball_type(youngs_modulus=model%get_standard_modulus())
+   call solve_drop(model, ball, drop_type(height=1.0_wp), sampling_type(), history, error)
    if (allocated(error)) error stop error%message
    bands = get_octaves()
    allocate (level(size(bands)))

@@ -46,29 +46,30 @@ if TYPE_CHECKING:
 
 
 @lru_cache(maxsize=4)
-def _solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact:
-    """Return the impact of the ball with the published modes, by finite elements."""
-    return solve(
-        Ball.standard(), model="finite_element", viscosity=viscosity, snapshot_interval=1e-3
-    )
+def _solve_elements(viscosity: FiniteElementViscosity = "fractional") -> Impact:
+    """Return the impact of the standard ball by finite elements."""
+    return solve(model="finite_element", viscosity=viscosity, snapshot_interval=1e-3)
 
 
 @cache
 def _solve_chipboard() -> FloorImpact:
     """Return the impact of this ball on 22 mm of chipboard far from joists, 1600 N s/m."""
     model = FiniteElement(snapshot_interval=1e-3)
-    impact = solve(Ball.standard(), model=model, floor=InfinitePlate(resistance=1600.0)).on_floor
+    impact = solve(model=model, floor=InfinitePlate(resistance=1600.0)).on_floor
     assert impact is not None  # noqa: S101 - the floor is mobile
     return impact
 
 
 def _draw_heights() -> Figure:
-    impacts = {f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)}
+    impacts = {
+        f"{height:.2f} m": solve(drop=Drop(height), model="hollow_sphere")
+        for height in (0.1, 1, 1.6)
+    }
     return force_history(impacts, "elastic")
 
 
 def _draw_viscosity() -> Figure:
-    return force_history({"viscous": _solve_published(), "elastic": _solve_published("none")})
+    return force_history({"viscous": _solve_elements(), "elastic": _solve_elements("none")})
 
 
 def _draw_shell() -> Figure:
@@ -122,7 +123,7 @@ def _draw_families() -> Figure:
         name: solve(model="modal_ball", static_families=families)
         for name, families in static.items()
     }
-    return level_changes(solve(model="modal_ball"), impacts)
+    return level_changes(solve(), impacts)
 
 
 def _draw_laws() -> Figure:
@@ -178,9 +179,9 @@ def _draw_floors() -> Figure:
 def _draw_impedances() -> Figure:
     resistance = [560.0, 1e3, 2e3, 5e3, 1e5]
     sources = {
-        "ball, shell": ball_impedance(solve(), resistance),
-        "ball, modes": ball_impedance(solve(model="modal_ball"), resistance),
-        "ball, elements": ball_impedance(_solve_published(), resistance[1:]),
+        "ball, shell": ball_impedance(solve(model="hollow_sphere"), resistance),
+        "ball, modes": ball_impedance(solve(), resistance),
+        "ball, elements": ball_impedance(_solve_elements(), resistance[1:]),
     }
     floors: dict[str, FloorOptions] = {
         "chipboard on joists": JoistFloor(),
@@ -220,8 +221,8 @@ def _draw_standard_ball() -> Figure:
 FIGURES = {
     "figure2_force_history": _draw_heights,
     "figure3_levels": _draw_shell,
-    "figure4_free_modes": lambda: mode_shapes(free_modes(Ball.standard())),
-    "figure5_motion": lambda: motion(_solve_published()),
+    "figure4_free_modes": lambda: mode_shapes(free_modes()),
+    "figure5_motion": lambda: motion(_solve_elements()),
     "ball_impedance": _draw_impedances,
     "compression": _draw_compressions,
     "finite_element_force": _draw_viscosity,
