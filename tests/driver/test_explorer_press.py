@@ -11,13 +11,12 @@ from starlette.testclient import TestClient
 
 import thud
 from thud.explorer import server
-from thud.explorer.models import standard_ball
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 TRUE_RATIO = 1.1
-BALL = standard_ball()
+BALL = thud.Case().resolved()
 
 VALUES: dict[str, Any] = {"model": {"name": "modal_ball"}}
 

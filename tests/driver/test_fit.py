@@ -161,7 +161,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, cou
     confidence = 0.9
     truth = {"youngs_modulus": 1.8e6, "height": 1.1, "time_shift": 220 / RATE - 0.1}
     case = thud.Case(sampling=thud.Sampling(duration=0.026), model=thud.HollowSphere())
-    impact = thud.solve(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
+    impact = thud.solve(replace(case, ball=TRUTH.ball, drop=thud.Drop(1.1)))
     impact = replace(impact, floor_force=np.append(impact.floor_force, np.zeros(2000)))
     starts = {"youngs_modulus": 1.8e6, "height": 1.1}
     covered = dict.fromkeys(truth, 0)

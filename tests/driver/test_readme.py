@@ -35,7 +35,7 @@ def test_first_result_is_that_of_the_commands() -> None:
     assert cases is not None
     paths = [str(REPOSITORY / path) for path in cases[1].split()]
     page = thud.compare(read_all(paths))
-    expected = wrap("\n".join([format_rows(page.rows()), *page.reasons]))
+    expected = wrap(format_rows(page.rows()))
     shown = shown_after("assessed force")
     assert without_times(shown) == [
         *without_times(expected), "Page: outputs/comparison/comparison.html"
