@@ -16,7 +16,7 @@ module thud_run
       result_directory_type, write_file
    use thud_room_report, only: get_room_files, get_room_summary, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
-   use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
+   use thud_table, only: get_compression_table, get_defaults_lines, get_modes_table, get_table
    use thud_text, only: fixed, lower_case, newline
    implicit none (type, external)
    private
@@ -176,7 +176,7 @@ contains
       end if
       ! A case without an impact has free modes alone: neither floor nor room nor compression.
       if (.not. case%has_impact) then
-         outcome%table = outcome%table//get_defaults_line(case)
+         outcome%table = outcome%table//get_defaults_lines(case)
          return
       end if
       outcome%conforms = is_conforming(case, results%impact%assessment)
@@ -205,7 +205,7 @@ contains
          call extend(files, size(room_file_names))
          call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))
       end if
-      outcome%table = outcome%table//get_defaults_line(case)
+      outcome%table = outcome%table//get_defaults_lines(case)
       if (case%has_compression) then
          call add_file(files, 'compression.csv', get_history_csv('deflection_m,force_N', &
             results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))

@@ -17,7 +17,7 @@ module thud_samples_run
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
    use thud_sweep, only: new_sweep, solve_sweep, sweep_type
    use thud_system, only: path_length
-   use thud_table, only: get_defaults_line, get_force_title, get_span_row
+   use thud_table, only: get_defaults_lines, get_force_title, get_span_row
    use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
@@ -84,7 +84,7 @@ contains
          //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure))
       outcome%conforms = tally%conforming == tally%samples
       call format_tally(case, table, tally, outcome%table)
-      outcome%table = outcome%table//get_defaults_line(case)
+      outcome%table = outcome%table//get_defaults_lines(case)
    end subroutine run_samples
 
    !> Computes and writes all samples, in chunks.

@@ -142,8 +142,12 @@ def test_run_names_the_groups_that_are_left_out(
     case_file: CaseFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["run", "--no-figures", str(case_file("&drop height = 0.5 /"))]) == 0
-    assert "&ball &model" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "&ball &model" in out
+    assert "standard ball: youngs_modulus = 1560000.0 Pa" in out
     assert cli.main(["run", "--no-figures", "-o", "m", str(case_file("&modes count = 1 /"))]) == 0
     assert re.search(r"defaults.*&ball(?! &model)", capsys.readouterr().out, re.IGNORECASE)
     assert cli.main(["run", "--no-figures", "-o", "again", "outputs/case/effective.nml"]) == 0
-    assert "default" not in capsys.readouterr().out.lower()
+    out = capsys.readouterr().out
+    assert "default" not in out.lower()
+    assert "standard ball:" not in out

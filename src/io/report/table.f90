@@ -1,10 +1,11 @@
 !> Results as tables on the screen.
 module thud_table
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, get_model_number
+   use thud_case, only: case_type, get_active_fields, get_model_number, is_stated
    use thud_compression, only: compression_type
    use thud_compute, only: assessment_type, get_assessed_force
    use thud_error, only: error_type
+   use thud_field, only: field_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
@@ -19,7 +20,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_compression_table, get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
+   public :: get_compression_table, get_defaults_lines, get_force_title, get_modes_table, get_span_row, get_table
    public :: get_verification_rows, is_peak_of_other, with_prefix
 
    !> Numerical error of a level above which it is shown, dB.
@@ -123,15 +124,29 @@ contains
       yes = quantity%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
    end function is_peak_of_other
 
-   !> Line that names the main groups missing from the file.
-   function get_defaults_line(case) result(line)
-      type(case_type), intent(in) :: case
-      !> The line; empty if none is missing.
-      character(len=:), allocatable :: line
+   !> Lines that name the main groups missing from the file, and the values of the standard ball for keys that it does not
+   !> state.
+   function get_defaults_lines(case) result(lines)
+      type(case_type), intent(in), target :: case
+      !> The lines; empty if nothing is missing.
+      character(len=:), allocatable :: lines
+      character(len=:), allocatable :: value
+      type(field_type), allocatable :: fields(:)
+      integer :: i
 
-      line = ''
-      if (case%left_out /= '') line = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
-   end function get_defaults_line
+      lines = ''
+      if (case%left_out /= '') lines = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
+      allocate (fields, source=get_active_fields(case))
+      fields = pack(fields, .not. is_stated(case, fields))
+      ! Without a wall the modulus has no effect.
+      if (.not. case%models(get_model_number(case))%model%get_standard_modulus() > 0.0_wp) fields = fields(:0)
+      if (size(fields) > 0) lines = lines//'  Not stated, so of the standard ball:'
+      do i = 1, size(fields)
+         call fields(i)%get_text(value)
+         lines = lines//' '//trim(fields(i)%key)//' = '//trim(value//' '//fields(i)%unit) &
+            //merge(newline, ',', i == size(fields))
+      end do
+   end function get_defaults_lines
 
    !> Name of a force in tables for readers.
    pure function get_force_title(force) result(title)
