@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 import thud
 from thud.level.assessment import octave_limits
+from thud.studies import calibrated_set
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -28,14 +29,14 @@ if TYPE_CHECKING:
 
     Sets = dict[str, NDArray[np.float64]]
 
-FILE = Path(__file__).parent / "thud/studies/standard_ball.csv"
+FILE = Path(__file__).parent / "thud/studies" / calibrated_set.FILE
 COLUMNS = ("youngs_modulus", "poisson_ratio", "loss_factor", "fractional_order", "friction")
 MODELS: dict[str, Any] = {
     "finite_element": thud.FiniteElement(viscosity="fractional", loss_frequency=74.0),
     "modal_ball": thud.ModalBall(damping_law="rising", loss_frequency=74.0),
 }
 # Resolution of fits and sets; a single drop refines its mesh by its numerical error.
-MESH = {"finite_element": {"radial_elements": 6, "polar_elements": 48}, "modal_ball": {}}
+MESH = {"finite_element": calibrated_set.MESH, "modal_ball": {}}
 LOWER, UPPER = octave_limits("rubber_ball")
 NOMINAL, TOLERANCE = (UPPER + LOWER) / 2, (UPPER - LOWER) / 2
 # Value and tolerance: the paper's measured contact time, s; restitution of the standards; modulus

@@ -33,8 +33,7 @@ contains
       call bundle%add_text('compiler', trim(get_compiler()))
    end subroutine describe_library
 
-   !> The input of the namelist file `path`, which may have a room without a floor: every key but calibrated ones that it
-   !> does not state.
+   !> The full input of the namelist file `path`, which may have a room without a floor.
    subroutine answer_effective_case(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
@@ -46,7 +45,7 @@ contains
       call request%get_text('path', path)
       call load_case(path, case, error, room_alone=.true.)
       if (allocated(error)) return
-      call get_case_text(case, text, stated_only=.true.)
+      call get_case_text(case, text)
       call bundle%add_text('case', text)
    end subroutine answer_effective_case
 
@@ -77,7 +76,7 @@ contains
       !$omp end critical (thud_run)
       call end_progress()
       if (allocated(error)) return
-      call get_case_text(case, text, stated_only=.true.)
+      call get_case_text(case, text)
       call bundle%add_text('case', text)
       call bundle%add_text('table', outcome%table)
       do i = 1, outcome%n_message

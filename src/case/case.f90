@@ -81,6 +81,7 @@ contains
       call new_models(case%models)
       call new_floors(case%floors)
       allocate (case%unstated(0))
+      call set_standard_modulus(case)
    end subroutine new_case
 
    !> Gives a ball whose modulus is not stated that of the standard ball by the model, or by finite elements for free modes
@@ -88,16 +89,15 @@ contains
    subroutine set_standard_modulus(case)
       type(case_type), intent(inout) :: case
       character(len=name_length) :: model
-      integer :: i
+      integer :: number
 
       model = case%model
       if (.not. case%has_impact) model = 'finite_element'
-      do i = 1, size(model_names)
-         if (model_names(i) /= model) cycle
-         associate (modulus => case%models(i)%model%get_standard_modulus())
-            if (modulus > 0.0_wp) case%ball%youngs_modulus = modulus
-         end associate
-      end do
+      number = findloc(model_names == model, .true., dim=1)
+      if (number == 0) return
+      associate (modulus => case%models(number)%model%get_standard_modulus())
+         if (modulus > 0.0_wp) case%ball%youngs_modulus = modulus
+      end associate
    end subroutine set_standard_modulus
 
    !> Group and key, as in `unstated`.

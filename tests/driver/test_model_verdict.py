@@ -52,6 +52,7 @@ def test_sets_are_those_of_the_standard_ball(model: str) -> None:
         ({"friction": 0.2}, ("friction",)),
         ({"viscosity": "kelvin_voigt"}, ("fractional_order",)),
         ({"viscosity": "none"}, ("loss_factor", "fractional_order")),
+        ({"viscosity": "constant_loss"}, ("loss_factor", "fractional_order")),
         ({"loss_frequency": 100.0, "poisson_ratio": 0.49}, ("poisson_ratio", "loss_factor")),
         ({"youngs_modulus": 2.2e6, "loss_factor": 0.2, "fractional_order": 0.5},
          ("loss_factor", "fractional_order")),
@@ -97,6 +98,14 @@ def test_drops_are_those_of_the_sets(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(calibrated_set, "solve_many", fail)
     with pytest.raises(thud.InputError, match=naming(6, 33, "it bursts")):
         thud.assess(thud.Case())
+
+
+def test_results_that_are_read_back_have_the_same_verdict(tmp_path: Path) -> None:
+    (tmp_path / "soft.nml").write_text("&ball youngs_modulus = 1.5e6 /")
+    out = tmp_path / "out"
+    assert main(["run", "-q", "--no-figures", str(tmp_path / "soft.nml"), "-o", str(out)]) == 0
+    case = thud.Case(ball=thud.Ball(youngs_modulus=1.5e6))
+    assert thud.assess(thud.read_results(out)).rows() == thud.assess(case).rows()
 
 
 def test_answer_is_the_same_in_every_process() -> None:

@@ -53,8 +53,6 @@ GroupType = TypeVar("GroupType", bound=Group)
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # Names of the keys that take lists of numbers or texts.
 LISTS = {key.name for key in KEYS if key.kind in {"list", "texts"}}
-# Names of the keys that are those of the standard ball where they are None.
-CALIBRATED = {key for _, key in STANDARD_BALL}
 # Optional groups of an impact, and all optional groups of a case.
 IMPACT_GROUPS: dict[str, type[Group]] = {
     "compression": Compression,
@@ -183,11 +181,13 @@ class Case(Group, Displayed):
             group: vars(options) for group in IMPACT_GROUPS if (options := getattr(self, group))
         }
         namelist = f90nml.Namelist()
+        model = self.model.name if self.model else ""
         for group, options in groups.items():
+            is_source = group not in {*FLOORS, "room"}
             plain = {
                 key: _plain(group, key, value)
                 for key, value in options.items()
-                if value is not None or key not in CALIBRATED
+                if value is not None or not is_source or (model, key) not in STANDARD_BALL
             }
             namelist[group] = {key: value for key, value in plain.items() if value != []}
         result: Namelist = namelist

@@ -97,10 +97,7 @@ def largest_contribution(verdict: Verdict) -> tuple[str, str] | None:
 
 def model_headline(verdict: Verdict) -> dict[str, str]:
     """Return the headline of the verdict on a source by the values of its model."""
-    detail = (
-        "Values of this model only, from which others may differ; thud-driver assess counts what "
-        f"is not known of the source. {_standard(verdict)}"
-    )
+    detail = f"Values of this model only, from which others may differ. {_standard(verdict)}"
     return _headline(verdict, f"{verdict.conforms} by this model", detail)
 
 

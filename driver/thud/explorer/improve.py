@@ -105,8 +105,6 @@ def improve(values: Values) -> Work:
         if change:
             changes.append(change)
     changes.sort(key=lambda change: abs(math.log(change["factor"])))
-    for change in changes:
-        change["text"] += ": conforms by these values"
     if changes:
         return {"changes": changes, "none": "", "note": NOTE}
     labels = ", ".join(lower(_field(case, name)["label"]) for name in names)

@@ -45,8 +45,6 @@ def in_words(message: str) -> str:
     ...          "allowed: 0 < wall_thickness < outer_radius = 0.089 m")
     'Wall thickness = 200 mm is not allowed; allowed: more than 0 mm and less than outer radius, \
 89 mm'
-    >>> in_words("&ball: youngs_modulus = 2.08 MPa is the modulus of another model")
-    "Young's modulus = 2.08 MPa is the modulus of another model"
     """
     match = _KEY.match(message)
     first = fields_by_key().get((match[1], match[2])) if match else None

@@ -69,7 +69,7 @@ class CompressionCurve(Displayed):
 @check_arguments
 def compress(
     ball: Ball | None = None,
-    model: ModelName | ModelOptions = "hollow_sphere",
+    model: ModelName | ModelOptions = "finite_element",
     *,
     max_deflection: float = Compression.max_deflection,
     points: int = Compression.points,
@@ -85,7 +85,7 @@ def compress(
     Parameters
     ----------
     ball
-        Ball, by default the rubber ball of the paper.
+        Ball, by default the standard ball.
     model
         Name or options of the source model; ``"measured_modes"`` has no compression.
     max_deflection

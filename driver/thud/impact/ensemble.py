@@ -81,7 +81,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         the name of a key of floor or room is not unique, its group precedes it, as in
         ``"plate.loss_factor"``.
     case
-        Values of all other keys; by default the ball and the drop of the paper.
+        Values of all other keys; by default the standard ball from 1 m.
     model
         Source model in place of the model of the case, with its default options.
     threads

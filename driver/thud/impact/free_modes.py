@@ -100,7 +100,7 @@ def free_modes(
     Parameters
     ----------
     ball
-        Ball, by default the rubber ball of the paper. Poisson's ratio may be 1/2.
+        Ball, by default the standard ball. Poisson's ratio may be 1/2.
     count
         Number of elastic modes.
 

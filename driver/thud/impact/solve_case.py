@@ -35,12 +35,11 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Parameters
     ----------
     ball, drop
-        Ball and drop, by default the rubber ball of the paper from 1 m. `ball` may instead be a
-        `Case`, without any other argument but `verify`.
+        Ball and drop, by default the standard rubber ball from 1 m. `ball` may instead be a `Case`,
+        without any other argument but `verify`.
     model
-        ``"hollow_sphere"`` (the analytical model of the paper, the default), ``"modal_ball"`` (the
-        improved model; with a room the default, with options with which it conforms),
-        ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``; or an
+        ``"modal_ball"`` (the default), ``"finite_element"``, ``"hollow_sphere"`` (the analytical
+        model of the paper), ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``; or an
         object of the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.

@@ -283,11 +283,6 @@ class Verdict(Outcome):
             result for result in (VERDICTS[1], VERDICTS[2], VERDICTS[0]) if result in results
         )
 
-    @property
-    def probability(self) -> float:
-        """Fraction of the drops that meet all criteria; NaN for one source."""
-        return self.counts[0] / self.counts[1] if self.counts else math.nan
-
     def __repr__(self) -> str:
         """Return the result and the criteria that cause it."""
         entries = [entry for entry in self.criteria if entry.conforms != VERDICTS[0]]

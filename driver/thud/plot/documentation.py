@@ -30,7 +30,7 @@ from thud.plot.ball_figures import compression, loss_factor, mode_shapes, motion
 from thud.plot.floor_figures import ball_impedances, draw_floor, floor_mobilities
 from thud.plot.impact_figures import force_history, level_changes, levels
 from thud.plot.style import COLORS, WIDTH, new_figure, own_style
-from thud.studies.calibrated_set import calibrated_set
+from thud.studies.calibrated_set import MESH, calibrated_set
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -198,7 +198,7 @@ def _draw_standard_ball() -> Figure:
         key: np.append(values, STANDARD_BALL["finite_element", key])
         for key, values in calibrated_set("finite_element").items()
     }
-    drops = solve_many(sets, Case(model=FiniteElement(radial_elements=6, polar_elements=48)))
+    drops = solve_many(sets, Case(model=FiniteElement(**MESH)))
     level = drops.levels["floor", "octave"][:, -1]
     figure = new_figure(1.8 * WIDTH)
     panels = (

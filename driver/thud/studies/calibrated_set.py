@@ -40,13 +40,15 @@ SAMPLES = 256
 _SEED = 0
 # Maximum fraction of drops without results.
 _MAX_FAILED = 0.1
-# Keys that a damping law does not use.
-_UNUSED = {
+# Keys that a damping law of elements fixes: it does not use them, or the sets are of another law.
+_FIXED = {
     "none": ("loss_factor", "fractional_order"),
     "kelvin_voigt": ("fractional_order",),
-    "constant_loss": ("fractional_order",),
+    "constant_loss": ("loss_factor", "fractional_order"),
     "prony": ("loss_factor", "fractional_order"),
 }
+# Damping law of the sets of the modal ball.
+_LAW = "rising"
 _CALIBRATION = "that the standard ball conforms is put in by the calibration, not found"
 # Relative differences of values that do not vary.
 _ROUNDING = 1e-9
@@ -115,6 +117,7 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
         f"{len(values) - 1} drops{lost}; range: minimum and maximum, without numerical error",
         "probability: Wilson interval (95 %)",
         f"not known: {', '.join(columns)}",
+        *map(str, stated),
         f"fixed by the case: {', '.join(fixed)}" if fixed else "",
         _CALIBRATION if sets else "",
     )
@@ -127,8 +130,9 @@ def _varied_set(case: Case, sets: Mapping[str, Values]) -> tuple[Columns, tuple[
     if not (sets and model):
         return result, ()
     stated = {key for key in sets if _is_stated(case, key)}
-    stated |= set(_UNUSED.get(getattr(model, "viscosity", ""), ()))
-    stated |= {"loss_factor"} if _is_stated(case, "loss_frequency") else set()
+    stated |= set(_FIXED.get(getattr(model, "viscosity", ""), ()))
+    if _is_stated(case, "loss_frequency") or getattr(model, "damping_law", _LAW) != _LAW:
+        stated.add("loss_factor")
     if "youngs_modulus" in stated and case.ball.youngs_modulus:
         ratio = case.ball.youngs_modulus / STANDARD_BALL[model.name, "youngs_modulus"]
         result["youngs_modulus"] = ratio * sets["youngs_modulus"]

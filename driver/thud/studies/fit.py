@@ -84,7 +84,7 @@ def fit(  # noqa: PLR0913 - options of a search
         Names of keys of ball, drop or model with real values; a mapping states the start or a
         `Parameter` of each.
     case
-        All other keys; by default the ball of the paper in the model of the paper.
+        All other keys; by default the standard ball, dropped from 1 m.
     confidence
         Confidence of the intervals.
     starts

@@ -89,7 +89,7 @@ class Study:
         result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
         if self.density is not None:
             result["[fixed] density"] = f"{self.density!r} kg/m3"
-        for group, keys in self.case.to_namelist().items():
+        for group, keys in self.case.resolved().to_namelist().items():
             result |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
         return {key: _shortened(value) for key, value in result.items()}
 

@@ -46,11 +46,12 @@ class Unknown:
     standard_deviation: float
     reason: str
 
-    @property
-    def shown_unit(self) -> tuple[str, float]:
-        """Unit in which the range is shown, and its size."""
+    def __str__(self) -> str:
+        """Return the range and its reason."""
         unit = next((key.unit for key in KEYS if key.name == self.key), "")
-        return display_unit(unit, max(abs(self.low), abs(self.high)))
+        unit, size = display_unit(unit, max(abs(self.low), abs(self.high)))
+        ends = f"{self.low / size:g} to {self.high / size:g} {unit}".rstrip()
+        return f"{self.key} {ends}: {self.reason}"
 
     def quantiles(self, fraction: NDArray[np.float64], value: float) -> NDArray[np.float64]:
         """Return the values below which fractions of all values lie; `value` is of the case."""

@@ -212,31 +212,32 @@ contains
       once = pack(texts, first)
    end function distinct
 
-   !> The input as the text of a namelist file; reading it gives the same case.
-   subroutine get_case_text(case, text, stated_only)
+   !> The input as the text of a namelist file; reading it gives the same case. Values of the standard ball for keys that the
+   !> case does not state are comments.
+   subroutine get_case_text(case, text)
       type(case_type), intent(in), target :: case
       character(len=:), allocatable, intent(out) :: text
-      !> Without the calibrated keys that the case does not state (default: the complete input).
-      logical, intent(in), optional :: stated_only
       character(len=:), allocatable :: value
+      logical :: stated
       type(field_type), allocatable :: fields(:)
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
-      if (present(stated_only)) fields = pack(fields, is_stated(case, fields) .or. .not. stated_only)
-      text = '! thud: the input of case '//trim(case%name)//', SI units'//newline
+      text = '! thud: the full input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
          call fields(i)%get_text(value)
-         text = text//'   '//fields(i)%key//' = '//value
+         stated = is_stated(case, fields(i))
+         text = text//merge('   ', '!  ', stated)//fields(i)%key//' = '//value
          if (fields(i)%unit /= '') text = text//' ! '//trim(fields(i)%unit)
+         if (.not. stated) text = text//' ! not stated: standard ball'
          text = text//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//'/'//newline
       end do
    end subroutine get_case_text
 
    !> All keys with default, allowed range and meaning, as a commented namelist file. Groups that the default case does
-   !> not use, and empty lists, are commented out.
+   !> not use, empty lists, and values of the standard ball, which depend on the model, are commented out.
    subroutine describe_keys(text)
       !> The description; a valid input file.
       character(len=:), allocatable, intent(out) :: text
@@ -259,7 +260,7 @@ contains
             text = text//newline//mark//'&'//trim(fields(i)%group)//newline
          end if
          text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline
-         if (mark == '' .and. fields(i)%is_empty()) text = text//'! '
+         if (mark == '' .and. (fields(i)%is_empty() .or. fields(i)%is_calibrated)) text = text//'! '
          text = text//mark//'   '//trim(fields(i)%key)//' = '//value//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
       end do
