@@ -148,6 +148,4 @@ def test_run_names_the_groups_that_are_left_out(
     assert cli.main(["run", "--no-figures", "-o", "m", str(case_file("&modes count = 1 /"))]) == 0
     assert re.search(r"defaults.*&ball(?! &model)", capsys.readouterr().out, re.IGNORECASE)
     assert cli.main(["run", "--no-figures", "-o", "again", "outputs/case/effective.nml"]) == 0
-    out = capsys.readouterr().out
-    assert "default" not in out.lower()
-    assert "standard ball:" not in out
+    assert "default" not in capsys.readouterr().out.lower()

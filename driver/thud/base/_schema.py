@@ -1200,11 +1200,11 @@ STANDARD_BALL: dict[tuple[str, str], float] = {
     ("finite_element", "friction"): 0.0,
     ("hollow_sphere", "youngs_modulus"): 1600000.0,
     ("hollow_sphere", "poisson_ratio"): 0.5,
-    ("measured_modes", "youngs_modulus"): 1600000.0,
+    ("measured_modes", "youngs_modulus"): 1560000.0,
     ("measured_modes", "poisson_ratio"): 0.5,
-    ("hunt_crossley", "youngs_modulus"): 1600000.0,
+    ("hunt_crossley", "youngs_modulus"): 1560000.0,
     ("hunt_crossley", "poisson_ratio"): 0.5,
-    ("two_mass", "youngs_modulus"): 1600000.0,
+    ("two_mass", "youngs_modulus"): 1560000.0,
     ("two_mass", "poisson_ratio"): 0.5,
 }
 

@@ -198,7 +198,10 @@ def _draw_standard_ball() -> Figure:
         key: np.append(values, STANDARD_BALL["finite_element", key])
         for key, values in calibrated_set("finite_element").items()
     }
-    drops = solve_many(sets, Case(model=FiniteElement(**MESH)))
+    model = FiniteElement(
+        radial_elements=MESH["radial_elements"], polar_elements=MESH["polar_elements"]
+    )
+    drops = solve_many(sets, Case(model=model))
     level = drops.levels["floor", "octave"][:, -1]
     figure = new_figure(1.8 * WIDTH)
     panels = (

@@ -15,7 +15,7 @@ module thud_pressed_ball
    use thud_lapack, only: dgbsv
    use thud_material, only: material_type
    use thud_mesh, only: mesh_type
-   use thud_text, only: to_text
+   use thud_text, only: significant, to_text
    implicit none (type, external)
    private
 
@@ -133,13 +133,13 @@ contains
             halvings = halvings + 1
          end if
          if (has_met(pressed)) then
-            error = numerical_error('&compression: max_deflection: at '//to_text(pressed%deflection) &
+            error = numerical_error('&compression: max_deflection: at '//significant(pressed%deflection, 3) &
                //' m the walls of the cavity meet; allowed: less')
             return
          end if
          if (halvings > max_halvings) then
             error = numerical_error('&compression: max_deflection: no state of rest was found beyond ' &
-               //to_text(pressed%deflection)//' m; allowed: less, or more polar_elements')
+               //significant(pressed%deflection, 3)//' m; allowed: less, or more polar_elements')
             return
          end if
       end do
