@@ -21,7 +21,10 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: get_full_key, is_stated, keep_impact_only, new_case, set_floor_air, set_standard_modulus
+   public :: get_full_key, get_modes_ball, is_stated, modes_model, keep_impact_only, new_case, set_floor_air, set_standard_modulus
+
+   !> Model whose modulus the free modes have.
+   character(len=*), parameter :: modes_model = 'finite_element'
 
    !> Input of one run.
    type :: case_type
@@ -84,21 +87,40 @@ contains
       call set_standard_modulus(case)
    end subroutine new_case
 
-   !> Gives a ball whose modulus is not stated that of the standard ball by the model, or by finite elements for free modes
-   !> alone. Models that do not use the wall keep the default.
-   subroutine set_standard_modulus(case)
-      type(case_type), intent(inout) :: case
-      character(len=name_length) :: model
+   !> Modulus of the standard ball by a model, Pa; that of the case for models that do not use the wall.
+   function get_modulus(case, model) result(modulus)
+      type(case_type), intent(in) :: case
+      !> One of `model_names`.
+      character(len=*), intent(in) :: model
+      real(wp) :: modulus
       integer :: number
 
-      model = case%model
-      if (.not. case%has_impact) model = 'finite_element'
+      modulus = 0.0_wp
       number = findloc(model_names == model, .true., dim=1)
-      if (number == 0) return
-      associate (modulus => case%models(number)%model%get_standard_modulus())
-         if (modulus > 0.0_wp) case%ball%youngs_modulus = modulus
-      end associate
+      if (number > 0) modulus = case%models(number)%model%get_standard_modulus()
+      if (.not. modulus > 0.0_wp) modulus = case%ball%youngs_modulus
+   end function get_modulus
+
+   !> Gives a ball whose modulus is not stated that of the standard ball by the source model, or for free modes alone by
+   !> finite elements.
+   subroutine set_standard_modulus(case)
+      type(case_type), intent(inout) :: case
+
+      if (case%has_impact) then
+         case%ball%youngs_modulus = get_modulus(case, case%model)
+      else
+         case%ball = get_modes_ball(case)
+      end if
    end subroutine set_standard_modulus
+
+   !> The ball of the free modes: a modulus that is not stated is that of finite elements, whatever the source model.
+   function get_modes_ball(case) result(ball)
+      type(case_type), intent(in) :: case
+      type(ball_type) :: ball
+
+      ball = case%ball
+      if (any(case%unstated == 'ball.youngs_modulus')) ball%youngs_modulus = get_modulus(case, modes_model)
+   end function get_modes_ball
 
    !> Group and key, as in `unstated`.
    pure elemental function get_full_key(field) result(name)

@@ -4,7 +4,7 @@ module thud_compute
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    !$ use omp_lib, only: omp_get_max_threads
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_case, only: case_type, check_case, get_floor_number, get_model_number
+   use thud_case, only: case_type, check_case, get_floor_number, get_model_number, get_modes_ball
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
    use thud_floor_model, only: floor_state_type
@@ -98,7 +98,7 @@ contains
 
       if (case%has_impact) call require_memory(sample_memory*get_sample_count(case%sampling), &
          '&sampling: so many samples', 'a lower sample_rate or duration', error)
-      if (case%has_modes .and. .not. allocated(error)) call get_free_modes(case%ball, case%modes%count, results%modes, &
+      if (case%has_modes .and. .not. allocated(error)) call get_free_modes(get_modes_ball(case), case%modes%count, results%modes, &
          error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
       if (case%has_impact .and. .not. allocated(error)) call compute_drops(case, scope, results%state, results%impact, &

@@ -1,9 +1,8 @@
-!> Warnings on cases that are allowed but implausible: a ball unlike rubber, a modulus of elasticity that belongs to another
-!> model, a force that no real source has.
+!> Warnings on cases that are allowed but implausible: a ball unlike rubber, a force that no real source has.
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, get_floor_number, get_model_number
+   use thud_case, only: case_type, get_floor_number, get_model_number, modes_model
    use thud_error, only: error_type
    use thud_floor_model, only: floor_state_type, reason_length
    use thud_force_exposure, only: get_force_exposure_levels
@@ -61,9 +60,6 @@ module thud_warnings
 
    !> Rounding error of a coefficient of restitution.
    real(wp), parameter :: restitution_error = 1.0e-6_wp
-
-   !> Source model whose modulus is that of the free modes that the paper published.
-   character(len=*), parameter :: modes_model = 'finite_element'
 
 contains
 

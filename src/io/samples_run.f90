@@ -2,7 +2,7 @@
 !> that the memory does not grow with the table.
 module thud_samples_run
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, keep_impact_only
+   use thud_case, only: case_type, get_full_key, keep_impact_only
    use thud_case_text, only: get_case_text
    use thud_compute, only: get_assessed_force
    use thud_constants, only: version
@@ -59,6 +59,7 @@ contains
       type(result_directory_type) :: results
       character(len=:), allocatable :: text
       character(len=path_length) :: inputs(2)
+      integer :: i
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
@@ -68,6 +69,9 @@ contains
       if (allocated(error)) return
       call open_sample_table(table_path, case, table, error)
       if (allocated(error)) return
+      ! The table states the keys of its columns.
+      case%unstated = pack(case%unstated, [(.not. any(get_full_key(table%fields) == case%unstated(i)), &
+         i=1, size(case%unstated))])
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
       inputs(1) = path

@@ -55,6 +55,15 @@ def test_message_names_what_is_wrong_with_unknowns(
         thud.assess(replace(ELEMENTS, unknowns=replace(FRICTION, **changes)))
 
 
+def test_unknown_without_an_effect_is_refused() -> None:
+    unknowns = thud.Unknowns(key="fractional_order", low=0.2, high=0.9, reason="not measured")
+    assert unknowns.key == ("fractional_order",)
+    case = thud.Case(unknowns=unknowns)
+    with pytest.raises(thud.InputError, match=naming("&unknowns", "fractional_order", "same drop")):
+        thud.assess(case)
+    assert thud.assess(replace(case, model=thud.ModalBall(damping_law="fractional"))).counts[1]
+
+
 @pytest.mark.parametrize("text", ["it is", "'a', b", "'a' 'b", "1, 2", f"'{'x' * 129}'"])
 def test_list_of_texts_needs_quotes(text: str, tmp_path: Path) -> None:
     path = tmp_path / "case.nml"

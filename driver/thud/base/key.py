@@ -63,7 +63,7 @@ class Group(Plain):
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        """Make a number a list of one where a list is needed.
+        """Make a number or a text a list of one where a list is needed.
 
         Raise InputError if a list that has a default is empty.
         """
@@ -72,7 +72,7 @@ class Group(Plain):
             value = getattr(self, option.name)
             if not isinstance(option.default, tuple):
                 continue
-            if isinstance(value, int | float):
+            if isinstance(value, int | float | str):
                 object.__setattr__(self, option.name, (value,))
             elif option.default and isinstance(value, tuple | list) and not value:
                 refuse(f"{type(self).__name__}: {option.name} is empty", "one number or more")

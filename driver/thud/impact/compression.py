@@ -69,7 +69,7 @@ class CompressionCurve(Displayed):
 @check_arguments
 def compress(
     ball: Ball | None = None,
-    model: ModelName | ModelOptions = "finite_element",
+    model: ModelName | ModelOptions = "modal_ball",
     *,
     max_deflection: float = Compression.max_deflection,
     points: int = Compression.points,

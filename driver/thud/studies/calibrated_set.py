@@ -105,6 +105,7 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
     varied, fixed = _varied_set(case, sets)
     case = _calibrated_mesh(blocked_case(case, stated).resolved())
     if stated:
+        _require_effects(case, stated)
         varied = _samples(case, varied, stated)
         fixed = tuple(key for key in fixed if key not in varied)
     # The first drop is that of the case.
@@ -162,6 +163,20 @@ def _samples(case: Case, sets: Columns, unknowns: tuple[Unknown, ...]) -> Column
         middle = float(value_in(case, unknown.key) or 0.0)
         result[unknown.key] = unknown.quantiles(points[:, i], middle)
     return result
+
+
+def _require_effects(case: Case, unknowns: tuple[Unknown, ...]) -> None:
+    """Raise InputError for an unknown whose ends make the same drop."""
+    for unknown in unknowns:
+        low, high = _criteria(
+            case, {unknown.key: np.array([unknown.low, unknown.high])}, progress=False
+        )
+        if np.array_equal(low, high):
+            refuse(
+                f"&unknowns: {unknown.key} = {unknown.low:g} and {unknown.high:g} make the same "
+                "drop: this source does not use it",
+                "keys that change the drop of the case",
+            )
 
 
 def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:

@@ -91,6 +91,7 @@ contains
          model = ''
          if (i > 0) model = model_names(i)
          if (i > 0) case%model = model
+         case%unstated = ['ball.youngs_modulus']
          call set_standard_modulus(case)
          fields = get_active_fields(case)
          do j = 1, size(fields)
