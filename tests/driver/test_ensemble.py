@@ -322,10 +322,10 @@ import resource, sys
 import numpy as np, thud
 heights = np.linspace(0.5, 1.5, 20_000)
 for _ in range(2):
-    thud.solve_many({"height": heights}, duration=0.03)
+    thud.solve_many({"height": heights}, duration=0.03, model="hollow_sphere")
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 for _ in range(10):
-    thud.solve_many({"height": heights}, duration=0.03)
+    thud.solve_many({"height": heights}, duration=0.03, model="hollow_sphere")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
     found = python("-c", code)
