@@ -292,7 +292,7 @@ contains
          if (allocated(error) .or. .not. case%has_room) return
          if (.not. floor%has_radiator()) then
             error = input_error('&floor: name = '//quoted(trim(case%floor))//' has no plate that radiates into a room; ' &
-               //'allowed with &room: '//join_quoted(pack(floor_names, [(case%floors(i)%model%has_radiator(), &
+               //'allowed: no &room, or '//join_quoted(pack(floor_names, [(case%floors(i)%model%has_radiator(), &
                i=1, size(floor_names))])))
             return
          end if

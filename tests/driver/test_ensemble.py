@@ -281,7 +281,11 @@ def test_scalars_and_defaults() -> None:
             naming("sample_rate", "'44100'", "a number"),
         ),
         ({}, {"duration": 10**400}, naming("&sampling: duration")),
-        ({}, {"duration": 10.0, "sample_rate": 1e7}, naming("&sampling: duration", "10.0 s")),
+        (
+            {},
+            {"duration": 10.0, "sample_rate": 1e7, "model": "hollow_sphere"},
+            naming("&sampling: duration", "10.0 s"),
+        ),
         ({}, {"source": "drum"}, naming("&limits: source", "'drum'", "'tyre'")),
     ],
 )

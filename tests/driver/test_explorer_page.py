@@ -950,7 +950,7 @@ def test_undo_goes_one_step_and_keeps_what_was_just_changed(
     # A change is stored at once when the page is left.
     type_into(page, "[id='drop.height']", "0.6")
     page.reload()
-    sync_api.expect(height).to_have_value("1.88")
+    sync_api.expect(height).to_have_value("0.6")
 
 
 def test_removed_recording_returns_with_undo(browser: Browser, server: Served) -> None:

@@ -37,7 +37,7 @@ FIGURES = {"report.html", "force.svg", "levels.svg"}
 @pytest.fixture(scope="module")
 def noisy() -> thud.Recording:
     """Return a recording whose level at 500 Hz lies in the background."""
-    impact = thud.solve()
+    impact = thud.solve(model="hollow_sphere")
     force = np.pad(impact.floor_force, int(0.1 * impact.sample_rate))
     force += np.random.default_rng(1).normal(scale=100, size=len(force))
     recording = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)

@@ -22,11 +22,7 @@ DOUBTFUL = {
     naming("&ball", "density", "mass", 800, 2200): "&ball mass = 25 / &sampling duration = 0.2 /",
     naming("&ball: youngs_modulus", "1.6 Pa", "10000.0", "3.0e9"):
     "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
-    " &sampling duration = 10, sample_rate = 2000 /",
-    naming("&ball: youngs_modulus", "1.60 MPa", "'hollow_sphere'", "'finite_element'", "2.08 MPa"):
-    "&model name = 'finite_element' / &mesh radial_elements = 4, polar_elements = 32 /",
-    naming("&ball: youngs_modulus", "2.08 MPa", "'finite_element'", "'modal_ball'", "1.60 MPa"):
-    "&ball youngs_modulus = 2.08e6 / &model name = 'modal_ball' /",
+    " &sampling duration = 10, sample_rate = 2000 / &model name = 'hollow_sphere' /",
     naming("level", "44", "52 dB"): "&drop height = 1e-7 /"
     " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
 }  # fmt: skip
@@ -73,16 +69,19 @@ def test_plausible_input_raises_no_warning(text: str, case_file: CaseFile) -> No
 
 
 OUTSIDE = {
-    naming("&ball: wall_thickness", "outer_radius", 0.5, 0.4): "&ball wall_thickness = 0.0445 /",
+    naming("&ball: wall_thickness", "outer_radius", 0.5, 0.4): "&ball wall_thickness = 0.0445 /"
+    " &model name = 'hollow_sphere' /",
     naming("&ball: poisson_ratio", 0.3, 0.45, "0.50"): "&ball poisson_ratio = 0.3 /",
-    naming("&drop: deflection", "outer_radius", 0.5): "&drop height = 3 /",
+    naming("&drop: deflection", "outer_radius", 0.5): "&drop height = 3 /"
+    " &model name = 'hollow_sphere' /",
     naming(
         "&drop: deflection", "wall_thickness", 0.5, "thin wall", "9 dB off those of finite elements"
     ): "&ball"
     " wall_thickness = 0.016, mass = 1, youngs_modulus = 5e6, poisson_ratio = 0.49 /"
     " &model name = 'modal_ball' /",
     naming("&drop: deflection", "wall_thickness", 2.0, "buckles"): "&ball wall_thickness = 0.0272,"
-    " youngs_modulus = 4e5 / &drop height = 1.6 / &sampling duration = 0.1 /",
+    " youngs_modulus = 4e5 / &drop height = 1.6 / &sampling duration = 0.1 /"
+    " &model name = 'hollow_sphere' /",
     naming("&drop: deflection", "twice outer_radius", 2.8, 1.0): "&drop height = 50 / &sampling"
     " duration = 0.1 / &model name = 'measured_modes' / &measured_modes frequency = 10,"
     " damping_ratio = 0, effective_mass = 2.5 /",
@@ -101,7 +100,9 @@ OUTSIDE = {
     naming("&floor: restitution", "-1.0e-6"): "&model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"
     " &oscillator mass = 0.5, stiffness = 0, damping = 0 / &sampling duration = 0.2 /",
-    naming("&model: restitution", 1, "1.0e-6"): "&hollow_sphere momentum_flux = 'none' / &floor"
+    naming(
+        "&model: restitution", 1, "1.0e-6"
+    ): "&model name = 'hollow_sphere' / &hollow_sphere momentum_flux = 'none' / &floor"
     " name = 'oscillator' / &oscillator mass = 30, stiffness = 1.70549e7,"
     " damping = 0 / &sampling duration = 0.2 /",
 }

@@ -54,12 +54,13 @@ def _tyre_steps(case: thud.Case) -> float:
 def _any_case(model: str, chance: random.Random, floors: int) -> thud.Case:
     """Return a case; keys that are not drawn from their whole range are near their defaults."""
     part = chance.choice([0.1, 0.2, 0.4, 1.0])
-    ball = _vary(thud.Ball(), "", "ball", chance, part)
+    standard = thud.Case(model=MODELS[model]()).resolved()
+    ball = _vary(standard.ball, "", "ball", chance, part)
     if ball.wall_thickness >= ball.outer_radius:
         ball = replace(ball, wall_thickness=ball.outer_radius * chance.random())
     drop = _vary(thud.Drop(), "", "drop", chance, part)
     options = OPTIONS.get(model, _plain)(
-        _vary(MODELS[model](), model, "", chance, part), ball, chance
+        _vary(standard.model, model, "", chance, part), ball, chance
     )
     floor = None
     if model != "measured_modes" and chance.random() * 1000 < floors:

@@ -287,7 +287,7 @@ class Impact(ImpactQuantities, Displayed):
             start=float(self.time[0] - self.touch_time),
             kind=self.assessed_force(),
             origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
-            checksum=hashlib.sha256(case_text(case.resolved())).hexdigest(),
+            checksum=hashlib.sha256(case_text(case)).hexdigest(),
         )
 
     def plot(self) -> Figure:
