@@ -18,6 +18,9 @@ module thud_case_text
    !> Groups whose absence a run reports, because defaults apply then; for free modes alone only the first.
    character(len=*), parameter :: main_groups(*) = ['ball ', 'drop ', 'model']
 
+   !> Length of a list of keys beyond which a message does not contain it.
+   integer, parameter :: longest_list = 300
+
 contains
 
    !> Reads a case from the text of a namelist file and checks it.
@@ -180,9 +183,10 @@ contains
             stated = stated .or. is_meant
             if (.not. any(is_meant)) then
                call get_suggestion(assignment%key, pack(fields%key, fields%group == group%name), suggestion)
+               allowed = join_quoted(distinct(pack(fields%key, fields%group == group%name)))
+               if (len(allowed) > longest_list) allowed = 'the keys that thud --keys lists'
                error = input_error('&'//group%name//': '//shortened(assignment%key)//' in line '//to_text(assignment%line) &
-                  //' is not a known key'//suggestion//'; allowed: ' &
-                  //join_quoted(distinct(pack(fields%key, fields%group == group%name))))
+                  //' is not a known key'//suggestion//'; allowed: '//allowed)
             else if (any([(group%assignments(j)%key == assignment%key, j=1, i - 1)])) then
                error = input_error('&'//group%name//': '//assignment%key//' is given a second time in line ' &
                   //to_text(assignment%line)//'; allowed: once')
