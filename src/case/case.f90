@@ -21,7 +21,8 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: get_full_key, get_modes_ball, is_stated, modes_model, keep_impact_only, new_case, set_floor_air, set_standard_modulus
+   public :: get_full_key, get_modes_ball, is_stated, keep_impact_only, modes_model, new_case, set_floor_air
+   public :: set_standard_modulus
 
    !> Model whose modulus the free modes have.
    character(len=*), parameter :: modes_model = 'finite_element'

@@ -98,8 +98,8 @@ contains
 
       if (case%has_impact) call require_memory(sample_memory*get_sample_count(case%sampling), &
          '&sampling: so many samples', 'a lower sample_rate or duration', error)
-      if (case%has_modes .and. .not. allocated(error)) call get_free_modes(get_modes_ball(case), case%modes%count, results%modes, &
-         error)
+      if (case%has_modes .and. .not. allocated(error)) call get_free_modes(get_modes_ball(case), case%modes%count, &
+         results%modes, error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
       if (case%has_impact .and. .not. allocated(error)) call compute_drops(case, scope, results%state, results%impact, &
          results%on_floor, error)

@@ -80,24 +80,23 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(case_type), target :: case
       type(field_type), allocatable :: fields(:)
-      character(len=name_length) :: model
+      character(len=name_length) :: models(size(model_names) + 1)
       integer :: i, j
 
       text = ''
-      do i = 0, size(model_names)
+      models = [character(len=name_length) :: '', model_names]
+      do i = 1, size(models)
          call new_case(case)
-         case%has_impact = i > 0
-         case%has_modes = i == 0
-         model = ''
-         if (i > 0) model = model_names(i)
-         if (i > 0) case%model = model
+         case%has_impact = models(i) /= ''
+         case%has_modes = models(i) == ''
+         if (case%has_impact) case%model = models(i)
          case%unstated = ['ball.youngs_modulus']
          call set_standard_modulus(case)
          fields = get_active_fields(case)
          do j = 1, size(fields)
             if (.not. fields(j)%is_calibrated) cycle
             if (text /= '') text = text//','//newline
-            text = text//'{"model": '//text_value(model)//', "key": ' &
+            text = text//'{"model": '//text_value(models(i))//', "key": ' &
                //text_value(fields(j)%key)//', "value": '//json_value(fields(j))//'}'
          end do
       end do
