@@ -102,16 +102,14 @@ contains
       if (.not. modulus > 0.0_wp) modulus = case%ball%youngs_modulus
    end function get_modulus
 
-   !> Gives a ball whose modulus is not stated that of the standard ball by the source model, or for free modes alone by
-   !> finite elements.
+   !> Gives the ball the modulus of the standard ball by the source model, or for free modes alone by finite elements.
    subroutine set_standard_modulus(case)
       type(case_type), intent(inout) :: case
+      character(len=name_length) :: model
 
-      if (case%has_impact) then
-         case%ball%youngs_modulus = get_modulus(case, case%model)
-      else
-         case%ball = get_modes_ball(case)
-      end if
+      model = case%model
+      if (.not. case%has_impact) model = modes_model
+      case%ball%youngs_modulus = get_modulus(case, model)
    end subroutine set_standard_modulus
 
    !> The ball of the free modes: a modulus that is not stated is that of finite elements, whatever the source model.

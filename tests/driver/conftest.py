@@ -39,6 +39,8 @@ settings.load_profile("thud")
 
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
+# The case of the paper: its ball by its shell.
+SHELL = thud.Case(model=thud.HollowSphere())
 MINIMAL = "&ball /\n&drop /\n&model name = 'hollow_sphere' /\n"
 RESULT_FILES = ["effective.nml", "force.csv", "levels.csv", "summary.nml", "thud.txt"]
 # How patterns of `naming` begin: at the begin of a message, in any case, over all its lines.

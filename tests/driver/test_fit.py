@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import naming, quiet_fit
+from conftest import SHELL, naming, quiet_fit
 from scipy import stats
 
 import thud
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     FailWhere = Callable[[Callable[[float], bool]], None]
 
 RATE = 44100.0
-SHELL = thud.Case(model=thud.HollowSphere())
 TRUTH = thud.Case(ball=thud.Ball(youngs_modulus=1.8e6), model=thud.HollowSphere())
 MODAL = thud.Case(model=thud.ModalBall(damping_law="rising"))
 COARSE = thud.FiniteElement(radial_elements=2, polar_elements=16, snapshot_interval=0.0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming, quiet_fit
+from conftest import REPOSITORY, SHELL, names_in, naming, quiet_fit
 from scipy import stats
 
 import thud
@@ -52,8 +52,6 @@ gain = 0.02
 youngs_modulus = { start = 1.6, unit = "MPa" }
 mass = { start = 2.4 }
 """
-
-SHELL = thud.Case(model=thud.HollowSphere())
 
 
 def record(case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0) -> Record:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, SHELL, naming
 from synthetic import make_recording
 
 import thud
@@ -40,8 +40,6 @@ file = "record.wav"
 [parameters]
 youngs_modulus = {{ start = 1.4, unit = "MPa" }}
 """
-
-SHELL = thud.Case(model=thud.HollowSphere())
 
 
 def pulse(impact: thud.Impact) -> np.ndarray:

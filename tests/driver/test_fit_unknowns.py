@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import naming, quiet_fit
+from conftest import SHELL, naming, quiet_fit
 
 import thud
 from thud.case.keys import with_values
@@ -19,8 +19,6 @@ from thud.studies.fitting.inference import misfit_ratio, posterior
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
 from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record
-
-SHELL = thud.Case(model=thud.HollowSphere())
 
 
 def miss(fit: thud.Fit) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -50,9 +50,8 @@ class Preset:
 
 
 def _aged_ball() -> Case:
-    case = Case(model=FiniteElement())
     modulus = STANDARD_BALL["finite_element", "youngs_modulus"]
-    return replace(case, ball=Ball(youngs_modulus=AGING * modulus))
+    return Case(ball=Ball(youngs_modulus=AGING * modulus), model=FiniteElement())
 
 
 PRESETS = {

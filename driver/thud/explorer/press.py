@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import ModalBall
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import UNITS, find_unit, scaled
+from thud.case.case import new_model
 from thud.explorer.answer import new_case
 from thud.explorer.form import fields_by_key
 from thud.explorer.models import MODEL_FACTS
@@ -71,7 +71,7 @@ def fit_press(
         refuse(f"{len(paths)} files are chosen", "the curve of one press")
     path, name = paths[0], Path(names[0]).name
     case = new_case(values)
-    model = case.model or ModalBall()
+    model = new_model(case.model, {})
     facts = MODEL_FACTS[model.name]
     if "youngs_modulus" not in facts.fitted:
         titles = [other.title for other in MODEL_FACTS.values() if "youngs_modulus" in other.fitted]

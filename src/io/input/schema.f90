@@ -90,7 +90,6 @@ contains
          case%has_impact = models(i) /= ''
          case%has_modes = models(i) == ''
          if (case%has_impact) case%model = models(i)
-         case%unstated = ['ball.youngs_modulus']
          call set_standard_modulus(case)
          fields = get_active_fields(case)
          do j = 1, size(fields)
