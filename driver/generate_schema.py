@@ -388,7 +388,10 @@ def python_key(key: Entry) -> str:
         parts.append(tuple(key["choices"]))
     if "lower" in key:
         parts += [key["lower"], key["upper"], *([True] if key["whole"] else [])]
-    return f"Key({', '.join(quoted(p) if isinstance(p, str) else repr(p) for p in parts)})"
+    words = [quoted(p) if isinstance(p, str) else repr(p) for p in parts]
+    if key["needs"]:
+        words.append(f"needs={tuple(map(str, key['needs']))}")
+    return f"Key({', '.join(words)})"
 
 
 def quoted(text: str) -> str:

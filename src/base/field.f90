@@ -86,6 +86,9 @@ module thud_field
       logical :: derived_at_zero = .false.
       !> Calibrated on the standard ball: where the key is not stated, it has the value of the standard ball by the model.
       logical :: is_calibrated = .false.
+      !> A choice and its values with which the key has an effect, the calibrated one first; blank: with all:
+      !> [max_choices].
+      character(len=key_length) :: needs(max_choices) = ''
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
       !> Allowed texts; the first `n_choice` are used: [max_choices]. The size is fixed because some compilers lose
@@ -99,10 +102,37 @@ module thud_field
       procedure :: get_text
       procedure :: get_allowed
       procedure :: is_empty
+      procedure :: get_needed_choice
+      procedure :: has_effect
       procedure, private :: get_error
    end type field_type
 
 contains
+
+   !> The value of the choice that decides whether a key has an effect; blank if there is none.
+   pure function get_needed_choice(field, fields) result(choice)
+      class(field_type), intent(in) :: field
+      !> Keys that the case uses: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      character(len=key_length) :: choice
+      integer :: i
+
+      choice = ''
+      do i = 1, size(fields)
+         if (fields(i)%n_choice == 0 .or. fields(i)%owner /= field%owner) cycle
+         if (fields(i)%key == field%needs(1)) choice = fields(i)%text_value(:key_length)
+      end do
+   end function get_needed_choice
+
+   !> Whether a key has an effect with the choices of the case.
+   pure function has_effect(field, fields) result(yes)
+      class(field_type), intent(in) :: field
+      !> Keys that the case uses: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      logical :: yes
+
+      yes = field%needs(1) == '' .or. any(field%needs(2:) == field%get_needed_choice(fields))
+   end function has_effect
 
    !> Returns an error for the first value outside its range, NaN included.
    subroutine check_fields(fields, error)

@@ -1,12 +1,12 @@
 !> Constructors of key descriptions, one per kind of value. Ranges are intervals such as `(0, 10]`, see
-!> `thud_interval`; `in_group` and `owned_by` set the group and the owner of keys.
+!> `thud_interval`; `in_group` and `owned_by` set the group and the owner of keys, `only_with` the choice that they need.
 module thud_new_field
    use thud_field, only: field_type, list_type, name_length, text_list_type
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: choice_field, in_group, integer_field, list_field, logical_field, owned_by, path_field, real_field, &
+   public :: choice_field, in_group, integer_field, list_field, logical_field, only_with, owned_by, path_field, real_field, &
       text_field, text_list_field
 
 contains
@@ -135,5 +135,23 @@ contains
       owned = fields
       owned%owner = owner
    end function owned_by
+
+   !> Keys that have an effect only with some values of a choice.
+   function only_with(choice, values, fields) result(needing)
+      !> Key of the choice.
+      character(len=*), intent(in) :: choice
+      !> Its values, the calibrated one first: [n_value].
+      character(len=*), intent(in) :: values(:)
+      !> The keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      type(field_type) :: needing(size(fields))
+      integer :: i
+
+      needing = fields
+      needing%needs(1) = choice
+      do i = 1, size(values)
+         needing%needs(i + 1) = values(i)
+      end do
+   end function only_with
 
 end module thud_new_field

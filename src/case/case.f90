@@ -21,8 +21,8 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: get_full_key, get_modes_ball, is_stated, keep_impact_only, modes_model, new_case, set_floor_air
-   public :: set_standard_modulus
+   public :: get_full_key, get_modes_ball, get_unstated_fields, is_stated, is_used, keep_impact_only, modes_model
+   public :: new_case, set_floor_air, set_standard_modulus
 
    !> Model whose modulus the free modes have.
    character(len=*), parameter :: modes_model = 'finite_element'
@@ -245,6 +245,17 @@ contains
       allocate (fields, source=get_fields(case))
       fields = pack(fields, [(is_used(case, fields(i)) .and. .not. fields(i)%is_empty(), i=1, size(fields))])
    end function get_active_fields
+
+   !> The keys with an effect that have the value of the standard ball because the case does not state them: [n_field].
+   function get_unstated_fields(case) result(fields)
+      !> The case that the fields read and set.
+      type(case_type), intent(in), target :: case
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      allocate (fields, source=get_active_fields(case))
+      fields = pack(fields, .not. is_stated(case, fields) .and. [(fields(i)%has_effect(fields), i=1, size(fields))])
+   end function get_unstated_fields
 
    !> The keys of ball, drop and source model that are real numbers: [n_field].
    function get_source_fields(case) result(fields)

@@ -2,8 +2,10 @@
 module thud_warnings
    use thud_ball, only: get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, get_floor_number, get_model_number, modes_model
+   use thud_case, only: case_type, get_active_fields, get_floor_number, get_model_number, get_unstated_fields, &
+      modes_model
    use thud_error, only: error_type
+   use thud_field, only: field_type, key_length
    use thud_floor_model, only: floor_state_type, reason_length
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
@@ -83,6 +85,7 @@ contains
          call add_ball_warnings(case, modes_model, warnings)
       end if
       if (.not. case%has_impact) return
+      call add_law_warning(case, warnings)
       if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
          '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
          //': its force is that on a rigid floor')
@@ -279,6 +282,25 @@ contains
             //fixed(rubber_ratio(2), 2))
       end associate
    end subroutine add_ball_warnings
+
+   !> Adds a warning on a loss factor that is not stated, with a damping law other than that of the standard ball.
+   subroutine add_law_warning(case, warnings)
+      type(case_type), intent(in), target :: case
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      type(field_type), allocatable :: fields(:)
+      character(len=key_length) :: law
+      integer :: i
+
+      allocate (fields, source=get_unstated_fields(case))
+      do i = 1, size(fields)
+         if (fields(i)%key /= 'loss_factor') cycle
+         law = fields(i)%get_needed_choice(get_active_fields(case))
+         if (law /= fields(i)%needs(2)) call add(warnings, &
+            '&'//trim(fields(i)%group)//': loss_factor = '//to_text(fields(i)%real_value)//' is that of the standard ball ' &
+            //'with '//trim(fields(i)%needs(1))//' = '//quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
+      end do
+   end subroutine add_law_warning
 
    !> Adds a warning.
    pure subroutine add(warnings, message)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import re
 import signal
@@ -22,6 +23,7 @@ from thud import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from types import ModuleType
 
     from matplotlib.figure import Figure
 
@@ -53,6 +55,17 @@ def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
     force = np.pad(impact.floor_force, quiet)
     force += np.random.default_rng(1).normal(scale=0.5, size=len(force))
     return thud.Recording.from_array(force, impact.sample_rate, **known)
+
+
+def load_script(path: str) -> ModuleType:
+    """Return a script of the repository as a module."""
+    spec = importlib.util.spec_from_file_location(Path(path).stem, REPOSITORY / path)
+    assert spec
+    assert spec.loader
+    # Dataclasses look for their module.
+    sys.modules[spec.name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def naming(*parts: object) -> str:

@@ -14,7 +14,7 @@ import thud
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import CaseFile
+    from conftest import CaseFile, Run
 
 
 def test_defaults_are_those_of_the_library(case_file: CaseFile) -> None:
@@ -107,3 +107,14 @@ def test_errors_of_a_file_name_the_file(case_file: CaseFile) -> None:
 def test_file_may_begin_with_a_byte_order_mark(case_file: CaseFile) -> None:
     plain = thud.read_case(case_file(MINIMAL))
     assert thud.read_case(case_file(f"\N{ZERO WIDTH NO-BREAK SPACE}{MINIMAL}")) == plain
+
+
+def test_echo_has_no_value_of_the_standard_ball_that_the_law_does_not_use(
+    case_file: CaseFile, run: Run, tmp_path: Path
+) -> None:
+    text = "&ball / &drop / &model name = 'finite_element' / &mesh radial_elements = 2 / "
+    result = run(case_file(text + "&material viscosity = 'kelvin_voigt' /"))
+    (echo,) = tmp_path.glob("outputs/*/effective.nml")
+    for told in (result.stdout, echo.read_text()):
+        assert "loss_factor" in told
+        assert "fractional_order" not in told

@@ -16,7 +16,6 @@ from thud.explorer.answer import answer_case, new_case
 from thud.explorer.form import form
 from thud.explorer.messages import describe_error
 from thud.explorer.models import (
-    CONDITIONS,
     FLOOR_FACTS,
     MODEL_FACTS,
     SHOWN,
@@ -82,11 +81,6 @@ def test_facts_name_models_floors_and_keys_of_the_library() -> None:
     keys = {(key.owner or key.group, key.name) for key in KEYS}
     shown = {(owner, name) for owner, names in SHOWN.items() for name in names}
     assert shown <= keys
-    for owner, entries in CONDITIONS.items():
-        for name, (other, choices) in entries.items():
-            assert (owner, name) in keys
-            (key,) = (key for key in KEYS if key.owner == owner and key.name == other)
-            assert set(choices) < set(key.choices)
     for facts in (*MODEL_FACTS.values(), *FLOOR_FACTS.values()):
         assert facts.purpose
         assert facts.validity.endswith(".")
@@ -122,25 +116,26 @@ def test_keys_that_a_model_ignores_have_no_effect(model: str) -> None:
 
 
 def test_keys_of_conditions_have_no_effect_without_their_choice() -> None:
-    for owner, entries in CONDITIONS.items():
-        for name, (other, choices) in entries.items():
-            field = next(f for (_, n), f in FIELDS.items() if n == name and f["condition"])
-            assert field["condition"]["values"]
-            (switch,) = (key for key in KEYS if key.owner == owner and key.name == other)
-            (key,) = (key for key in KEYS if key.owner == owner and key.name == name)
-            off = next(choice for choice in switch.choices if choice not in choices)
-            base = {"model": {"name": owner}, switch.group: {switch.name: off}}
-            if off == "prony":
+    for key in (key for key in KEYS if key.needs):
+        owner, (other, *choices) = key.owner, key.needs
+        (switch,) = (entry for entry in KEYS if entry.owner == owner and entry.name == other)
+        assert set(choices) <= set(switch.choices)
+        field = next(f for (_, n), f in FIELDS.items() if n == key.name and f["condition"])
+        assert field["condition"]["values"]
+        value: Any = 91.0 if key.name == "loss_frequency" else 0.37
+        value = [0.2] if key.kind == "list" else value
+        for choice in switch.choices:
+            base: dict[str, Any] = {"model": {"name": owner}, switch.group: {other: choice}}
+            if choice == "prony":
                 base[switch.group] |= {"prony_share": [0.1], "prony_time": [0.01]}
             if owner == "finite_element":
                 base["mesh"] = {"radial_elements": 4, "polar_elements": 32}
-            value = {"real": 0.37 if key.upper == 1 else 91.0}.get(key.kind, [0.2])
-            changed = {**base, key.group: {**base.get(key.group, {}), name: value}}
-            if name.startswith("prony_"):
+            changed = {**base, key.group: {**base.get(key.group, {}), key.name: value}}
+            if key.name.startswith("prony_") and choice not in choices:
                 assert "do nothing" in error_of(changed)["error"]
                 continue
             forces = [compute(new_case(case)).floor_force for case in (base, changed)]
-            assert np.array_equal(*forces), (owner, name)
+            assert np.array_equal(*forces) != (choice in choices), (owner, key.name, choice)
 
 
 def test_page_begins_with_a_ball_that_conforms() -> None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import io
 import math
-import sys
 from argparse import ArgumentParser
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming
+from conftest import REPOSITORY, load_script, names_in, naming
 from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
@@ -269,13 +267,7 @@ def test_missing_files_get_one_sentence(name: str, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def plate():  # noqa: ANN201 - a module
     """Return the example."""
-    path = REPOSITORY / "docs/examples/plate_scikit_fem.py"
-    spec = importlib.util.spec_from_file_location("plate_scikit_fem", path)
-    module = importlib.util.module_from_spec(spec)
-    # Its dataclass looks for its module.
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_script("docs/examples/plate_scikit_fem.py")
 
 
 def test_frequency_of_the_plate_of_scikit_fem_is_of_fourth_order(plate) -> None:  # noqa: ANN001

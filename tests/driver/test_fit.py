@@ -371,7 +371,7 @@ def test_parameters_that_are_not_identifiable_are_named(
 
 
 def test_parameter_without_effect_is_named() -> None:
-    case = thud.Case(model=thud.ModalBall(damping_law="constant"))
+    case = thud.Case(model=thud.ModalBall(damping_law="constant", loss_factor=0.3))
     with pytest.warns(thud.FitWarning, match=naming("loss_frequency")):
         fit = thud.fit(thud.solve(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
     assert fit.values["youngs_modulus"] == pytest.approx(1.56e6, rel=1e-6)

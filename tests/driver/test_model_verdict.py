@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY, load_script, naming
 from scipy.stats import binomtest, spearmanr
 
 import thud
 from thud.base._schema import MODELS, STANDARD_BALL
 from thud.base.tables import format_rows, wrap
 from thud.cli import main
+from thud.impact.compute import compute
 from thud.level.assessment import wilson_interval
 from thud.studies import calibrated_set
 
@@ -31,10 +31,10 @@ def modulus(model: str, factor: float) -> float:
     return factor * STANDARD_BALL[model, "youngs_modulus"]
 
 
-@pytest.mark.parametrize("model", [thud.HollowSphere(), LINEAR, None])
+@pytest.mark.parametrize("model", [thud.HollowSphere(), LINEAR])
 def test_nothing_is_known_to_vary_without_a_set(model: Any) -> None:  # noqa: ANN401
     with pytest.raises(thud.InputError, match=naming("&unknowns", "modal_ball", "finite_element")):
-        thud.assess(thud.Case(model=model, modes=None if model else thud.Modes()))
+        thud.assess(thud.Case(model=model))
 
 
 @pytest.mark.parametrize("model", ["modal_ball", "finite_element"])
@@ -50,7 +50,7 @@ def test_sets_are_those_of_the_standard_ball(model: str) -> None:
     [
         ({}, ()),
         ({"friction": 0.2}, ("friction",)),
-        ({"viscosity": "kelvin_voigt"}, ("fractional_order",)),
+        ({"viscosity": "kelvin_voigt"}, ("loss_factor", "fractional_order")),
         ({"viscosity": "none"}, ("loss_factor", "fractional_order")),
         ({"viscosity": "constant_loss"}, ("loss_factor", "fractional_order")),
         ({"loss_frequency": 100.0, "poisson_ratio": 0.49}, ("poisson_ratio", "loss_factor")),
@@ -68,6 +68,26 @@ def test_stated_parameters_are_fixed(keys: dict[str, Any], fixed: tuple[str, ...
     assert set(verdict.unknowns) == sets.keys() - set(fixed)
     if fixed:
         assert f"fixed by the case: {', '.join(fixed)}" in verdict.notes
+
+
+@pytest.mark.parametrize(
+    ("model", "count"),
+    [
+        (thud.ModalBall(), 0),
+        (thud.ModalBall(damping_law="constant"), 1),
+        (thud.ModalBall(damping_law="constant", loss_factor=0.3), 0),
+        (COARSE, 1),
+        (replace(COARSE, viscosity="none"), 1),
+        (replace(COARSE, viscosity="kelvin_voigt"), 2),
+        (replace(COARSE, viscosity="kelvin_voigt", loss_factor=0.2), 1),
+    ],
+)
+def test_notes_have_the_warnings_of_the_drop(model: Any, count: int) -> None:  # noqa: ANN401
+    """Of a coarse mesh, and of a loss factor that is not stated with another damping law."""
+    case = thud.Case(model=model)
+    warnings = compute(case).warnings
+    assert len(warnings) == count
+    assert set(warnings) <= set(thud.assess(case).notes)
 
 
 def test_drops_are_those_of_the_sets(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,12 +229,7 @@ NEAR = {
 )
 def test_probability_is_that_of_other_sets(model: str, count: int, names: tuple[str, ...]) -> None:
     """Parameters drawn anew from the same distribution, within twice the stated error."""
-    path = REPOSITORY / "driver/calibrate_standard_ball.py"
-    spec = importlib.util.spec_from_file_location("calibrate_standard_ball", path)
-    assert spec
-    assert spec.loader
-    calibration = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(calibration)
+    calibration = load_script("driver/calibrate_standard_ball.py")
     sets, _ = calibration.draw_sets(model, count, 1, progress=False)
     options = MODELS[model]()
     for name in names:

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import load_script
 from scipy.stats import binomtest
 
 from thud.base._schema import STANDARD_BALL
 from thud.studies.calibrated_set import calibrated_set
 
-SCRIPT = REPOSITORY / "driver/calibrate_standard_ball.py"
-SPEC = importlib.util.spec_from_file_location("calibrate_standard_ball", SCRIPT)
-assert SPEC is not None
-assert SPEC.loader is not None
-calibrate = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(calibrate)
+calibrate = load_script("driver/calibrate_standard_ball.py")
 
 # Draws of the prior that `./bootstrap calibrate` needed for its sets.
 DRAWN = {"finite_element": 323, "modal_ball": 431}

@@ -103,7 +103,7 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
         assert found.attrs["thud_version"] == thud.__version__
         assert found.attrs["compiler"].startswith("GCC version")
         assert "/" not in found.attrs["compiler"]
-        assert "youngs_modulus = 1560000.0" in found.attrs["case"]
+        assert "youngs_modulus = 1560000.0" in found.attrs["resolved_case"]
 
 
 def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatch) -> None:

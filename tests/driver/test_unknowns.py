@@ -55,6 +55,19 @@ def test_message_names_what_is_wrong_with_unknowns(
         thud.assess(replace(ELEMENTS, unknowns=replace(FRICTION, **changes)))
 
 
+@pytest.mark.parametrize(
+    ("case", "named"),
+    [
+        (thud.Case(unknowns=thud.Unknowns()), ("&unknowns: key", "missing")),
+        (thud.Case(model=None, modes=thud.Modes()), ("&model", "missing")),
+        (thud.Case(model=None, modes=thud.Modes(), unknowns=FRICTION), ("&model", "missing")),
+    ],
+)
+def test_case_without_keys_or_model_is_refused(case: thud.Case, named: tuple[str, ...]) -> None:
+    with pytest.raises(thud.InputError, match=naming(*named)):
+        thud.assess(case)
+
+
 def test_unknown_without_an_effect_is_refused() -> None:
     unknowns = thud.Unknowns(key="fractional_order", low=0.2, high=0.9, reason="not measured")
     assert unknowns.key == ("fractional_order",)

@@ -17,7 +17,7 @@ impacts: dict[str, thud.Impact] = {name: thud.solve(ball, model=name) for name i
 lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
 tyre: thud.ModelOptions = thud.TwoMass(belt_mass=1.0)
 impacts["lumped"] = thud.solve(ball, thud.Drop(height=1.0), lumped)
-elements = thud.FiniteElement(viscosity="kelvin_voigt", snapshot_interval=1e-3)
+elements = thud.FiniteElement(viscosity="kelvin_voigt", loss_factor=0.2, snapshot_interval=1e-3)
 flagship = thud.solve(thud.Ball.standard(), model=elements)
 motion: thud.Motion | None = flagship.motion
 others = thud.HollowSphere("none"), thud.ModalBall(rings=40), thud.MeasuredModes(frequency=[30.0])

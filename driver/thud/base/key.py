@@ -40,6 +40,9 @@ class Key:
         quotient of numbers and names of keys.
     whole : bool
         Whether only whole numbers are allowed.
+    needs : tuple of str
+        Name of a choice and its values with which the key has an effect, that of the standard ball
+        first; empty: with all.
     """
 
     owner: str
@@ -52,6 +55,7 @@ class Key:
     lower: float | str = -math.inf
     upper: float | str = math.inf
     whole: bool = False
+    needs: tuple[str, ...] = ()
 
 
 class Group(Plain):

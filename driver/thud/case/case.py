@@ -53,6 +53,8 @@ GroupType = TypeVar("GroupType", bound=Group)
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # Names of the keys that take lists of numbers or texts.
 LISTS = {key.name for key in KEYS if key.kind in {"list", "texts"}}
+# Source model of a case that names none.
+DEFAULT_MODEL = ModalBall
 # Optional groups of an impact, and all optional groups of a case.
 IMPACT_GROUPS: dict[str, type[Group]] = {
     "compression": Compression,
@@ -78,7 +80,7 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
-    model = next(iter(MODELS)) if model is None else model
+    model = DEFAULT_MODEL.name if model is None else model
     require_choice("&model: name", model, MODELS)
     require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
     return MODELS[model](**options)  # type: ignore[arg-type]
@@ -112,7 +114,7 @@ class Case(Group, Displayed):
     name: str = "python"
     ball: Ball = field(default_factory=Ball)
     drop: Drop = field(default_factory=Drop)
-    model: ModelOptions | None = field(default_factory=ModalBall)
+    model: ModelOptions | None = field(default_factory=DEFAULT_MODEL)
     sampling: Sampling = field(default_factory=Sampling)
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
@@ -214,7 +216,7 @@ class Case(Group, Displayed):
         if "modes" in content:
             modes = Modes(**content["modes"])
         if "model" in content or not modes:
-            name = content.get("model", {}).get("name", next(iter(MODELS)))
+            name = content.get("model", {}).get("name", DEFAULT_MODEL.name)
             kind = MODELS[name]
             options = {}
             for option in fields(kind):

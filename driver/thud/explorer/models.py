@@ -240,21 +240,6 @@ SHOWN = {
         "required_rating",
     ),
 }  # fmt: skip
-# Choices with which a key has an effect, by owner or group: the key of the choice, and its values.
-CONDITIONS: dict[str, dict[str, tuple[str, tuple[str, ...]]]] = {
-    "modal_ball": {
-        "loss_frequency": ("damping_law", ("rising", "fractional")),
-        "fractional_order": ("damping_law", ("fractional",)),
-    },
-    "finite_element": {
-        "mooney_share": ("law", ("mooney_rivlin",)),
-        "loss_factor": ("viscosity", ("kelvin_voigt", "fractional", "constant_loss")),
-        "loss_frequency": ("viscosity", ("kelvin_voigt", "fractional", "constant_loss")),
-        "fractional_order": ("viscosity", ("fractional",)),
-        "prony_share": ("viscosity", ("prony",)),
-        "prony_time": ("viscosity", ("prony",)),
-    },
-}
 
 
 def model_facts() -> list[dict[str, Any]]:
@@ -283,9 +268,8 @@ def is_folded(key: Key) -> bool:
 
 def condition_of(key: Key) -> dict[str, object] | None:
     """Return the choice with which a key has an effect: group, name and values; None: always."""
-    entry = CONDITIONS.get(key.owner or key.group, {}).get(key.name)
-    if entry is None:
+    if not key.needs:
         return None
-    name, values = entry
+    name, *values = key.needs
     group = next(item.group for item in KEYS if item.owner == key.owner and item.name == name)
-    return {"group": group, "name": name, "values": list(values)}
+    return {"group": group, "name": name, "values": values}

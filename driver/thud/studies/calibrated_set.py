@@ -13,7 +13,8 @@ import numpy as np
 from thud.base._schema import STANDARD_BALL, FiniteElement, ModalBall
 from thud.base.checks import refuse, require_kind
 from thud.case.case import Case, check_case
-from thud.case.keys import value_in
+from thud.case.keys import find_key, key_owners, value_in, with_values
+from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.impact.impact import Impact
 from thud.level.assessment import Verdict, assess_levels
@@ -40,15 +41,6 @@ SAMPLES = 256
 _SEED = 0
 # Maximum fraction of drops without results.
 _MAX_FAILED = 0.1
-# Keys that a damping law of elements fixes: it does not use them, or the sets are of another law.
-_FIXED = {
-    "none": ("loss_factor", "fractional_order"),
-    "kelvin_voigt": ("fractional_order",),
-    "constant_loss": ("loss_factor", "fractional_order"),
-    "prony": ("loss_factor", "fractional_order"),
-}
-# Damping law of the sets of the modal ball.
-_LAW = "rising"
 _CALIBRATION = "that the standard ball conforms is put in by the calibration, not found"
 # Relative differences of values that do not vary.
 _ROUNDING = 1e-9
@@ -93,17 +85,20 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
     require_kind("case", case, Case | Impact)
     if isinstance(case, Impact):
         case = case.case
+    if case.model is None:
+        refuse("&model is missing", "a case with a source model")
     check_case(case)
     stated = stated_unknowns(case)
-    sets = calibrated_set(case.model.name if case.model else "")
+    sets = calibrated_set(case.model.name)
     if not sets and not stated:
         models = ", ".join(repr(model.name) for model in (ModalBall, FiniteElement))
         refuse(
             "nothing is known to vary with this source model",
             f"&unknowns with key, low, high and reason, or model = {models}",
         )
-    varied, fixed = _varied_set(case, sets)
-    case = _calibrated_mesh(blocked_case(case, stated).resolved())
+    alone = blocked_case(case, stated)
+    varied, fixed = _varied_set(alone, sets)
+    case = _calibrated_mesh(alone.resolved())
     if stated:
         _require_effects(case, stated)
         varied = _samples(case, varied, stated)
@@ -119,6 +114,7 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
         "probability: Wilson interval (95 %)",
         f"not known: {', '.join(columns)}",
         *map(str, stated),
+        *compute(with_values(alone, {key: float(x[0]) for key, x in columns.items()})).warnings,
         f"fixed by the case: {', '.join(fixed)}" if fixed else "",
         _CALIBRATION if sets else "",
     )
@@ -130,9 +126,8 @@ def _varied_set(case: Case, sets: Mapping[str, Values]) -> tuple[Columns, tuple[
     model, result = case.model, dict(sets)
     if not (sets and model):
         return result, ()
-    stated = {key for key in sets if _is_stated(case, key)}
-    stated |= set(_FIXED.get(getattr(model, "viscosity", ""), ()))
-    if _is_stated(case, "loss_frequency") or getattr(model, "damping_law", _LAW) != _LAW:
+    stated = {key for key in sets if _is_stated(case, key) or _is_of_other_law(case, key)}
+    if _is_stated(case, "loss_frequency"):
         stated.add("loss_factor")
     if "youngs_modulus" in stated and case.ball.youngs_modulus:
         ratio = case.ball.youngs_modulus / STANDARD_BALL[model.name, "youngs_modulus"]
@@ -143,6 +138,12 @@ def _varied_set(case: Case, sets: Mapping[str, Values]) -> tuple[Columns, tuple[
 
 def _is_stated(case: Case, key: str) -> bool:
     return getattr(case.model, key, getattr(case.ball, key, None)) is not None
+
+
+def _is_of_other_law(case: Case, key: str) -> bool:
+    """Return whether the case has another damping law than that whose key the sets have."""
+    entry, _ = find_key(key, key_owners(case))
+    return bool(entry.needs) and getattr(case.model, entry.needs[0]) != entry.needs[1]
 
 
 def _calibrated_mesh(case: Case) -> Case:

@@ -2,7 +2,7 @@
 module thud_case_text
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, get_full_key, is_stated, &
-      new_case, set_floor_air, set_standard_modulus
+      is_used, new_case, set_floor_air, set_standard_modulus
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
@@ -121,7 +121,8 @@ contains
       character(len=:), allocatable :: where
       integer :: i
 
-      allocate (fields, source=get_active_fields(case))
+      allocate (fields, source=get_fields(case))
+      fields = pack(fields, is_used(case, fields))
       do i = 1, size(groups)
          if (any(fields%group == groups(i)%name)) cycle
          where = 'with &modes alone'
@@ -216,8 +217,8 @@ contains
       once = pack(texts, first)
    end function distinct
 
-   !> The input as the text of a namelist file; reading it gives the same case. Values of the standard ball for keys that the
-   !> case does not state are comments.
+   !> The input as the text of a namelist file; reading it gives the same case. Values of the standard ball for keys
+   !> with an effect that the case does not state are comments.
    subroutine get_case_text(case, text)
       type(case_type), intent(in), target :: case
       character(len=:), allocatable, intent(out) :: text
@@ -227,6 +228,7 @@ contains
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
+      fields = pack(fields, is_stated(case, fields) .or. [(fields(i)%has_effect(fields), i=1, size(fields))])
       text = '! thud: the full input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline

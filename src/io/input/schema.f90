@@ -147,7 +147,7 @@ contains
       text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
          //text_value(field%key)//', "kind": '//text_value(field%get_kind())//', "unit": '//text_value(field%unit) &
          //', "default": '//value//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
-         //text_value(field%meaning)
+         //text_value(field%meaning)//', "needs": '//list_of(pack(field%needs, field%needs /= ''))
       if (field%range /= '') then
          interval = new_interval(field%range)
          text = text//', "lower": '//end_value(interval%lower, interval%lower_expression)//', "upper": ' &

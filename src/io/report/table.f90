@@ -1,7 +1,7 @@
 !> Results as tables on the screen.
 module thud_table
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, get_active_fields, get_model_number, is_stated
+   use thud_case, only: case_type, get_model_number, get_unstated_fields
    use thud_compression, only: compression_type
    use thud_compute, only: assessment_type, get_assessed_force
    use thud_error, only: error_type
@@ -136,8 +136,7 @@ contains
 
       lines = ''
       if (case%left_out /= '') lines = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
-      allocate (fields, source=get_active_fields(case))
-      fields = pack(fields, .not. is_stated(case, fields))
+      allocate (fields, source=get_unstated_fields(case))
       ! Without a wall the modulus has no effect.
       if (.not. case%models(get_model_number(case))%model%get_standard_modulus() > 0.0_wp) fields = fields(:0)
       if (size(fields) > 0) lines = lines//'  Not stated, so of the standard ball:'

@@ -6,7 +6,7 @@ module thud_material
    use thud_field, only: field_type, list_type, name_length
    use thud_fractional_loss, only: new_fractional_loss
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, real_field
+   use thud_new_field, only: choice_field, list_field, only_with, real_field
    use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
    use thud_text, only: to_text
    implicit none (type, external)
@@ -64,26 +64,29 @@ contains
       type(material_options_type), intent(in), target :: options
       !> One field per component: [9].
       type(field_type), allocatable :: fields(:)
+      ! Laws with losses.
+      character(len=*), parameter :: lossy(4) = [character(len=13) :: 'fractional', 'kelvin_voigt', 'constant_loss', 'prony']
 
       fields = [ &
          choice_field('law', options%law, 'law of elasticity', &
          [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
-         real_field('mooney_share', options%mooney_share, '', &
-         'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]'), &
+         only_with('law', ['mooney_rivlin'], [real_field('mooney_share', options%mooney_share, '', &
+         'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]')]), &
          real_field('bulk_ratio', options%bulk_ratio, '', &
          "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
+         only_with('viscosity', lossy(:3), [ &
          real_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
-         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', is_calibrated=.true.), &
-         real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', is_calibrated=.true.), &
-         real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', is_calibrated=.true.), &
-         list_field('prony_share', options%prony_share, '', &
+         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', is_calibrated=.true.)]), &
+         only_with('viscosity', lossy, [real_field('loss_frequency', options%loss_frequency, 'Hz', &
+         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', is_calibrated=.true.)]), &
+         only_with('viscosity', lossy(:1), [real_field('fractional_order', options%fractional_order, '', &
+         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', is_calibrated=.true.)]), &
+         only_with('viscosity', lossy(4:), [list_field('prony_share', options%prony_share, '', &
          'moduli of the branches divided by the long-term modulus, for prony', '[0, 1000]'), &
          list_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &
-         '(0, 1000]')]
+         '(0, 1000]')])]
    end function get_material_fields
 
    !> Returns an error if options do not fit each other, or if the model cannot take the ball.

@@ -6,7 +6,7 @@ module thud_modal_ball_options
    use thud_field, only: field_type, list_type, name_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, integer_field, list_field, logical_field, real_field
+   use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
    use thud_prony, only: check_fractional_loss
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
@@ -121,13 +121,13 @@ contains
          'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
          choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
          [character(len=10) :: 'constant', 'rising', 'fractional']), &
-         real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
-         '[0, 1.9]', is_calibrated=.true.), &
-         real_field('loss_frequency', options%loss_frequency, 'Hz', &
+         only_with('damping_law', ['rising    ', 'fractional', 'constant  '], [real_field('loss_factor', &
+         options%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', is_calibrated=.true.)]), &
+         only_with('damping_law', ['rising    ', 'fractional'], [real_field('loss_frequency', options%loss_frequency, 'Hz', &
          'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]', &
-         is_calibrated=.true.), &
-         real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, for fractional; 1: as rising', '(0, 1]'), &
+         is_calibrated=.true.)]), &
+         only_with('damping_law', ['fractional'], [real_field('fractional_order', options%fractional_order, '', &
+         'order of the derivative, for fractional; 1: as rising', '(0, 1]')]), &
          logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists volume changes'), &
          logical_field('contact_gravity', options%contact_gravity, 'gravity acts also during the contact'), &
          choice_field('floor_friction', options%floor_friction, 'friction of the floor: none or infinite (sticking)', &
