@@ -27,7 +27,7 @@ module thud_joist_floor
       real(wp) :: spacing = 0.4_wp
       !> Width and height of a joist, m; its density, kg/m3; its modulus of elasticity, Pa.
       real(wp) :: joist_width = 0.06_wp, joist_height = 0.22_wp, joist_density = 420.0_wp, joist_modulus = 1.1e10_wp
-      !> Fraction of the full composite action of sheathing and joists: an estimate for screwed chipboard.
+      !> Factor gamma of the connection of sheathing and joists over the span: an estimate for screwed chipboard.
       real(wp) :: connection = 0.1_wp
       !> Loss factor including that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
@@ -61,7 +61,7 @@ contains
          real_field('joist_density', options%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
          real_field('joist_modulus', options%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
          real_field('connection', options%connection, '', &
-         'composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
+         'composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
          real_field('loss_factor', options%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          options%get_source_fields(), &
@@ -83,14 +83,21 @@ contains
       base%stiffness = new_orthotropic(plate_type(length=options%length, width=options%width, &
          thickness=options%sheathing_thickness, density=options%sheathing_density, &
          wave_speed=sqrt(options%sheathing_modulus/options%sheathing_density), loss_factor=options%loss_factor))
-      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height)
+      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
+         arm => (options%joist_height + options%sheathing_thickness)/2)
          joists%position = get_positions(options)
-         joists%bending = get_joist_stiffness(options)
+         joists%bending = e*b*h**3/12
+         call get_composite(options, joists%composite, joists%slip)
          ! Shear coefficient of a rectangle: 5/6.
          joists%shear = 5*shear_ratio*e*b*h/6
          joists%torsion = shear_ratio*e*get_torsion_constant(b, h)
          joists%mass = options%joist_density*b*h
          joists%inertia = joists%mass*(b**2 + h**2)/12
+         ! A free joist swings about the sheathing, and bends sideways where it twists; a subceiling holds it.
+         if (.not. options%has_subceiling()) then
+            joists%inertia = joists%inertia + joists%mass*arm**2
+            joists%warping = e*h*b**3/12*arm**2
+         end if
       end associate
       joists%loss_factor = options%loss_factor
       allocate (base%stiffness%ribs, source=joists)
@@ -137,38 +144,38 @@ contains
       nearest = values(minloc(abs(values - value), dim=1))
    end function get_nearest
 
-   !> Bending stiffness of a joist with the part of the sheathing that acts with it, without the bending of the sheathing
-   !> itself, N m2 (EN 1995-1-1 annex B, equations B.1 to B.6).
-   pure function get_joist_stiffness(options) result(stiffness)
+   !> Bending stiffness that the sheathing adds to a joist, without that of its own bending, and its slip
+   !> (EN 1995-1-1 annex B: a deflection with the wavenumber k has gamma = 1/(1 + E A k**2/K) with the sheathing's axial
+   !> stiffness E A and the slip modulus K per length).
+   pure subroutine get_composite(options, composite, slip)
       class(joist_floor_type), intent(in) :: options
-      real(wp) :: stiffness
-      real(wp) :: sheathing_axial, joist_axial, eccentricity, joist_offset
+      !> Bending stiffness without slip, N m2, and slip by shear force, 1/N.
+      real(wp), intent(out) :: composite, slip
+      real(wp) :: sheathing, joist, arm
+      ! Loose sheathing slips freely.
+      real(wp), parameter :: loose = 1.0e-15_wp
 
-      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
-         t => options%sheathing_thickness, a => options%spacing)
-         ! Axial stiffness, N, of the connected fraction of the sheathing and of a joist; distance of the joist's axis from
-         ! the neutral axis, m.
-         sheathing_axial = options%connection*options%sheathing_modulus*t*a
-         joist_axial = e*b*h
-         eccentricity = (h + t)/2
-         joist_offset = sheathing_axial*eccentricity/(sheathing_axial + joist_axial)
-         stiffness = e*b*h**3/12 + sheathing_axial*(eccentricity - joist_offset)**2 + joist_axial*joist_offset**2
-      end associate
-   end function get_joist_stiffness
+      sheathing = options%sheathing_modulus*options%sheathing_thickness*options%spacing
+      joist = options%joist_modulus*options%joist_width*options%joist_height
+      arm = (options%joist_height + options%sheathing_thickness)/2
+      composite = arm**2*sheathing*joist/(sheathing + joist)
+      slip = (1/max(options%connection, loose) - 1)/(sheathing*arm**2)*(options%length/pi)**2
+   end subroutine get_composite
 
    !> The orthotropic plate with smeared joists, as thick as the sheathing.
    !>
-   !> The bending stiffness along the joists is that of sheathing and joists, across them B' of the sheathing; H = B' + G J
-   !> of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
+   !> The bending stiffness along the joists is that of sheathing and joists over the span, across them B' of the sheathing;
+   !> H = B' + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
    pure function get_smeared(options) result(plate)
       class(joist_floor_type), intent(in) :: options
       type(plate_type) :: plate
-      real(wp) :: across, along, torsion, mass
+      real(wp) :: across, along, torsion, mass, composite, slip
 
+      call get_composite(options, composite, slip)
       across = get_sheathing_stiffness(options)
       associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
          t => options%sheathing_thickness, a => options%spacing)
-         along = across + get_joist_stiffness(options)/a
+         along = across + (e*b*h**3/12 + composite/(1 + slip*composite*(pi/options%length)**2))/a
          torsion = across + shear_ratio*e*get_torsion_constant(b, h)/(2*a)
          mass = options%sheathing_density*t + options%joist_density*b*h/a
       end associate

@@ -60,7 +60,8 @@ class JoistFloor:
 
     Joists run along x, the length; `sides` are the edges y = 0 and y = width, parallel to them. The
     bending stiffness of the sheathing is E t**3/12, whatever its Poisson ratio, which matters at
-    free edges only. `shear` makes the joists Timoshenko beams.
+    free edges only. `shear` makes the joists Timoshenko beams. Joists that are not `held` below rotate
+    about the sheathing, and bend sideways.
     """
 
     length: float = 4.0
@@ -74,6 +75,7 @@ class JoistFloor:
     joist_density: float = 420.0
     joist_modulus: float = 1.1e10
     connection: float = 0.1
+    held: bool = False
     loss_factor: float = 0.05
     poisson_ratio: float = 0.3
     shear: bool = False
@@ -118,28 +120,32 @@ def get_torsion_constant(width: float, height: float) -> float:
 
 
 def get_ribs(floor: JoistFloor) -> list[Rib]:
-    """Return the joists, with the connected fraction of the sheathing, as beams.
+    """Return the joists, with the sheathing as a flange that slips, as beams.
 
-    E I gains what the couple of the axial forces in sheathing and joist adds (the gamma method of
-    EN 1995-1-1 annex B); the polar moment of inertia is that about the axis of the joist.
+    The axial forces of sheathing and joist, N = E A u' with one u for both, are a couple that
+    springs of the connection load by the slip u - arm w' (Newmark); `connection` is the fraction of
+    E A that remains of the sheathing for one half-wave over the length.
     """
     area = floor.joist_width * floor.joist_height
-    axial = floor.joist_modulus * area
-    connected = (
-        floor.connection * floor.sheathing_modulus * floor.sheathing_thickness * floor.spacing
-    )
+    joist = floor.joist_modulus * area
+    sheathing = floor.sheathing_modulus * floor.sheathing_thickness * floor.spacing
     arm = (floor.joist_height + floor.sheathing_thickness) / 2
-    bending = axial * floor.joist_height**2 / 12 + arm**2 * axial * connected / (axial + connected)
+    flange = arm**2 / (1 / joist + 1 / sheathing)
+    loose = 1 / floor.connection - 1 if floor.connection else math.inf
+    spring = arm**2 * sheathing * (math.pi / floor.length) ** 2 / loose if loose else math.inf
     shear_modulus = floor.joist_modulus / 16
-    inertia = floor.joist_density * area / 12
+    mass = floor.joist_density * area
+    free = arm**2 * (not floor.held)
     return [
         Rib(
-            along="x", at=float(y), bending=bending,
+            along="x", at=float(y), bending=joist * floor.joist_height**2 / 12,
             torsion=shear_modulus * get_torsion_constant(floor.joist_width, floor.joist_height),
-            mass=floor.joist_density * area,
-            torsional_inertia=inertia * (floor.joist_width**2 + floor.joist_height**2),
+            warping=free * joist * floor.joist_width**2 / 12, flange=flange, spring=spring,
+            mass=mass,
+            torsional_inertia=mass
+            * ((floor.joist_width**2 + floor.joist_height**2) / 12 + free),
             shear_stiffness=5 / 6 * shear_modulus * area if floor.shear else math.inf,
-            rotary_inertia=inertia * floor.joist_height**2, loss_factor=floor.loss_factor,
+            rotary_inertia=mass * floor.joist_height**2 / 12, loss_factor=floor.loss_factor,
         )
         for y in get_joists(floor)
     ]  # fmt: skip
@@ -175,12 +181,15 @@ def to_elements(
 def _rib_dynamics(rib: Rib, k: Array, omega: Array, *, damped: bool) -> tuple[Array, Array]:
     """Return dynamic stiffnesses per length against W and its slope."""
     loss = 1 + 1j * rib.loss_factor * damped
-    twist = loss * rib.torsion * k**2 - rib.torsional_inertia * omega**2
+    twist = loss * (rib.torsion * k**2 + rib.warping * k**4) - rib.torsional_inertia * omega**2
+    bending = rib.bending
+    if rib.flange and rib.spring:
+        bending = bending + 1 / (1 / rib.flange + k**2 / rib.spring)
     if math.isinf(rib.shear_stiffness):
-        return loss * rib.bending * k**4 - rib.mass * omega**2, twist
+        return loss * bending * k**4 - rib.mass * omega**2, twist
     shear = loss * rib.shear_stiffness
     # The rotation of the sections is eliminated.
-    rotation = loss * rib.bending * k**2 + shear - rib.rotary_inertia * omega**2
+    rotation = loss * bending * k**2 + shear - rib.rotary_inertia * omega**2
     bend = shear * k**2 - (shear * k) ** 2 / rotation - rib.mass * omega**2
     return bend, twist
 

@@ -90,7 +90,7 @@ def isotropic_plate(
 
 @dataclass(frozen=True)
 class Rib:
-    """A beam along a grid line, joined to the plate in deflection and twist, of no eccentricity.
+    """A beam along a grid line, joined to the plate in deflection and twist.
 
     Attributes
     ----------
@@ -100,6 +100,11 @@ class Rib:
         Its coordinate in the other direction, m: a line of the grid.
     bending, torsion : float
         E I and G J, N m2.
+    warping : float
+        Stiffness against the curvature of the twist, N m4: of lateral bending at a distance.
+    flange, spring : float
+        Bending stiffness of a flange in N m2 that follows the rotation by a spring, N; the spring
+        may be infinite.
     mass, torsional_inertia : float
         Mass, kg/m, and polar moment of inertia, kg m, per length.
     shear_stiffness : float
@@ -116,6 +121,9 @@ class Rib:
     at: float
     bending: float
     torsion: float = 0.0
+    warping: float = 0.0
+    flange: float = 0.0
+    spring: float = 0.0
     mass: float = 0.0
     torsional_inertia: float = 0.0
     shear_stiffness: float = INFINITE
@@ -232,8 +240,10 @@ class _Assembly:
         self.n_plate = 4 * len(x) * len(y)
         self.total = self.n_plate * len(plates)
         self.total += sum(
-            self.n_rotation(rib) for rib in ribs if math.isfinite(rib.shear_stiffness)
-        )
+            self.n_rotation(rib) for rib in ribs
+            for spring in (rib.shear_stiffness, rib.spring * bool(rib.flange))
+            if 0 < spring < math.inf
+        )  # fmt: skip
         self.next_rotation = self.n_plate * len(plates)
         self.stiffness = sparse.csr_array((self.total, self.total), dtype=complex)
         self.mass = sparse.csr_array((self.total, self.total))
@@ -305,21 +315,35 @@ class _Assembly:
     def add_rib(self, rib: Rib) -> None:
         product, loss = self.products[rib.along], 1 + 1j * rib.loss_factor
         self.stiffness += loss * rib.torsion * self.on_line(rib, 1, product[1, 1])
+        self.stiffness += loss * rib.warping * self.on_line(rib, 1, product[2, 2])
         self.mass += rib.mass * self.on_line(rib, 0, product[0, 0])
         self.mass += rib.torsional_inertia * self.on_line(rib, 1, product[0, 0])
-        if math.isinf(rib.shear_stiffness):
-            self.stiffness += loss * rib.bending * self.on_line(rib, 0, product[2, 2])
-        else:
-            self.add_shear(rib)
+        x, weight = gauss_points(self.nodes[rib.along])
+        at, scale = np.full(len(x), rib.at), sparse.diags_array(weight * loss)
+        # Slope and curvature at the Gauss points.
+        slope, rate = (
+            self.row(x, at, rib.plate, (order, 0))
+            if rib.along == "x"
+            else self.row(at, x, rib.plate, (0, order))
+            for order in (1, 2)
+        )
+        if math.isfinite(rib.shear_stiffness):
+            slope, rate = self.add_rotation(rib, rib.shear_stiffness, slope, scale)
+            self.mass += rib.rotary_inertia * (slope.T @ sparse.diags_array(weight) @ slope)
+        self.stiffness += rib.bending * (rate.T @ scale @ rate)
+        if rib.flange and 0 < rib.spring < math.inf:
+            _, rate = self.add_rotation(rib, rib.spring, slope, scale)
+        if rib.spring:
+            self.stiffness += rib.flange * (rate.T @ scale @ rate)
 
-    def add_shear(self, rib: Rib) -> None:
-        """Add bending, shear and rotary inertia of a Timoshenko beam.
+    def add_rotation(self, rib: Rib, spring: float, slope: Any, scale: Any) -> tuple[Any, Any]:  # noqa: ANN401
+        """Add a rotation that follows a slope by a spring; return its values and derivatives.
 
-        The rotations of its sections are continuous parabolas, which contain the slopes of the
-        cubics, so that a stiff shear area does not lock.
+        It is a continuous parabola in each element; those contain the slopes of the cubics, so that
+        a stiff spring does not lock.
         """
         nodes = self.nodes[rib.along]
-        x, weight = gauss_points(nodes)
+        x, _ = gauss_points(nodes)
         left = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
         h = np.diff(nodes)[left]
         t = (x - nodes[left]) / h
@@ -333,20 +357,14 @@ class _Assembly:
             )
             for value in (values, slopes)
         )
-        at = np.full(len(x), rib.at)
-        if rib.along == "x":
-            strain = self.row(x, at, rib.plate, (1, 0)) - rotation
-        else:
-            strain = self.row(at, x, rib.plate, (0, 1)) - rotation
-        scale, loss = sparse.diags_array(weight), 1 + 1j * rib.loss_factor
-        self.stiffness += loss * rib.bending * (rate.T @ scale @ rate)
-        self.stiffness += loss * rib.shear_stiffness * (strain.T @ scale @ strain)
-        self.mass += rib.rotary_inertia * (rotation.T @ scale @ rotation)
+        strain = slope - rotation
+        self.stiffness += spring * (strain.T @ scale @ strain)
         edges = self.plates[rib.plate].edges
         ends = self.next_rotation, self.next_rotation + self.n_rotation(rib) - 1
         for end, edge in zip(ends, edges[:2] if rib.along == "x" else edges[2:], strict=True):
             self.held[end] = math.isinf(edge.rotation)
         self.next_rotation += self.n_rotation(rib)
+        return rotation, rate
 
     def add_layer(self, layer: Layer) -> None:
         area = sparse.kron(self.products["x"][0, 0], self.products["y"][0, 0])

@@ -99,14 +99,14 @@ def test_edges_have_the_frequencies_of_finite_elements(
 
 
 def test_joists_have_the_frequencies_of_an_exact_solution(oracle: Callable[..., None]) -> None:
-    """Discrete ribs with bending, shear and torsion on sheathing."""
-    expected = get_frequencies(JoistFloor(shear=True), 20)[0]
-    found = frequencies_of(thud.JoistFloor(), 200.0)[:20]
+    """Discrete ribs with bending, shear, torsion, warping and slip on sheathing."""
+    expected = get_frequencies(JoistFloor(shear=True), 150, maximum=400.0)[0]
+    found = np.sort(frequencies_of(thud.JoistFloor(), 480.0))[:150]
     oracle(
-        "20 natural frequencies of a joist floor by an exact solution",
+        "150 natural frequencies of a joist floor by an exact solution",
         "independent code",
         found / expected - 1,
-        1e-2,
+        1.5e-2,
     )
 
 
@@ -194,7 +194,7 @@ def test_subceiling_below_joists_has_the_modes_and_the_radiation_of_finite_eleme
 ) -> None:
     """A second plate on line springs and air, with complex stiffnesses solved directly."""
     sides, strike = (2.6, 2.1), (1.1, 0.85)
-    exact = JoistFloor(length=sides[0], width=sides[1], shear=True)
+    exact = JoistFloor(length=sides[0], width=sides[1], shear=True, held=True)
     board = isotropic_plate(2.5e9 * 0.0125**3 / 12, 0.2, 9.0, loss_factor=0.02)
     below = Subceiling(board, Layer(1.2 * 343**2 / 0.25, 0.3), channel=1e6, channel_loss=0.1)
     system = to_elements(exact, 0.1, points=[strike], below=below)

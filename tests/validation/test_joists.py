@@ -42,13 +42,19 @@ def test_ribs_have_closed_sections() -> None:
     # Timoshenko and Goodier, Theory of elasticity, article 109.
     assert get_torsion_constant(1, 1) == pytest.approx(0.1406, abs=5e-5)
     assert get_torsion_constant(2, 1) == pytest.approx(0.457, abs=5e-4)
-    loose, glued = (get_ribs(replace(FLOOR, connection=c))[0].bending for c in (0, 1))
-    assert loose == pytest.approx(1.1e10 * 0.06 * 0.22**3 / 12)
-    # About the common neutral axis.
-    sections = [(1.1e10 * 0.06 * 0.22, 0.0), (3e9 * 0.022 * 0.4, 0.121)]
-    axis = sum(ea * z for ea, z in sections) / sum(ea for ea, _ in sections)
-    expected = loose + sum(ea * (z - axis) ** 2 for ea, z in sections)
-    assert glued == pytest.approx(expected, rel=1e-12)
+    loose, screwed, glued = (get_ribs(replace(FLOOR, connection=c))[0] for c in (0, 0.1, 1))
+    assert loose.bending == pytest.approx(1.1e10 * 0.06 * 0.22**3 / 12)
+    assert loose.spring == 0
+    # About the common neutral axis; over the span EN 1995-1-1 annex B weakens the sheathing.
+    k = math.pi / 4
+    for part, added in (
+        (1, glued.flange),
+        (0.1, 1 / (1 / screwed.flange + k**2 / screwed.spring)),
+    ):
+        sections = [(1.1e10 * 0.06 * 0.22, 0.0), (part * 3e9 * 0.022 * 0.4, 0.121)]
+        axis = sum(ea * z for ea, z in sections) / sum(ea for ea, _ in sections)
+        expected = sum(ea * (z - axis) ** 2 for ea, z in sections)
+        assert added == pytest.approx(expected, rel=1e-12)
 
 
 def test_plate_without_joists_has_the_closed_form() -> None:
@@ -118,7 +124,7 @@ def test_conductance_between_joists_becomes_that_of_the_sheathing() -> None:
     assert 10 * np.log10(found / sheathing) == pytest.approx(0, abs=0.5)
     # The joists are stiffer and heavier.
     ratio = get_conductance(FLOOR, ON, [250, 500]) / get_conductance(FLOOR, BETWEEN, [250, 500])
-    assert (ratio < 0.15).all()
+    assert (ratio < 0.2).all()
 
 
 def test_radiated_energy_of_a_plate_without_joists_is_that_of_its_modes() -> None:

@@ -839,8 +839,8 @@ class JoistFloor(RectangularFloor):
     joist_modulus : float
         Modulus of elasticity of the joists, Pa; 1e+07 <= joist_modulus <= 1e+12.
     connection : float
-        Composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B; 0 <=
-        connection <= 1.
+        Composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1
+        annex B; 0 <= connection <= 1.
     loss_factor : float
         Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
     source_on : str
@@ -1375,7 +1375,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_height", "real", "m", "height of a joist", (), 0.01, 2.0),
     Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),

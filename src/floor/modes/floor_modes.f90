@@ -2,7 +2,7 @@
 module thud_floor_modes
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_function_set, only: get_finest_wavenumber, get_highest_wavenumber
+   use thud_function_set, only: get_highest_wavenumber
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_mode_mixing, only: diagonalize
@@ -196,7 +196,6 @@ contains
       real(wp), allocatable :: value(:, :), gain(:)
       logical, allocatable :: individual(:)
       real(wp) :: compliance, corner
-      real(wp) :: lacking(2)
       logical :: has_all
 
       ! Sums of functions are stopped at a frequency, or have the compliance of all their modes.
@@ -217,10 +216,8 @@ contains
          if (any(abs(source - point) >= epsilon(1.0_wp))) then
             continue
          else if (has_all) then
-            lacking = get_truncated_compliance(modes%stack%plate(1), get_highest_wavenumber([set%x, set%y]), &
-               get_finest_wavenumber(set%y), width*source(2))
-            compliance = compliance + lacking(1)
-            corner = corner*(1 - lacking(2)/compliance)
+            compliance = compliance + get_truncated_compliance(modes%stack%plate(1), &
+               get_highest_wavenumber([set%x, set%y]), width*source(2))
          else
             compliance = compliance + 2/(pi*resistance*modes%sum_limit)
          end if

@@ -8,7 +8,7 @@ module thud_function_set
    implicit none (type, external)
    private
 
-   public :: cosines, function_set_type, get_finest_wavenumber, get_functions, get_highest_wavenumber
+   public :: cosines, function_set_type, get_functions, get_highest_wavenumber
    public :: get_overlap, get_quadrature, new_polynomials, new_splines, sines
 
    !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
@@ -32,9 +32,8 @@ module thud_function_set
       !> Nodes of splines, m: [count], and second derivatives there of the splines that are 1 at one node, 1/m2:
       !> [count, count].
       real(wp), allocatable :: node(:), curvature(:, :)
-      !> Wavenumber up to which polynomials that are modes of a beam are complete, and up to which they resolve the moments
-      !> of ribs, 1/m.
-      real(wp) :: complete = 0.0_wp, finest = 0.0_wp
+      !> Wavenumber up to which polynomials that are modes of a beam are complete, 1/m.
+      real(wp) :: complete = 0.0_wp
    end type function_set_type
 
 contains
@@ -47,14 +46,6 @@ contains
       wavenumber = set%complete
       if (set%kind == sines) wavenumber = (set%count + 0.5_wp)*pi/set%length
    end function get_highest_wavenumber
-
-   !> Wavenumber up to which sines, or modes of a beam, resolve the moments of ribs, 1/m.
-   elemental function get_finest_wavenumber(set) result(wavenumber)
-      type(function_set_type), intent(in) :: set
-      real(wp) :: wavenumber
-
-      wavenumber = max(get_highest_wavenumber(set), set%finest)
-   end function get_finest_wavenumber
 
    !> Polynomials up to a degree that fulfill constraints: at each position, the derivative of the given order is 0.
    !>

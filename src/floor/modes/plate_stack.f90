@@ -9,8 +9,7 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
-   public :: get_counts, get_degree, get_resolved_frequency, get_resolved_part, get_twisting_ribs, has_sines, is_uncoupled
-   public :: with_rigid_edges
+   public :: get_counts, get_degree, get_resolved_frequency, get_resolved_part, has_sines, is_uncoupled, with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -29,9 +28,6 @@ module thud_plate_stack
    !> Longer side of the smallest part of a floor that represents it, m.
    real(wp), parameter :: min_part = 1.0_wp
 
-   !> Number of sines per rib, and in all, that resolve the curvature at ribs by themselves.
-   integer, parameter :: min_sines(2) = [8, 50]
-
    !> Springs along an edge of a plate.
    type :: edge_type
       !> Stiffness against deflection, N/m2, and against rotation, N, per length.
@@ -42,9 +38,11 @@ module thud_plate_stack
    type :: ribs_type
       !> Positions across the ribs, m: [n_rib].
       real(wp), allocatable :: position(:)
-      !> Stiffness of one rib in bending, N m2, in shear, N (0: rigid), and in torsion, N m2.
-      real(wp) :: bending = 0.0_wp, shear = 0.0_wp, torsion = 0.0_wp
-      !> Mass per length, kg/m, and its moment of inertia about the axis, kg m.
+      !> Stiffness of one rib in bending, N m2, in shear, N, in torsion, N m2, and in warping, N m4.
+      real(wp) :: bending = 0.0_wp, shear = 0.0_wp, torsion = 0.0_wp, warping = 0.0_wp
+      !> Bending stiffness that a flange without slip adds, N m2, and its slip by shear force, 1/N.
+      real(wp) :: composite = 0.0_wp, slip = 0.0_wp
+      !> Mass per length, kg/m, and its moment of inertia about the axis of rotation, kg m.
       real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
       real(wp) :: loss_factor = 0.0_wp
    end type ribs_type
@@ -129,13 +127,13 @@ contains
       end do
    contains
 
-      !> Number of functions of x and of y of a plate, with those for ribs: [2].
+      !> Number of functions of x and of y of a plate, with the rotations of ribs: [2].
       pure function get_all_counts(plate) result(n)
          type(orthotropic_type), intent(in) :: plate
          integer :: n(2)
 
          n = get_counts(stack, plate, frequency)
-         n(2) = n(2) + size(get_twisting_ribs(plate, n(2)))
+         if (allocated(plate%ribs)) n(2) = n(2) + size(plate%ribs%position)
       end function get_all_counts
    end function get_resolved_frequency
 
@@ -263,22 +261,6 @@ contains
          end if
       end do
    end function get_counts
-
-   !> Positions across the width of ribs that resist rotation, m: [n_rib]. There are none if the plate yields in shear, or if
-   !> sines are much shorter than the distance of the ribs.
-   pure function get_twisting_ribs(plate, n) result(position)
-      type(orthotropic_type), intent(in) :: plate
-      !> Number of functions of y.
-      integer, intent(in) :: n
-      real(wp), allocatable :: position(:)
-
-      allocate (position(0))
-      if (.not. allocated(plate%ribs) .or. maxval(plate%shear) > 0.0_wp) return
-      if (max(plate%ribs%torsion, plate%ribs%inertia) > 0.0_wp) position = plate%ribs%position
-      if (has_sines(plate, 2) .and. n >= max(min_sines(1)*size(position), min_sines(2))) then
-        position = position(:0)
-      end if
-   end function get_twisting_ribs
 
    !> Degree of the polynomials that resolve a wave: its Legendre coefficients end about there.
    elemental function get_degree(half) result(degree)

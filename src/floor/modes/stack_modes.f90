@@ -2,10 +2,11 @@
 !> rigid in shear (Mindlin) are static displacements.
 module thud_stack_modes
    use thud_constants, only: pi
-   use thud_function_set, only: cosines, function_set_type, get_functions, get_overlap, new_polynomials, sines
+   use thud_function_set, only: cosines, function_set_type, get_functions, get_highest_wavenumber, get_overlap, &
+      new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
-   use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, get_twisting_ribs, has_sines, &
+   use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, has_sines, &
       layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
       solve_ritz_system
@@ -13,9 +14,6 @@ module thud_stack_modes
    private
 
    public :: get_stack_modes
-
-   !> Number of half waves by which functions resolve the moments of ribs beyond those that are complete.
-   integer, parameter :: rib_half_waves = 40
 
    !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
    type :: plate_motion_type
@@ -95,9 +93,8 @@ contains
       real(wp), intent(in) :: frequency
       type(plate_motion_type) :: motion
       type(function_set_type) :: deflection(2), rotation(2)
-      real(wp), allocatable :: lines(:), twisting(:)
+      real(wp), allocatable :: lines(:)
       real(wp) :: sides(2)
-      integer :: n_rib
       integer :: n(2), degree(2)
       logical :: is_thin
       integer :: i
@@ -106,17 +103,13 @@ contains
       is_thin = .not. maxval(plate%shear) > 0.0_wp
       sides = [stack%length, stack%width]
       do i = 1, 2
-         twisting = spread(0.0_wp, 1, 0)
-         if (i == 2) twisting = get_twisting_ribs(plate, n(2))
-         n_rib = size(twisting)
-         if (has_sines(plate, i) .and. n_rib == 0) then
+         if (has_sines(plate, i)) then
             deflection(i) = function_set_type(sines, sides(i), n(i))
             rotation(i) = function_set_type(cosines, sides(i), n(i))
             cycle
          end if
          degree(i) = n(i)
-         ! What ribs add consists of shorter waves, too.
-         if (is_thin) degree(i) = get_degree((n(i) + merge(2, rib_half_waves, n_rib == 0))*pi/2)
+         if (is_thin) degree(i) = get_degree((n(i) + 2)*pi/2)
          lines = spread(0.0_wp, 1, 0)
          if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
          if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
@@ -127,8 +120,7 @@ contains
                   [spread(0, 1, size(fixed)), spread(1, 1, size(clamped))])
                rotation(i) = new_polynomials(sides(i), degree(i) + size(clamped), clamped, spread(0, 1, size(clamped)))
             end associate
-            if (is_thin) call keep_beam_modes(deflection(i), edge, merge(plate%along, plate%across, i == 1), &
-               n(i), twisting)
+            if (is_thin) call keep_beam_modes(deflection(i), edge, merge(plate%along, plate%across, i == 1), n(i))
          end associate
       end do
       motion%deflection = product_type(deflection(1), deflection(2))
@@ -138,9 +130,9 @@ contains
 
    !> Replaces polynomials by the lowest modes of a beam, which are far fewer for the same waves.
    !>
-   !> What the others would add under forces and moments at the ends, and under moments of ribs that resist torsion, is kept,
-   !> too: at free edges and at such ribs the curvature is not that of a beam, which its modes approach slowly.
-   subroutine keep_beam_modes(set, edge, bending, n, rib)
+   !> What the others would add under forces and moments at the ends is kept, too: at free edges the curvature is not that of
+   !> a beam, which its modes approach slowly.
+   subroutine keep_beam_modes(set, edge, bending, n)
       type(function_set_type), intent(inout) :: set
       !> Springs at both ends.
       type(edge_type), intent(in) :: edge(2)
@@ -148,8 +140,6 @@ contains
       real(wp), intent(in) :: bending
       !> Number of modes.
       integer, intent(in) :: n
-      !> Positions of ribs that resist torsion, m: [n_rib].
-      real(wp), intent(in) :: rib(:)
       real(wp), parameter :: unit(1, 1) = 1.0_wp
       type(ritz_system_type) :: system
       type(modes_type) :: modes
@@ -184,14 +174,11 @@ contains
          kept(j) = .true.
       end do
       set%complete = sqrt(maxval(omega, mask=kept)) + pi/(2*set%length)
-      set%finest = set%complete
-      if (size(rib) > 0) set%finest = set%complete + rib_half_waves*pi/set%length
       chosen = pack([(i, i=1, set%count)], kept)
       allocate (added(set%count, 0))
       do order = 0, 1
          call add_deflections(get_functions(set, [0.0_wp, set%length], order), order)
       end do
-      call add_deflections(get_functions(set, rib, 1), 1)
       added = matmul(set%coefficient, added)
       set%coefficient(:, :n) = set%coefficient(:, chosen)
       set%count = n + size(added, 2)
@@ -335,40 +322,59 @@ contains
       end associate
    end function get_point_matrix
 
-   !> Stiffness and mass of the ribs of a plate; their torsion follows the slope of its deflection.
+   !> Stiffness and mass of the ribs of a plate. They turn with torsion and warping, joined to the slope of the deflection by
+   !> the static stiffness pi B k of the waves shorter than those of the functions, which end at the wavenumber k: their
+   !> curvature jumps at ribs, which the functions approach slowly.
    subroutine add_ribs(system, plate, motion)
       type(ritz_system_type), intent(inout) :: system
       type(orthotropic_type), intent(in) :: plate
       type(plate_motion_type), intent(in) :: motion
+      real(wp), allocatable :: slope(:, :), unit(:, :)
+      real(wp) :: joint
+      integer :: turn
 
       if (.not. allocated(plate%ribs)) return
       associate (ribs => plate%ribs, w => motion%w, x => motion%deflection%x, y => motion%deflection%y)
-         associate (at_ribs => get_point_matrix(y, ribs%position, 0), slope => get_point_matrix(y, ribs%position, 1))
-            call add_stiffness(system, w, w, ribs%torsion, get_overlap(x, 1, x, 1), slope, ribs%loss_factor)
-            call add_mass(system, w, w, ribs%inertia, get_overlap(x, 0, x, 0), slope)
-            call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, &
-               ribs%loss_factor)
+         associate (at_ribs => get_point_matrix(y, ribs%position, 0), n => size(ribs%position), eta => ribs%loss_factor)
+            call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, eta)
             call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
+            if (.not. ribs%inertia > 0.0_wp) return
+            slope = matmul(transpose(get_functions(y, ribs%position, 1)), get_even_and_odd(n))
+            unit = matmul(transpose(get_even_and_odd(n)), get_even_and_odd(n))
+            joint = pi*plate%across*get_highest_wavenumber(y)
+            ! One function for the rotation of each rib.
+            call add_displacement(system, product_type(x, function_set_type(cosines, y%length, n)), turn)
+            call add_stiffness(system, turn, turn, ribs%torsion, get_overlap(x, 1, x, 1), unit, eta)
+            call add_stiffness(system, turn, turn, ribs%warping, get_overlap(x, 2, x, 2), unit, eta)
+            call add_mass(system, turn, turn, ribs%inertia, get_overlap(x, 0, x, 0), unit)
+            associate (one => get_overlap(x, 0, x, 0), loss => plate%loss_factor)
+               call add_stiffness(system, turn, turn, joint, one, unit, loss)
+               call add_stiffness(system, w, w, joint, one, matmul(slope, transpose(slope)), loss)
+               call add_stiffness(system, w, turn, -joint, one, slope, loss)
+            end associate
          end associate
       end associate
    end subroutine add_ribs
 
-   !> Stiffness of a rib over the functions of its deflection. With shear (Timoshenko), its rotation takes the values of
-   !> least energy.
+   !> Stiffness of a rib over the functions of its deflection. Its rotation (Timoshenko) and the slip of the flange take the
+   !> values of least energy.
    function get_beam_stiffness(ribs, deflection, rotation) result(stiffness)
       type(ribs_type), intent(in) :: ribs
       type(function_set_type), intent(in) :: deflection, rotation
       !> The stiffness, N/m times m: [deflection%count, deflection%count].
       real(wp) :: stiffness(deflection%count, deflection%count)
-      real(wp) :: rotated(rotation%count, rotation%count)
+      real(wp), dimension(rotation%count, rotation%count) :: rotated, unit, curved, slipping
       real(wp), dimension(rotation%count, deflection%count) :: coupling, followed
       integer :: info
 
-      if (.not. ribs%shear > 0.0_wp) then
-         stiffness = ribs%bending*get_overlap(deflection, 2, deflection, 2)
-         return
-      end if
-      rotated = ribs%bending*get_overlap(rotation, 1, rotation, 1) + ribs%shear*get_overlap(rotation, 0, rotation, 0)
+      unit = get_overlap(rotation, 0, rotation, 0)
+      curved = get_overlap(rotation, 1, rotation, 1)
+      rotated = ribs%bending*curved + ribs%shear*unit
+      ! The functions are orthonormal: of a sine, the flange adds k**2 composite/(1 + slip composite k**2).
+      slipping = unit + ribs%slip*ribs%composite*curved
+      curved = ribs%composite*curved
+      call dposv('U', rotation%count, rotation%count, slipping, rotation%count, curved, rotation%count, info)
+      rotated = rotated + curved
       coupling = ribs%shear*get_overlap(rotation, 0, deflection, 1)
       followed = coupling
       call dposv('U', rotation%count, deflection%count, rotated, rotation%count, followed, rotation%count, info)

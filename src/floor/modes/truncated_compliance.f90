@@ -27,40 +27,35 @@ module thud_truncated_compliance
 
 contains
 
-   !> The compliance at a point, and the part of it by moments of ribs, m/N: [2]. Longer waves have this part, which no short
-   !> wave carries away.
-   function get_truncated_compliance(plate, wavenumber, finest, y) result(compliance)
+   !> The compliance at a point, m/N.
+   function get_truncated_compliance(plate, wavenumber, y) result(compliance)
       !> A plate that is rigid in shear.
       type(orthotropic_type), intent(in) :: plate
       !> Wavenumbers along length and width up to which the functions are complete, 1/m: [2].
       real(wp), intent(in) :: wavenumber(2)
-      !> Wavenumber along the width up to which the moments of ribs are resolved, 1/m.
-      real(wp), intent(in) :: finest
       !> Coordinate of the point along the width, m.
       real(wp), intent(in) :: y
-      real(wp) :: compliance(2)
+      real(wp) :: compliance
       real(wp) :: no_position(0)
 
       associate (strip => strip_type(plate%along, plate%coupling + 2*plate%torsion, plate%across))
          if (allocated(plate%ribs)) then
-            compliance = get_compliance(strip, wavenumber, finest, plate%ribs, y)
+            compliance = get_compliance(strip, wavenumber, plate%ribs, y)
          else
-            compliance = get_compliance(strip, wavenumber, 1.0_wp, ribs_type(position=no_position), y)
+            compliance = get_compliance(strip, wavenumber, ribs_type(position=no_position), y)
          end if
       end associate
    end function get_truncated_compliance
 
-   !> The compliance with ribs, and the part of it by moments of ribs, m/N: [2].
-   function get_compliance(strip, wavenumber, finest, ribs, point) result(compliance)
+   !> The compliance with ribs, m/N.
+   function get_compliance(strip, wavenumber, ribs, point) result(compliance)
       type(strip_type), intent(in) :: strip
       !> Complete wavenumbers along and across the ribs, 1/m: [2].
       real(wp), intent(in) :: wavenumber(2)
-      !> Wavenumber across them up to which the moments of ribs are resolved, 1/m.
-      real(wp), intent(in) :: finest
       type(ribs_type), intent(in) :: ribs
       !> Coordinate of the point across the ribs, m.
       real(wp), intent(in) :: point
-      real(wp) :: compliance(2)
+      real(wp) :: compliance
       real(wp), allocatable :: along(:), weight(:), load(:), moment(:), position(:), distance(:, :)
       logical :: near(size(ribs%position))
       integer :: i
@@ -76,21 +71,19 @@ contains
       call get_quadrature(n_point, 0.0_wp, wavenumber(1), along, weight)
       do i = 1, n_point
          call get_line_loads(strip, ribs, along(i), distance, load, moment)
-         compliance = compliance + weight(i)/pi*[dot_product(load, &
-            matmul(get_short_deflection(strip, along(i), wavenumber(2), distance), load)), &
-            sum(moment**2)/(pi*strip%across*finest)]
+         compliance = compliance + weight(i)/pi*dot_product(load, &
+            matmul(get_short_deflection(strip, along(i), wavenumber(2), distance), load))
       end do
       ! Shorter ones: k = wavenumber/t.
       call get_quadrature(n_point, 0.0_wp, 1.0_wp, along, weight)
       do i = 1, n_point
          associate (k => wavenumber(1)/along(i))
             call get_line_loads(strip, ribs, k, distance, load, moment)
-            compliance(1) = compliance(1) + weight(i)*k/along(i)/pi &
+            compliance = compliance + weight(i)*k/along(i)/pi &
                *(dot_product(load, get_deflection(strip, k, distance(:, 1), 0)) &
                + dot_product(moment, get_deflection(strip, k, distance(2:, 1), 1)))
          end associate
       end do
-      compliance(1) = sum(compliance)
    end function get_compliance
 
    !> Loads on the plate: a unit force, and the reactions of the ribs.
@@ -111,8 +104,7 @@ contains
       allocate (load(n + 1), moment(n), source=0.0_wp)
       load(1) = 1.0_wp
       if (n == 0) return
-      beam = 1/(ribs%bending*k**4)
-      if (ribs%shear > 0.0_wp) beam = beam + 1/(ribs%shear*k**2)
+      beam = 1/((ribs%bending + ribs%composite/(1 + ribs%slip*ribs%composite*k**2))*k**4) + 1/(ribs%shear*k**2)
       associate (between => distance(2:, 2:), from_force => distance(2:, 1))
          matrix(:n, :n) = get_deflection(strip, k, between, 0)
          matrix(:n, n + 1:) = -get_deflection(strip, k, between, 1)
@@ -123,7 +115,7 @@ contains
       do i = 1, n
          matrix(i, i) = matrix(i, i) + beam
          ! Without torsion, nothing resists the slope: a compliance that is far above that of the plate.
-         matrix(n + i, n + i) = matrix(n + i, n + i) + 1/max(ribs%torsion*k**2, 1.0e-9_wp*strip%across*k)
+         matrix(n + i, n + i) = matrix(n + i, n + i) + 1/max(ribs%torsion*k**2 + ribs%warping*k**4, 1.0e-9_wp*strip%across*k)
       end do
       call dposv('U', 2*n, 1, matrix, 2*n, reaction, 2*n, info)
       if (info /= 0) return
