@@ -60,8 +60,8 @@ class JoistFloor:
 
     Joists run along x, the length; `sides` are the edges y = 0 and y = width, parallel to them. The
     bending stiffness of the sheathing is E t**3/12, whatever its Poisson ratio, which matters at
-    free edges only. `shear` makes the joists Timoshenko beams. Joists that are not `held` below rotate
-    about the sheathing, and bend sideways.
+    free edges only. `shear` makes the joists Timoshenko beams. Joists that are not `held` below
+    rotate about the sheathing, and bend sideways.
     """
 
     length: float = 4.0

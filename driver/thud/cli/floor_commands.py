@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base._schema import JoistFloor
 from thud.base.checks import refuse
 from thud.base.errors import PlausibilityWarning
 from thud.base.files import is_one_of, replace_file
@@ -135,8 +136,11 @@ def _floor_cases(
             add(case.name, path, case)
     for name in names:
         entry = construction(name)
-        add(entry.name, f"--construction {name}", entry.case(first))
+        case = entry.case(first)
+        add(entry.name, f"--construction {name}", case)
         chosen[entry.name] = entry
+        if isinstance(case.floor, JoistFloor):
+            print_notes([f"{entry.name}: joists span {case.floor.length:g} m"])
         if entry.note:
             print_notes([f"{entry.name}: {entry.note}"])
     if not cases:

@@ -105,7 +105,9 @@ class Construction(Displayed):
             Case whose ball, drop, model and room are used; by default the standard ball, and a room
             as large as the floor, 2.5 m high, with 0.5 s. The floor takes length and width of its
             room, or of its floor if the room does not state both or is in a corner of the floor,
-            unless the construction is not allowed with these.
+            unless the construction is not allowed with these. Joists span the length that the
+            construction states, else that of the joists of `source`, else the shorter side; the
+            room turns with them.
 
         Raises
         ------
@@ -126,8 +128,18 @@ class Construction(Displayed):
         sides = _sides(source)
         if not sides or not isinstance(self.floor, RectangularFloor):
             return result
-        length, width = sides
-        resized = replace(result, floor=replace(self.floor, length=length, width=width))
+        room, (length, width) = result.room, sides
+        if isinstance(self.floor, JoistFloor) and not isinstance(source.floor, JoistFloor):
+            length, width = sorted(sides)
+            if sides[0] > sides[1]:
+                assert room is not None  # noqa: S101 - that of the case above
+                room = replace(
+                    room, length=room.width, width=room.length,
+                    corner_x=room.corner_y, corner_y=room.corner_x,
+                )  # fmt: skip
+        if isinstance(self.floor, JoistFloor) and "length" in self.sources:
+            length = self.floor.length
+        resized = replace(result, room=room, floor=replace(self.floor, length=length, width=width))
         try:
             check_case(resized)
         except InputError:
