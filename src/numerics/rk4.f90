@@ -1,13 +1,11 @@
-!> Classical fourth-order Runge-Kutta steps for any system of ordinary differential equations,
-!> and the location of events inside a step.
+!> Classical fourth-order Runge-Kutta steps for any system of ordinary differential equations.
 module thud_rk4
    use thud_kinds, only: wp
-   use thud_zero_search, only: advance_search, bisection_type, is_converged, new_zero_search, update_bracket, &
-      zero_search_type
+   use thud_zero_search, only: bisection_type
    implicit none (type, external)
    private
 
-   public :: locate_zero, longest_valid, ode_type, rk4_step
+   public :: longest_valid, ode_type, rk4_step
 
    !> A first-order system of ordinary differential equations.
    type, abstract :: ode_type
@@ -61,44 +59,6 @@ contains
       if (.not. valid) return
       new_state = state + step/6*(k1 + 2*(k2 + k3) + k4)
    end subroutine rk4_step
-
-   !> Length of the step at whose end one component of the state falls to zero, exact to rounding.
-   !>
-   !> The component is positive at (or just after) the beginning and not positive after the full step.
-   pure function locate_zero(ode, time, state, step, component) result(length)
-      class(ode_type), intent(in) :: ode
-      !> Time at the beginning of the step.
-      real(wp), intent(in) :: time
-      !> State at the beginning: [n_state].
-      real(wp), intent(in) :: state(:)
-      real(wp), intent(in) :: step
-      !> Index of the component.
-      integer, intent(in) :: component
-      real(wp) :: length
-      type(zero_search_type) :: search
-
-      search = new_zero_search(state(component), step, component_after(step))
-      do while (.not. is_converged(search))
-         call advance_search(search)
-         call update_bracket(search, component_after(search%trial))
-      end do
-      length = search%right
-
-   contains
-
-      !> The component after a shorter step.
-      pure function component_after(length) result(component_value)
-         !> Length of the shorter step.
-         real(wp), intent(in) :: length
-         real(wp) :: component_value
-         real(wp) :: new_state(size(state))
-         logical :: valid
-
-         call rk4_step(ode, time, state, length, new_state, valid)
-         component_value = new_state(component)
-      end function component_after
-
-   end function locate_zero
 
    !> Longest step that stays in the domain of the equations, by bisection to rounding.
    pure function longest_valid(ode, time, state, step) result(length)

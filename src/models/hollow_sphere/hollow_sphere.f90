@@ -4,7 +4,7 @@ module thud_hollow_sphere
    use thud_ball, only: ball_type
    use thud_constants, only: pi
    use thud_contact_source, only: coarse_step_error
-   use thud_drop, only: drop_type
+   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, name_length
    use thud_force_history, only: force_history_type
@@ -247,15 +247,19 @@ contains
       weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
    end function get_flux_weight
 
-   !> Whether a state lies so far outside the domain that it results from a step that is too long.
-   pure function is_diverged(shell, state) result(diverged)
+   !> Whether a state results from a step that is too long: far outside the domain, or with several times the energy of the
+   !> impact.
+   pure function is_diverged(shell, drop, state) result(diverged)
       class(shell_type), intent(in) :: shell
+      type(drop_type), intent(in) :: drop
       !> State: [4].
       real(wp), intent(in) :: state(:)
       !> True also if the state is not a number.
       logical :: diverged
 
-      diverged = .not. abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp
+      ! The factor leaves room for a floor that moves towards the ball.
+      diverged = .not. (abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp .and. &
+         (1 - state(at_deflection)/(2*shell%radius))*state(at_velocity)**2 < 4*get_impact_velocity(drop)**2)
    end function is_diverged
 
    !> Error for a drop in which the cavity collapses.
@@ -266,8 +270,8 @@ contains
       real(wp), intent(in) :: state(:)
       type(error_type) :: error
 
-      if (is_diverged(self, state)) then
-         error = coarse_step_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
+      if (is_diverged(self, drop, state)) then
+         error = coarse_step_error('a step ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if
       error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses, ' &

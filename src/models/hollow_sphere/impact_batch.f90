@@ -121,7 +121,7 @@ contains
       finite = abs(value) <= huge(value)
    end function is_finite
 
-   !> Fractions of the step at which the phase ends, to rounding: `locate_zero` of `thud_rk4` for all balls together; 1 for
+   !> Fractions of the step at which the phase ends, to rounding: the search of `thud_lumped` for all balls together; 1 for
    !> balls without such an end.
    subroutine locate(impacts, compressing, ends, length)
       !> The impacts, at the beginning of the step.

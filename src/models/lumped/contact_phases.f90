@@ -1,17 +1,17 @@
-!> The phases of a lumped source on a mobile floor: compression, restitution and flight, and the events between them.
-module thud_coupled_phases
+!> The phases of a lumped source: compression, restitution and flight, and the events between them.
+module thud_contact_phases
    use thud_contact_source, only: contact_source_type
    use thud_coupled_step, only: coupled_state_type, get_relative_state
    use thud_error, only: error_type, numerical_error
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_receiver, only: get_receiver_velocity, receiver_type
+   use thud_receiver, only: can_strike, get_receiver_velocity, receiver_type
    use thud_receiver_stages, only: receiver_stages_type
    use thud_text, only: fixed
    implicit none (type, external)
    private
 
-   public :: begin_contact, get_event, get_event_function, impact_type, pass_event, update_maxima
+   public :: begin_contact, get_event, get_event_function, has_left, impact_type, pass_event, update_maxima
 
    !> A light floor may stop the source, so that it never leaves. The floor has captured the source, and the contact ends, if
    !> kinetic energy and force times deflection are both below this fraction of the initial energy.
@@ -29,11 +29,13 @@ module thud_coupled_phases
 
    !> Impact in progress.
    type :: impact_type
-      !> The receiver, and its response over a whole step.
+      !> The receiver, without states if it is rigid, and its response over a whole step.
       type(receiver_type) :: receiver
       type(receiver_stages_type) :: stages
-      !> Motion of source and floor.
-      type(coupled_state_type) :: motion
+      !> Whether the receiver can move.
+      logical :: is_mobile = .false.
+      !> Motion of source and floor, now and at the end of the step that is tried.
+      type(coupled_state_type) :: motion, end
       !> Time since first touch, s; velocity at first touch, the scale of velocities, m/s.
       real(wp) :: time = 0.0_wp, velocity_scale = 0.0_wp
       !> Maximum force on the floor so far, N.
@@ -89,7 +91,7 @@ contains
       end associate
    end subroutine begin_contact
 
-   !> Event that lies inside a step.
+   !> Event that lies inside a step. Written so that NaN ends a contact.
    pure function get_event(source, end) result(event)
       class(contact_source_type), intent(in) :: source
       !> Motion at the end of the step.
@@ -102,8 +104,8 @@ contains
       if (.not. source%touching) then
          if (state(1) >= 0.0_wp) event = touch
       else if (source%compressing) then
-         if (state(2) <= 0.0_wp) event = turning_point
-      else if (state(1) <= 0.0_wp) then
+         if (.not. state(2) > 0.0_wp) event = turning_point
+      else if (.not. state(1) > 0.0_wp) then
          event = release
       else if (state(2) > 0.0_wp) then
          ! The floor approaches again.
@@ -153,9 +155,9 @@ contains
             history%contact_time = impact%time
             coupled%force = 0.0_wp
             coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%receiver_motion)
-            coupled%displacement(1) = coupled%receiver_motion%displacement
+            coupled%state(1) = coupled%receiver_motion%displacement
          case default
-            coupled%displacement(1) = coupled%receiver_motion%displacement
+            coupled%state(1) = coupled%receiver_motion%displacement
             call begin_contact(source, impact, error)
          end select
       end associate
@@ -172,9 +174,10 @@ contains
       if (.not. source%touching) return
       state = get_relative_state(source, impact%motion)
       call source%record_peaks(state, history)
+      if (.not. impact%is_mobile) return
       associate (coupled => impact%motion)
          impact%peak_force = max(impact%peak_force, coupled%force)
-         impact%captured = max(maxval(coupled%velocity**2), coupled%force*state(1)/source%mass) &
+         impact%captured = max(maxval(coupled%state(2:2*source%n_mass:2)**2), coupled%force*state(1)/source%mass) &
             <= capture_tolerance*impact%velocity_scale**2
          if (.not. impact%captured) return
          source%touching = .false.
@@ -184,4 +187,22 @@ contains
       end associate
    end subroutine update_maxima
 
-end module thud_coupled_phases
+   !> Whether the source has left the floor for good, or the floor has captured it.
+   pure function has_left(source, impact) result(left)
+      class(contact_source_type), intent(in) :: source
+      type(impact_type), intent(in) :: impact
+      logical :: left
+      real(wp) :: center(2)
+      real(wp) :: gap
+
+      left = .not. source%touching
+      if (.not. left .or. impact%captured) return
+      associate (state => get_relative_state(source, impact%motion))
+         center = source%get_center_motion(state)
+         ! Minimum gap between the first mass, which oscillates about the center of mass, and the floor, m.
+         gap = -(center(1) + source%get_amplitude(state))
+      end associate
+      left = .not. can_strike(impact%receiver, impact%motion%receiver_motion, gap, -center(2) - impact%motion%floor_velocity)
+   end function has_left
+
+end module thud_contact_phases

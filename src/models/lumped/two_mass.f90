@@ -23,10 +23,9 @@ module thud_two_mass
    public :: two_mass_type
 
    !> Indices in the state: displacement since first touch (m) and velocity (m/s) of belt and rim towards the floor, relative
-   !> to the floor if it is mobile; impulse on the floor (N s); energy lost (J); gap between belt and floor (m), which falls
-   !> to zero at touch.
+   !> to the floor if it is mobile; impulse on the floor (N s); energy lost (J).
    integer, parameter :: at_belt = 1, at_belt_velocity = 2, at_rim = 3, at_rim_velocity = 4, at_impulse = 5, at_loss = 6, &
-      at_gap = 7, n_state = 7
+      n_state = 6
 
    !> Angle by which the fastest motion advances in a step, rad. On a rigid floor (Runge-Kutta) a step loses angle**6/72 of
    !> the energy, 4e-11 per radian of motion; on a mobile floor (Radau IIA) angle**6/3600, 3e-9 per radian.
@@ -74,9 +73,6 @@ module thud_two_mass
       procedure :: get_derivative
       procedure :: record_sample
       procedure :: record_peaks
-      procedure :: get_event_component
-      procedure :: begin_next_phase
-      procedure :: has_separated
       procedure :: get_center_motion
       procedure :: get_inner_energy
       procedure :: get_amplitude
@@ -136,14 +132,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type), intent(in), optional :: receiver
       type(tyre_type) :: tyre
-      integer :: n_step
+      type(sampling_type) :: finer
 
       tyre = new_tyre(ball%mass, options)
-      call choose_steps(tyre, get_impact_velocity(drop), merge(step_angle, coupled_angle, is_rigid(receiver)), sampling, &
-         n_step, error)
+      finer = sampling
+      call choose_steps(tyre, get_impact_velocity(drop), merge(step_angle, coupled_angle, is_rigid(receiver)), finer, error)
       if (allocated(error)) return
-      call solve_lumped(tyre, drop, sampling, [character(len=14) :: 'pressure_force', 'carcass_force', 'damping_force'], &
-         history, error, receiver, n_step, [character(len=19) :: 'belt_displacement_m', 'rim_displacement_m'])
+      call solve_lumped(tyre, drop, finer, [character(len=14) :: 'pressure_force', 'carcass_force', 'damping_force'], &
+         history, error, receiver, [character(len=19) :: 'belt_displacement_m', 'rim_displacement_m'])
       ! There is no flux of momentum: the "elastic" force is the whole force, including damping.
       history%peak_elastic_force = history%peak_force
    end subroutine solve
@@ -167,15 +163,14 @@ contains
    end function new_tyre
 
    !> Chooses the steps per sampling interval from the fastest rate of the motion.
-   subroutine choose_steps(tyre, impact_velocity, angle, sampling, n_step, error)
+   subroutine choose_steps(tyre, impact_velocity, angle, sampling, error)
       type(tyre_type), intent(in) :: tyre
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       !> Angle by which the fastest motion advances in a step, rad.
       real(wp), intent(in) :: angle
-      type(sampling_type), intent(in) :: sampling
-      !> Steps per sampling interval.
-      integer, intent(out) :: n_step
+      !> The sampling; its substeps are raised.
+      type(sampling_type), intent(inout) :: sampling
       !> Set if the record would take too many steps.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: steps, total
@@ -183,7 +178,7 @@ contains
       steps = real(sampling%substeps, wp)*ceiling(min(max_steps, &
          get_fastest_rate(tyre, impact_velocity)/(angle*sampling%sample_rate)))
       total = steps*get_sample_count(sampling)
-      n_step = nint(min(steps, max_steps))
+      sampling%substeps = nint(min(steps, max_steps))
       if (total > max_steps) error = input_error('&two_mass: belt_mass = '//to_text(tyre%belt_mass) &
          //' kg with the stiffness of patch and sidewall needs '//to_text(total)//' steps; allowed: up to ' &
          //to_text(max_steps))
@@ -231,7 +226,6 @@ contains
          rate(at_rim_velocity) = -sidewall/self%rim_mass
          rate(at_impulse) = force
          rate(at_loss) = components(3)*belt + self%sidewall_damping*(rim - belt)**2
-         rate(at_gap) = -belt
       end associate
    end subroutine get_derivative
 
@@ -256,26 +250,6 @@ contains
       history%peak_force = max(history%peak_force, sum(get_components(self, state)))
       history%max_deflection = max(history%max_deflection, center(1))
    end subroutine record_peaks
-
-   !> Component of the state that falls to zero when the belt leaves or touches the floor.
-   pure function get_event_component(self) result(component)
-      class(tyre_type), intent(in) :: self
-      integer :: component
-
-      component = merge(at_belt, at_gap, self%touching)
-   end function get_event_component
-
-   !> Changes between contact and flight.
-   pure subroutine begin_next_phase(self, time, state, history)
-      class(tyre_type), intent(inout) :: self
-      real(wp), intent(in) :: time
-      real(wp), intent(inout) :: state(:)
-      type(force_history_type), intent(inout) :: history
-
-      state([at_belt, at_gap]) = 0.0_wp
-      if (self%touching) history%contact_time = time
-      self%touching = .not. self%touching
-   end subroutine begin_next_phase
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center_motion(self, state) result(center)
@@ -306,15 +280,6 @@ contains
 
       amplitude = self%rim_mass/(self%belt_mass + self%rim_mass)*sqrt(2*self%get_inner_energy(state)/self%sidewall_stiffness)
    end function get_amplitude
-
-   !> Whether the belt can no longer come back to a rigid floor.
-   pure function has_separated(self, state) result(separated)
-      class(tyre_type), intent(in) :: self
-      real(wp), intent(in) :: state(:)
-      logical :: separated
-
-      separated = .not. self%touching .and. all(self%get_center_motion(state) + [self%get_amplitude(state), 0.0_wp] < 0.0_wp)
-   end function has_separated
 
    !> Writes motion and forces of one sample into the history.
    pure subroutine record_sample(self, state, i, history)

@@ -33,12 +33,14 @@ module thud_coupled_step
 
    !> Motion of source and floor.
    type :: coupled_state_type
-      !> Displacements of the masses towards the floor, m, their velocities, m/s, and accelerations, m/s2: [n_mass].
-      real(wp), allocatable :: displacement(:), velocity(:), acceleration(:)
+      !> State of the source, not relative to the floor: [n_state].
+      real(wp), allocatable :: state(:)
+      !> Accelerations of the masses, m/s2: [n_mass].
+      real(wp), allocatable :: acceleration(:)
       !> Force on the floor, N, and velocity of the floor, m/s.
       real(wp) :: force = 0.0_wp, floor_velocity = 0.0_wp
-      !> Impulse on the floor, N s; energy given to the floor and energy lost in the source, J.
-      real(wp) :: impulse = 0.0_wp, work = 0.0_wp, loss = 0.0_wp
+      !> Energy given to the floor, J.
+      real(wp) :: work = 0.0_wp
       !> Motion of the floor.
       type(receiver_motion_type) :: receiver_motion
    end type coupled_state_type
@@ -69,10 +71,9 @@ contains
       integer :: n
 
       n = 2*source%n_mass
-      state = 0.0_wp
-      state(1:n:2) = coupled%displacement - coupled%receiver_motion%displacement
-      state(2:n:2) = coupled%velocity - coupled%floor_velocity
-      state(n + 1:n + 2) = [coupled%impulse, coupled%loss]
+      state = coupled%state
+      state(1:n:2) = state(1:n:2) - coupled%receiver_motion%displacement
+      state(2:n:2) = state(2:n:2) - coupled%floor_velocity
    end function get_relative_state
 
    !> Advances source and floor by one step.
@@ -121,15 +122,15 @@ contains
       end do
       end = start
       associate (h => stages%interval, weight => radau_integral(n_stage, :), k => 2*source%n_mass)
-         end%displacement = start%displacement + h*start%velocity &
+         end%state(1:k:2) = start%state(1:k:2) + h*start%state(2:k:2) &
             + h**2*matmul(second_integral(n_stage, :), trial%acceleration)
-         end%velocity = start%velocity + h*matmul(weight, trial%acceleration)
+         end%state(2:k:2) = start%state(2:k:2) + h*matmul(weight, trial%acceleration)
          end%acceleration = trial%acceleration(n_stage, :)
          end%force = trial%force(n_stage)
          end%floor_velocity = trial%floor_velocity(n_stage)
-         end%impulse = start%impulse + h*dot_product(weight, trial%force)
+         end%state(k + 1) = start%state(k + 1) + h*dot_product(weight, trial%force)
+         end%state(k + 2) = start%state(k + 2) + h*dot_product(weight, trial%rate(k + 2, :))
          end%work = start%work + h*dot_product(weight, trial%force*trial%floor_velocity)
-         end%loss = start%loss + h*dot_product(weight, trial%rate(k + 2, :))
       end associate
       call advance_stages(stages, trial%force, end%receiver_motion)
    end subroutine take_coupled_step
@@ -150,9 +151,9 @@ contains
          u = trial%free_velocity + matmul(stages%velocity, trial%force)
          trial%floor_acceleration = matmul(radau_derivative, u - start%floor_velocity)/h
          do k = 1, source%n_mass
-            state(2*k - 1, :) = start%displacement(k) + h*radau_node*start%velocity(k) &
+            state(2*k - 1, :) = start%state(2*k - 1) + h*radau_node*start%state(2*k) &
                + h**2*matmul(second_integral, trial%acceleration(:, k)) - w
-            state(2*k, :) = start%velocity(k) + h*matmul(radau_integral, trial%acceleration(:, k)) - u
+            state(2*k, :) = start%state(2*k) + h*matmul(radau_integral, trial%acceleration(:, k)) - u
          end do
          do i = 1, n_stage
             call get_rate(source, trial%time(i), state(:, i), trial%rate(:, i), valid)

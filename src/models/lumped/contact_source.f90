@@ -1,9 +1,9 @@
 !> Interface of a source of a few masses, the first of which touches the floor. The floor may be rigid or mobile.
 !>
 !> The state holds displacement towards the floor (m) and velocity (m/s) of each mass in turn, then impulse on the floor
-!> (N s) and energy lost (J); a source may append components. On a mobile floor displacements and velocities are relative to
-!> the floor, but the rates that `get_derivative` returns for the velocities are the absolute accelerations of the masses;
-!> force and loss are defined as on a rigid floor.
+!> (N s) and energy lost (J). On a mobile floor displacements and velocities are relative to the floor, but the rates that
+!> `get_derivative` returns for the velocities are the absolute accelerations of the masses; force and loss are defined as on
+!> a rigid floor.
 module thud_contact_source
    use thud_drop, only: drop_type
    use thud_error, only: error_type, numerical_error
@@ -14,10 +14,7 @@ module thud_contact_source
    implicit none (type, external)
    private
 
-   public :: coarse_step_error, contact_source_type, many_events_error
-
-   !> Maximum number of touches, releases and turning points in one step; more than a few mean that steps are too long.
-   integer, parameter, public :: max_events = 100
+   public :: coarse_step_error, contact_source_type
 
    !> Equations of motion of the source.
    type, abstract, extends(ode_type) :: contact_source_type
@@ -33,9 +30,6 @@ module thud_contact_source
    contains
       procedure(record_sample_interface), deferred :: record_sample
       procedure(record_peaks_interface), deferred :: record_peaks
-      procedure :: get_event_component
-      procedure :: begin_next_phase
-      procedure :: has_separated
       procedure :: get_center_motion
       procedure :: get_inner_energy
       procedure :: get_failure
@@ -69,45 +63,6 @@ module thud_contact_source
    end interface
 
 contains
-
-   !> Index of the component of the state that falls to zero at the end of a phase on a rigid floor: the velocity in
-   !> compression, then the deflection.
-   pure function get_event_component(self) result(component)
-      class(contact_source_type), intent(in) :: self
-      integer :: component
-
-      component = merge(2, 1, self%compressing)
-   end function get_event_component
-
-   !> Ends a phase on a rigid floor and begins the next: compression, restitution, flight.
-   pure subroutine begin_next_phase(self, time, state, history)
-      class(contact_source_type), intent(inout) :: self
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
-      !> State at the event: [n_state].
-      real(wp), intent(inout) :: state(:)
-      !> History: the turning point updates its maxima, the release sets its contact time.
-      type(force_history_type), intent(inout) :: history
-
-      state(self%get_event_component()) = 0.0_wp
-      if (self%compressing) then
-         self%compressing = .false.
-         call self%record_peaks(state, history)
-      else
-         self%touching = .false.
-         history%contact_time = time
-      end if
-   end subroutine begin_next_phase
-
-   !> Whether the source has left a rigid floor for good; a single mass leaves at release.
-   pure function has_separated(self, state) result(separated)
-      class(contact_source_type), intent(in) :: self
-      !> State: [n_state].
-      real(wp), intent(in) :: state(:)
-      logical :: separated
-
-      separated = .not. self%touching
-   end function has_separated
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center_motion(self, state) result(center)
@@ -167,12 +122,5 @@ contains
          //'; allowed: more substeps, a higher sample_rate, or a softer or heavier source')
       error%has_coarse_steps = .true.
    end function coarse_step_error
-
-   !> Error for a step with more than `max_events` events.
-   pure function many_events_error() result(error)
-      type(error_type) :: error
-
-      error = coarse_step_error(to_text(max_events)//' touches, releases and turning points fall into one step')
-   end function many_events_error
 
 end module thud_contact_source

@@ -4,14 +4,13 @@ module thud_hunt_crossley
    use thud_ball, only: ball_type
    use thud_contact_law, only: contact_law_type, get_contact_force
    use thud_drop, only: drop_type, get_impact_velocity
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type, input_error, signal_base
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_lumped, only: solve_lumped
    use thud_new_field, only: real_field
    use thud_receiver, only: receiver_type
-   use thud_rk4, only: locate_zero, rk4_step
    use thud_sampling, only: sampling_type
    use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
@@ -21,6 +20,9 @@ module thud_hunt_crossley
    private
 
    public :: get_damping, hunt_crossley_type
+
+   !> Names of the components of the force.
+   character(len=13), parameter :: force_names(2) = [character(len=13) :: 'spring_force', 'damping_force']
 
    !> Options of the model. Exactly one of stiffness and contact time is given, and at most one of damping and restitution; 0
    !> means not given.
@@ -170,42 +172,30 @@ contains
 
    end function get_damping
 
-   !> Stiffness that gives a contact time, N/m^exponent.
-   !>
-   !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation does not contain k: one contact in these units
-   !> gives the ratio of contact time to D/v0.
-   pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
+   !> Stiffness that gives a contact time, N/m^exponent. The time is proportional to the length (M v0^2/k)^(1/(n + 1)): one
+   !> contact on a rigid floor with a length of about the right order gives the ratio.
+   subroutine get_stiffness(contact_time, exponent, damping, mass, drop, stiffness, error)
       !> Target contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
       real(wp), intent(in) :: contact_time, exponent, damping, mass
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
-      !> k, N/m^exponent; 0 if the damping is too high for a rebound.
-      real(wp) :: stiffness
-      real(wp), parameter :: step = 1.0e-3_wp
-      integer, parameter :: max_steps = 1000000
-      type(spring_type) :: spring
-      real(wp) :: state(4)
-      real(wp) :: next(4)
-      real(wp) :: time, length
-      integer :: i
-      logical :: valid
+      type(drop_type), intent(in) :: drop
+      !> k, N/m^exponent.
+      real(wp), intent(out) :: stiffness
+      !> Set if the damping is too high for a rebound.
+      type(error_type), allocatable, intent(out) :: error
+      !> Samples and steps in the time (M v0^2/k)^(1/(n + 1))/v0, a third of the contact of a spring without damping.
+      real(wp), parameter :: samples = 100.0_wp, steps = 1000.0_wp
+      type(force_history_type) :: history
+      real(wp) :: unit, v0, duration
 
-      spring = new_spring(1.0_wp, 1.0_wp, exponent, damping*impact_velocity)
-      state = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
-      time = 0.0_wp
-      do i = 1, max_steps
-         call rk4_step(spring, time, state, step, next, valid)
-         ! Written so that NaN ends the loop too.
-         if (.not. next(at_deflection) > 0.0_wp) exit
-         state = next
-         time = time + step
-      end do
-      stiffness = 0.0_wp
-      if (.not. next(at_deflection) <= 0.0_wp) return
-      time = time + locate_zero(spring, time, state, step, at_deflection)
-      length = contact_time*impact_velocity/time
-      stiffness = mass*impact_velocity**2/length**(exponent + 1)
-   end function get_stiffness
+      v0 = get_impact_velocity(drop)
+      unit = contact_time/3
+      ! The rebound from a strong damper is at most as fast as 2/(3 alpha).
+      duration = unit*min(10*(1 + 1.5_wp*damping*v0), 1000.0_wp)
+      stiffness = mass*v0**2/(unit*v0)**(exponent + 1)
+      call solve_lumped(new_spring(mass, stiffness, exponent, damping), drop, sampling_type(samples/unit, duration, &
+         nint(steps/samples)), force_names, history, error)
+      stiffness = stiffness*(history%contact_time/contact_time)**(exponent + 1)
+   end subroutine get_stiffness
 
    !> Equation of motion of a source.
    pure function new_spring(mass, stiffness, exponent, damping) result(spring)
@@ -246,16 +236,17 @@ contains
       damping = options%damping
       if (options%restitution > 0.0_wp) damping = get_damping(options%restitution, v0)
       stiffness = options%stiffness
-      if (options%contact_time > 0.0_wp) stiffness = get_stiffness(options%contact_time, options%exponent, damping, &
-         ball%mass, v0)
-      if (.not. stiffness > 0.0_wp) then
+      if (options%contact_time > 0.0_wp) then
+         call get_stiffness(options%contact_time, options%exponent, damping, ball%mass, drop, stiffness, error)
+      end if
+      if (allocated(error)) then
+         if (error%code >= signal_base) return
          error = input_error('&hunt_crossley: damping = '//to_text(damping)//' s/m at '//to_text(v0) &
             //' m/s gives no contact time; allowed: lower damping')
          return
       end if
       spring = new_spring(ball%mass, stiffness, options%exponent, damping)
-      call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error, &
-         receiver)
+      call solve_lumped(spring, drop, sampling, force_names, history, error, receiver)
    end subroutine solve
 
 end module thud_hunt_crossley
