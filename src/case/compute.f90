@@ -45,8 +45,6 @@ module thud_compute
       logical :: energies = .true.
       !> Level in the room below.
       logical :: room = .true.
-      !> Also that by the modes of floor and room, with the interval of the rating.
-      logical :: modal_room = .true.
    end type scope_type
 
    !> Levels and criteria of an impact.
@@ -186,10 +184,9 @@ contains
       if (allocated(on_floor) .and. scope%levels) call get_floor_result(case, state, on_floor, scope%energies, floor, error)
       if (allocated(error) .or. .not. (case%has_room .and. scope%room)) return
       if (allocated(on_floor)) then
-         call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, scope%modal_room, room, error)
+         call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, room, error)
       else
-         call predict_room(case, state, impact%history%floor_force, impact%history%sample_rate, scope%modal_room, room, &
-            error)
+         call predict_room(case, state, impact%history%floor_force, impact%history%sample_rate, room, error)
       end if
    end subroutine assess_floor
 
@@ -213,11 +210,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       associate (model => case%models(get_model_number(case))%model)
-         if (.not. model%couples() .or. is_rigid(state%receiver)) return
+         if (is_rigid(state%receiver)) return
          allocate (on_floor)
          call solve_drop(model, case%ball, case%drop, case%sampling, on_floor, error, state%receiver)
       end associate
-      ! `couples` is true by default: a model that ignores the receiver has computed the drop on a rigid floor.
+      ! A model that ignores the receiver has computed the drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 
@@ -234,7 +231,7 @@ contains
       if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
          cost = cost + get_drop_cost(model, case%ball, case%drop, case%sampling)
-         if (.not. (case%has_floor .and. model%couples())) return
+         if (.not. case%has_floor) return
          call prepare_floor(case, state, error)
          if (allocated(error) .or. is_rigid(state%receiver)) return
          cost = cost + 1.0e-3_wp + get_drop_cost(model, case%ball, case%drop, case%sampling, state%receiver)

@@ -32,11 +32,13 @@ module thud_numerical_error
 contains
 
    !> Estimates the error of a force history by its difference from a coarser one.
-   subroutine estimate_error(coarse, ratio, history)
+   subroutine estimate_error(coarse, ratio, min_error, history)
       !> The same drop at a coarser resolution; its sampling rate may be lower.
       type(force_history_type), intent(in) :: coarse
       !> Error of a level of the history divided by the difference.
       real(wp), intent(in) :: ratio
+      !> Minimum errors of the octave levels, dB: [octave_count].
+      real(wp), intent(in) :: min_error(:)
       !> The history; its errors are set.
       type(force_history_type), intent(inout) :: history
       real(wp) :: level(octave_count, 3), change(octave_count)
@@ -75,7 +77,7 @@ contains
       first_order_ratio = 1/(sqrt(1 + 1/ratio) - 1)
       ! Means show the end of the contact to within an interval.
       interval = merge(1/history%sample_rate, 0.0_wp, history%has_means)
-      history%numerical_error = numerical_error_type(known=.true., octave=change, &
+      history%numerical_error = numerical_error_type(known=.true., octave=max(change, min_error), &
          contact_time=first_order_ratio*time_change + interval, &
          restitution=first_order_ratio*abs(history%restitution - coarse%restitution), &
          peak_force=first_order_ratio*peak_change + get_lost_peak(history) + get_left_out_force(history))

@@ -12,7 +12,7 @@ module thud_resolved_drop
    use thud_numerical_error, only: add_verification, estimate_error, get_largest_error
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
-   use thud_source_model, only: source_model_type
+   use thud_source_model, only: convergence_type, source_model_type
    implicit none (type, external)
    private
 
@@ -39,14 +39,15 @@ contains
       type(force_history_type) :: coarse, finer
       type(force_history_type), allocatable :: references(:)
       type(motion_type), allocatable :: motion
-      real(wp), allocatable :: min_error(:, :)
+      type(convergence_type) :: convergence
       type(error_type), allocatable :: coarse_error
-      integer :: level, highest, reference
+      real(wp) :: min_error(octave_count)
+      integer :: level, highest
       logical :: is_finest
 
       is_finest = .false.
       highest = model%get_highest_level(ball, sampling)
-      allocate (references(0:highest), min_error(octave_count, 0:highest + 1))
+      allocate (references(0:highest))
       allocate (prepared, source=model)
       call prepared%share_setup(ball, sampling)
       call solve_at(0, history, coarse_error)
@@ -73,14 +74,14 @@ contains
             exit
          end if
          if (allocated(coarse_error)) deallocate (coarse_error)
-         reference = model%get_reference_level(level)
-         if (allocated(references(reference)%floor_force)) then
-            call estimate_error(references(reference), model%get_error_ratio(ball, level, history), history)
-            history%numerical_error%octave = max(history%numerical_error%octave, min_error(:, level))
-         end if
+         associate (reference => references(convergence%reference))
+            if (allocated(reference%floor_force)) call estimate_error(reference, convergence%ratio, convergence%min_error, &
+               history)
+         end associate
          if (history%numerical_error%known .and. get_largest_error(history) <= max_error) exit
       end do
       level = min(level, highest)
+      min_error = convergence%min_error
       if (is_finest .or. history%numerical_error%known .and. .not. sampling%verify) return
       ! The error is not known if the coarsest resolution fails and there is one level.
       call solve_at(level + 1, finer, error)
@@ -90,8 +91,7 @@ contains
          return
       end if
       if (.not. history%numerical_error%known) then
-         call estimate_error(finer, 1 + model%get_error_ratio(ball, level + 1, finer), history)
-         history%numerical_error%octave = max(history%numerical_error%octave, min_error(:, level))
+         call estimate_error(finer, 1 + convergence%ratio, min_error, history)
       end if
       if (sampling%verify) call add_verification(finer, history)
 
@@ -109,7 +109,7 @@ contains
          resolved_sampling = sampling
          call resolved%set_level(ball, level, resolved_sampling, coarse)
          call resolved%solve(ball, drop, resolved_sampling, history, error, receiver)
-         min_error(:, level) = resolved%get_min_error(ball)
+         convergence = resolved%get_convergence(ball, level, history)
       end subroutine solve_at
 
    end subroutine solve_drop

@@ -17,59 +17,68 @@ module thud_source_model
    implicit none (type, external)
    private
 
-   public :: source_model_type
+   public :: convergence_type, source_model_type
 
    !> Typical simulated duration of a drop on a rigid floor, s, for estimates of the computing time.
    real(wp), parameter, public :: typical_contact = 0.025_wp
 
+   !> How the error of a result follows from its difference from a coarser level of resolution. By default the ratio is
+   !> somewhat more than the 1/3 of an error that is proportional to the square of the step, as that of a force that begins
+   !> with a jump.
+   type :: convergence_type
+      !> The coarser level.
+      integer :: reference = 0
+      !> Estimated error divided by the difference.
+      real(wp) :: ratio = 0.4_wp
+      !> Minimum errors of the octave levels, which differences do not show, dB: [octave_count].
+      real(wp) :: min_error(octave_count) = 0.0_wp
+   end type convergence_type
+
    !> A source model with its options as components.
    type, abstract :: source_model_type
    contains
-      procedure(get_fields), deferred, pass(options) :: get_fields
-      procedure(solve), deferred, pass(options) :: solve
-      procedure, pass(options) :: check
-      procedure, pass(options) :: get_snapshot_shape
-      procedure, pass(options) :: get_cost
-      procedure, pass(options) :: get_standard_modulus
-      procedure, pass(options) :: get_validity_limits
-      procedure, pass(options) :: get_loss_factors
-      procedure, pass(options) :: compress
-      procedure, pass(options) :: couples
-      procedure, pass(options) :: share_setup
-      procedure, pass(options) :: set_level
-      procedure, pass(options) :: get_highest_level
-      procedure, pass(options) :: chooses_resolution
-      procedure, pass(options) :: get_reference_level
-      procedure, pass(options) :: get_expected_level
-      procedure, pass(options) :: get_error_ratio
-      procedure, pass(options) :: get_min_error
+      procedure(get_fields), deferred :: get_fields
+      procedure(solve), deferred :: solve
+      procedure :: check
+      procedure :: get_snapshot_shape
+      procedure :: get_cost
+      procedure :: get_standard_modulus
+      procedure :: get_validity_limits
+      procedure :: get_loss_factors
+      procedure :: compress
+      procedure :: share_setup
+      procedure :: set_level
+      procedure :: get_highest_level
+      procedure :: chooses_resolution
+      procedure :: get_expected_level
+      procedure :: get_convergence
    end type source_model_type
 
    abstract interface
       !> Fields of the options: each connects a namelist key to a component.
-      function get_fields(options) result(fields)
+      function get_fields(self) result(fields)
          import :: field_type, source_model_type
          implicit none (type, external)
          !> The options that the fields read and set.
-         class(source_model_type), intent(in), target :: options
+         class(source_model_type), intent(in), target :: self
          !> The fields: [n_field].
          type(field_type), allocatable :: fields(:)
       end function get_fields
 
       !> Force history of one drop.
-      subroutine solve(ball, drop, options, sampling, history, error, receiver)
+      subroutine solve(self, ball, drop, sampling, history, error, receiver)
          import :: ball_type, drop_type, error_type, force_history_type, receiver_type, sampling_type, source_model_type
          implicit none (type, external)
+         !> The options, checked.
+         class(source_model_type), intent(in) :: self
          type(ball_type), intent(in) :: ball
          type(drop_type), intent(in) :: drop
-         !> The options, checked.
-         class(source_model_type), intent(in) :: options
          !> Sampling rate, length of the record, substeps.
          type(sampling_type), intent(in) :: sampling
          type(force_history_type), intent(out) :: history
          !> Set if the drop leaves the range of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error
-         !> The structure under the source (default: a rigid floor); only for models for which `couples` is true.
+         !> The structure under the source (default: a rigid floor). A model that ignores it returns no motion of the floor.
          type(receiver_type), intent(in), optional :: receiver
       end subroutine solve
    end interface
@@ -77,10 +86,10 @@ module thud_source_model
 contains
 
    !> Checks that options, ball and sampling fit each other; by default, they do.
-   subroutine check(ball, options, sampling, error)
-      type(ball_type), intent(in) :: ball
+   subroutine check(self, ball, sampling, error)
       !> The options, each inside its own range.
-      class(source_model_type), intent(in) :: options
+      class(source_model_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
       !> Set if they do not fit; the message names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
@@ -88,9 +97,9 @@ contains
    end subroutine check
 
    !> Shape of the snapshots of the deformed ball; by default there are none.
-   function get_snapshot_shape(ball, options, sampling) result(extents)
+   function get_snapshot_shape(self, ball, sampling) result(extents)
+      class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Number of nodes from pole to pole, of nodes through the wall, and of snapshots.
       integer :: extents(3)
@@ -100,10 +109,10 @@ contains
 
    !> Approximate computing time of a drop at one resolution, that of the options, on one core, s; by default that of a model
    !> with one or two degrees of freedom.
-   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
-      type(ball_type), intent(in) :: ball
+   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
       !> The options, checked.
-      class(source_model_type), intent(in) :: options
+      class(source_model_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
       !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
@@ -124,8 +133,8 @@ contains
    end function get_cost
 
    !> Modulus of elasticity of the standard ball in this model, Pa; by default 0, for models that do not use the wall.
-   function get_standard_modulus(options) result(modulus)
-      class(source_model_type), intent(in) :: options
+   function get_standard_modulus(self) result(modulus)
+      class(source_model_type), intent(in) :: self
       !> The modulus, Pa.
       real(wp) :: modulus
 
@@ -134,10 +143,10 @@ contains
 
    !> Validity limits of the model for a result; by default those of a source without size and without gravity during the
    !> contact.
-   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+      class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> The force.
       type(force_history_type), intent(in) :: history
@@ -148,9 +157,9 @@ contains
    end function get_validity_limits
 
    !> Loss factor of the material against frequency; models without a material return an error.
-   subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
+   subroutine get_loss_factors(self, ball, frequency, loss_factor, error)
+      class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(in) :: options
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
       !> Loss factors: [n].
@@ -162,18 +171,10 @@ contains
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
 
-   !> Whether the model can drop on a mobile floor (default); if not, its force on a rigid floor is used.
-   function couples(options) result(yes)
-      class(source_model_type), intent(in) :: options
-      logical :: yes
-
-      yes = .true.
-   end function couples
-
    !> Computes what the levels of resolution share; by default nothing.
-   subroutine share_setup(ball, options, sampling)
+   subroutine share_setup(self, ball, sampling)
+      class(source_model_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(inout) :: options
       !> Sampling of the input.
       type(sampling_type), intent(in) :: sampling
 
@@ -181,9 +182,9 @@ contains
 
    !> Sets the resolution. By default level 0 has half the sampling rate of the input, for the error of samples and steps,
    !> level 1 that of the input, and level 2 twice that.
-   subroutine set_level(ball, options, level, sampling, coarse)
+   subroutine set_level(self, ball, level, sampling, coarse)
+      class(source_model_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(inout) :: options
       !> The level, from 0 up.
       integer, intent(in) :: level
       !> Sampling of the input, to be changed as the level needs it.
@@ -195,9 +196,9 @@ contains
    end subroutine set_level
 
    !> Highest level of resolution; by default 1: the resolution is that of the input.
-   function get_highest_level(ball, options, sampling) result(level)
+   function get_highest_level(self, ball, sampling) result(level)
+      class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: level
 
@@ -205,27 +206,17 @@ contains
    end function get_highest_level
 
    !> Whether the model chooses its resolution; by default it is that of the input.
-   function chooses_resolution(options) result(yes)
-      class(source_model_type), intent(in) :: options
+   function chooses_resolution(self) result(yes)
+      class(source_model_type), intent(in) :: self
       logical :: yes
 
       yes = .false.
    end function chooses_resolution
 
-   !> Level whose difference from a level shows the error of the latter: by default the next coarser one.
-   function get_reference_level(options, level) result(reference)
-      class(source_model_type), intent(in) :: options
-      !> Level of the result, from 1 up.
-      integer, intent(in) :: level
-      integer :: reference
-
-      reference = level - 1
-   end function get_reference_level
-
    !> Level at which the resolution is probably fine enough, for estimates of the computing time; by default 1.
-   function get_expected_level(ball, options, contact) result(level)
+   function get_expected_level(self, ball, contact) result(level)
+      class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(in) :: options
       !> Expected contact time, deflection and contact radius, for models that use the wall.
       type(force_history_type), intent(in) :: contact
       integer :: level
@@ -233,37 +224,26 @@ contains
       level = 1
    end function get_expected_level
 
-   !> Estimated error of a result divided by its difference from the reference level. By default somewhat more than the
-   !> 1/3 of an error that is proportional to the square of the step, as that of a force that begins with a jump.
-   function get_error_ratio(ball, options, level, history) result(ratio)
+   !> Convergence of a result; by default that of `convergence_type`, with the next coarser level.
+   function get_convergence(self, ball, level, history) result(convergence)
+      !> The options at the level of the result.
+      class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(source_model_type), intent(in) :: options
-      !> Level of the result.
+      !> Level of the result, from 1 up.
       integer, intent(in) :: level
       !> The result.
       type(force_history_type), intent(in) :: history
-      real(wp) :: ratio
+      type(convergence_type) :: convergence
 
-      ratio = 0.4_wp
-   end function get_error_ratio
-
-   !> Minimum errors of the octave levels that differences between levels of resolution do not show; by default 0.
-   function get_min_error(ball, options) result(error)
-      type(ball_type), intent(in) :: ball
-      !> The options at the level of the result.
-      class(source_model_type), intent(in) :: options
-      !> Errors, dB: [octave_count].
-      real(wp) :: error(octave_count)
-
-      error = 0.0_wp
-   end function get_min_error
+      convergence%reference = level - 1
+   end function get_convergence
 
    !> Force on each of two plates in a quasi-static compression; models without one return an error.
-   subroutine compress(ball, options, deflection, force, error)
+   subroutine compress(self, ball, deflection, force, error)
+      !> The options, checked.
+      class(source_model_type), intent(in) :: self
       !> The ball, with the gas that it has in the press.
       type(ball_type), intent(in) :: ball
-      !> The options, checked.
-      class(source_model_type), intent(in) :: options
       !> Approach of the plates, ascending from 0, m: [n].
       real(wp), intent(in) :: deflection(:)
       !> The force, N: [n].

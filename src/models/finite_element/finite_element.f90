@@ -71,28 +71,28 @@ module thud_finite_element
    !> The model.
    type, extends(finite_element_options_type) :: finite_element_type
    contains
-      procedure, pass(options) :: solve
-      procedure, pass(options) :: get_cost
-      procedure, pass(options) :: get_standard_modulus
-      procedure, pass(options) :: get_validity_limits
-      procedure, pass(options) :: get_loss_factors
-      procedure, pass(options) :: compress
+      procedure :: solve
+      procedure :: get_cost
+      procedure :: get_standard_modulus
+      procedure :: get_validity_limits
+      procedure :: get_loss_factors
+      procedure :: compress
    end type finite_element_type
 
 contains
 
    !> Approximate time of a drop at one resolution on one core, s.
-   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
+   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
+      class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
       real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
       real(wp) :: n_step, n_padded, element_cost
 
-      call count_work(ball, options, sampling, n_step, n_padded, contact_time)
-      select case (options%material%viscosity)
+      call count_work(self, ball, sampling, n_step, n_padded, contact_time)
+      select case (self%material%viscosity)
       case ('none')
          element_cost = 2.5e-8_wp
       case ('kelvin_voigt')
@@ -105,18 +105,18 @@ contains
    end function get_cost
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
-   function get_standard_modulus(options) result(modulus)
-      class(finite_element_type), intent(in) :: options
+   function get_standard_modulus(self) result(modulus)
+      class(finite_element_type), intent(in) :: self
       real(wp) :: modulus
 
       modulus = 2.06e6_wp
    end function get_standard_modulus
 
    !> The limit of the speed of the ball; the error of the mesh is stated by its numerical error.
-   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+      class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
@@ -125,9 +125,9 @@ contains
    end function get_validity_limits
 
    !> Loss factor of the material in shear as a function of frequency.
-   subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
+   subroutine get_loss_factors(self, ball, frequency, loss_factor, error)
+      class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_type), intent(in) :: options
       real(wp), intent(in) :: frequency(:)
       real(wp), intent(out) :: loss_factor(:)
       type(error_type), allocatable, intent(out) :: error
@@ -135,15 +135,15 @@ contains
       integer :: i
 
       loss_factor = 0.0_wp
-      call new_material(options%material, ball, material, error)
+      call new_material(self%material, ball, material, error)
       if (allocated(error)) return
       loss_factor = [(get_material_loss_factor(material, frequency(i)), i=1, size(frequency))]
    end subroutine get_loss_factors
 
    !> Force on each of two plates in a quasi-static compression, with the long-term modulus.
-   subroutine compress(ball, options, deflection, force, error)
+   subroutine compress(self, ball, deflection, force, error)
+      class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_type), intent(in) :: options
       real(wp), intent(in) :: deflection(:)
       real(wp), intent(out) :: force(:)
       type(error_type), allocatable, intent(out) :: error
@@ -152,9 +152,9 @@ contains
       integer :: i
 
       force = 0.0_wp
-      call new_material(options%material, ball, material, error)
+      call new_material(self%material, ball, material, error)
       if (allocated(error)) return
-      pressed = new_pressed_ball(ball, new_mesh(ball, options%mesh), material)
+      pressed = new_pressed_ball(ball, new_mesh(ball, self%mesh), material)
       do i = 1, size(deflection)
          call press(pressed, deflection(i), error)
          if (allocated(error)) return
@@ -164,10 +164,10 @@ contains
 
    !> Force history of one drop. A run that turns out to be unstable is repeated with half the step, and the history states
    !> the reduced `step_safety`. One that breaks down may be unstable, too: it is repeated once.
-   subroutine solve(ball, drop, options, sampling, history, error, receiver)
+   subroutine solve(self, ball, drop, sampling, history, error, receiver)
+      class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(finite_element_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
@@ -176,10 +176,10 @@ contains
       integer :: attempt
       logical :: breaks_down, broke_down
 
-      allocate (attempted, source=options)
+      allocate (attempted, source=self)
       broke_down = .false.
       do attempt = 1, max_attempts
-         call solve_once(ball, drop, attempted, sampling, history, error, receiver)
+         call solve_once(attempted, ball, drop, sampling, history, error, receiver)
          breaks_down = .false.
          if (allocated(error)) breaks_down = error%code == numerical_failure .and. .not. error%has_short_record &
             .and. history%energy_residual > 0.0_wp
@@ -192,10 +192,10 @@ contains
    end subroutine solve
 
    !> Force history of one drop with the step as it is.
-   subroutine solve_once(ball, drop, options, sampling, history, error, receiver)
+   subroutine solve_once(self, ball, drop, sampling, history, error, receiver)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       !> Set if the drop cannot be computed; if the run is unstable, the residual of energy in `history` is too large.
@@ -207,15 +207,15 @@ contains
       real(wp) :: speed, gap
 
       history = new_impact_record(sampling, get_impact_velocity(drop), receiver)
-      history%touch_time = options%flight_before
-      speed = history%impact_velocity - drop%gravity*options%flight_before
-      gap = speed*options%flight_before + drop%gravity*options%flight_before**2/2
+      history%touch_time = self%flight_before
+      speed = history%impact_velocity - drop%gravity*self%flight_before
+      gap = speed*self%flight_before + drop%gravity*self%flight_before**2/2
       if (speed < 0.0_wp) then
-         error = input_error('&finite_element: flight_before = '//to_text(options%flight_before) &
+         error = input_error('&finite_element: flight_before = '//to_text(self%flight_before) &
             //' s is longer than the fall; allowed: up to '//to_text(history%impact_velocity/drop%gravity)//' s')
          return
       end if
-      call new_material(options%material, ball, material, error)
+      call new_material(self%material, ball, material, error)
       if (allocated(error)) return
       contacts%settling_time = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
       if (contacts%settling_time > huge(1.0_wp)) then
@@ -223,29 +223,29 @@ contains
             //'allowed: a higher one')
          return
       end if
-      if (sampling%duration <= options%flight_before + contacts%settling_time) then
+      if (sampling%duration <= self%flight_before + contacts%settling_time) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
             //'after '//significant(contacts%settling_time, 3)//' s without touch, in which shear waves cross the ball; ' &
-            //'allowed: at least '//significant(rounded_up*(options%flight_before + contacts%settling_time), 3)//' s')
+            //'allowed: at least '//significant(rounded_up*(self%flight_before + contacts%settling_time), 3)//' s')
          return
       end if
-      run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)
-      if (options%snapshot_interval > 0.0_wp) then
+      run = new_impact_run(ball, self, material, drop%gravity, gap, speed, receiver)
+      if (self%snapshot_interval > 0.0_wp) then
          allocate (history%motion)
-         call start_motion(run%position, get_frame_count(options, sampling), history%motion)
+         call start_motion(run%position, get_frame_count(self, sampling), history%motion)
       end if
-      call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, error)
+      call march(self, run, get_mean_height(run) - gap, contacts, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
    end subroutine solve_once
 
    !> Integrates in time until the ball has left for good.
-   subroutine march(run, touch_height, contacts, options, sampling, history, error)
+   subroutine march(self, run, touch_height, contacts, sampling, history, error)
+      !> Number of bounces, times of flight, step.
+      class(finite_element_options_type), intent(in) :: self
       type(impact_run_type), intent(inout) :: run
       !> Height of the center of mass at first touch, m.
       real(wp), intent(in) :: touch_height
       type(contacts_type), intent(inout) :: contacts
-      !> Number of bounces, times of flight, step.
-      class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Gets its samples, its snapshots, and contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
@@ -256,17 +256,17 @@ contains
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
-      call choose_steps(run, options, sampling, n_sample, n_step, error)
+      call choose_steps(self, run, sampling, n_sample, n_step, error)
       if (allocated(error)) return
       check_stride = max(1, nint(check_interval*sampling%sample_rate))
-      stride = get_stride(options, sampling)
+      stride = get_stride(self, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
          if (mod(i - 1, check_stride) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
             ! No further contact is wanted.
-            if (contacts%n_over >= options%bounces .and. will_touch(run, interval/n_step)) exit samples
+            if (contacts%n_over >= self%bounces .and. will_touch(run, interval/n_step)) exit samples
             call update_velocity(run, interval/n_step)
             if (i + k == 1) first_energy = get_energy(run)
             call check_run(run, time, first_energy, history, error)
@@ -286,14 +286,14 @@ contains
             call follow_contact(run, contacts, time, interval/n_step, history)
             call update_position(run, interval/n_step)
          end do
-         if (contacts%n_over < options%bounces) cycle samples
-         if (time > contacts%latest + max(contacts%settling_time, options%flight_after)) exit samples
+         if (contacts%n_over < self%bounces) cycle samples
+         if (time > contacts%latest + max(contacts%settling_time, self%flight_after)) exit samples
       end do samples
       if (run%floor%moves .and. run%impulse > 0.0_wp) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the' &
             //' mobile floor; allowed: longer than the contact, which never ends on a floor too light for the ball')
-      else if (contacts%n_over < options%bounces) then
-         error = get_duration_error(run, contacts, options%bounces, sampling%duration)
+      else if (contacts%n_over < self%bounces) then
+         error = get_duration_error(run, contacts, self%bounces, sampling%duration)
       end if
       if (.not. allocated(error)) call continue_flight(run, latest, touch_height, history)
    end subroutine march
@@ -328,10 +328,10 @@ contains
    end function get_duration_error
 
    !> Number of steps in a sampling interval; returns an error if the run would take too long.
-   subroutine choose_steps(run, options, sampling, n_sample, n_step, error)
-      type(impact_run_type), intent(in) :: run
+   subroutine choose_steps(self, run, sampling, n_sample, n_step, error)
       !> Options; `step_safety` is the ratio of the step to the bound.
-      class(finite_element_options_type), intent(in) :: options
+      class(finite_element_options_type), intent(in) :: self
+      type(impact_run_type), intent(in) :: run
       type(sampling_type), intent(in) :: sampling
       !> Number of samples of the record.
       integer, intent(in) :: n_sample
@@ -342,7 +342,7 @@ contains
       real(wp) :: interval, wanted
 
       interval = 1/sampling%sample_rate
-      wanted = interval/(options%step_safety*get_stable_interval(run%body%mesh%r, run%body%mesh%z, run%body%material, &
+      wanted = interval/(self%step_safety*get_stable_interval(run%body%mesh%r, run%body%mesh%z, run%body%material, &
          run%contact))
       n_step = max(sampling%substeps, ceiling(min(wanted, 2.0_wp*max_steps)))
       associate (n_node => size(run%position)/2)

@@ -14,7 +14,7 @@ module thud_finite_element_options
    use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type, mesh_type, new_mesh
    use thud_new_field, only: in_group, integer_field, real_field
    use thud_sampling, only: get_sample_count, get_step_count, sampling_type
-   use thud_source_model, only: source_model_type, typical_contact
+   use thud_source_model, only: convergence_type, source_model_type, typical_contact
    use thud_stable_step, only: get_stable_interval
    use thud_text, only: to_text
    implicit none (type, external)
@@ -73,53 +73,51 @@ module thud_finite_element_options
       type(material_options_type) :: material
       type(contact_options_type) :: contact
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: get_snapshot_shape
-      procedure, pass(options) :: set_level
-      procedure, pass(options) :: get_highest_level
-      procedure, pass(options) :: chooses_resolution
-      procedure, pass(options) :: get_reference_level
-      procedure, pass(options) :: get_expected_level
-      procedure, pass(options) :: get_error_ratio
-      procedure, pass(options) :: get_min_error
+      procedure :: get_fields
+      procedure :: check
+      procedure :: get_snapshot_shape
+      procedure :: set_level
+      procedure :: get_highest_level
+      procedure :: chooses_resolution
+      procedure :: get_expected_level
+      procedure :: get_convergence
    end type finite_element_options_type
 
 contains
 
    !> Keys and allowed ranges; some belong to groups of their own.
-   function get_fields(options) result(fields)
-      class(finite_element_options_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(finite_element_options_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('bounces', options%bounces, 'number of contacts to compute', '[1, 100]'), &
-         real_field('flight_before', options%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
+         integer_field('bounces', self%bounces, 'number of contacts to compute', '[1, 100]'), &
+         real_field('flight_before', self%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
          is_numerical=.true.), &
-         real_field('flight_after', options%flight_after, 's', 'duration of free flight after the last contact', &
+         real_field('flight_after', self%flight_after, 's', 'duration of free flight after the last contact', &
          '[0, 10]', is_numerical=.true.), &
-         real_field('step_safety', options%step_safety, '', 'time step divided by a bound on stable steps', &
+         real_field('step_safety', self%step_safety, '', 'time step divided by a bound on stable steps', &
          '[0.01, 0.98]', is_numerical=.true.), &
-         in_group('mesh', get_mesh_fields(options%mesh)), &
-         in_group('material', get_material_fields(options%material)), &
-         in_group('contact', get_contact_fields(options%contact)), &
-         in_group('output', [real_field('snapshot_interval', options%snapshot_interval, 's', &
+         in_group('mesh', get_mesh_fields(self%mesh)), &
+         in_group('material', get_material_fields(self%material)), &
+         in_group('contact', get_contact_fields(self%contact)), &
+         in_group('output', [real_field('snapshot_interval', self%snapshot_interval, 's', &
          'time between snapshots of the deformed ball; 0: none', '[0, 10]', is_numerical=.true.)])]
    end function get_fields
 
    !> Returns an error if options do not fit each other, the ball or the memory.
-   subroutine check(ball, options, sampling, error)
+   subroutine check(self, ball, sampling, error)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: bytes
 
-      call check_material(options%material, ball, error)
+      call check_material(self%material, ball, error)
       if (allocated(error)) return
-      call check_mesh(options%mesh, error)
+      call check_mesh(self%mesh, error)
       if (allocated(error)) return
-      if (options%mesh%radial_elements == 1) then
+      if (self%mesh%radial_elements == 1) then
          error = input_error('&mesh: radial_elements = 1 is not allowed with finite_element; allowed: from ' &
             //to_text(min_radial)//', or 0 for automatic')
          return
@@ -130,17 +128,17 @@ contains
          return
       end if
       ! Positions and velocities of each node.
-      bytes = 32.0_wp*product(real(get_snapshot_shape(ball, options, sampling), wp))
+      bytes = 32.0_wp*product(real(self%get_snapshot_shape(ball, sampling), wp))
       if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
-         //to_text(options%snapshot_interval)//' s makes '//to_text(get_frame_count(options, sampling)) &
+         //to_text(self%snapshot_interval)//' s makes '//to_text(get_frame_count(self, sampling)) &
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
    end subroutine check
 
    !> Sets the resolution: at level 0 elements of twice the size, without snapshots; above level 1 smaller ones. Automatic
    !> elements are short enough for the contact radius of the coarser drop.
-   subroutine set_level(ball, options, level, sampling, coarse)
+   subroutine set_level(self, ball, level, sampling, coarse)
+      class(finite_element_options_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(inout) :: options
       integer, intent(in) :: level
       type(sampling_type), intent(inout) :: sampling
       type(force_history_type), intent(in) :: coarse
@@ -148,37 +146,37 @@ contains
       logical :: resolves_contact
 
       refinement = merge(0.5_wp, refinement_ratio**(level - 1), level == 0)
-      resolves_contact = options%chooses_resolution() .and. allocated(coarse%model_history)
-      associate (mesh => options%mesh)
+      resolves_contact = self%chooses_resolution() .and. allocated(coarse%model_history)
+      associate (mesh => self%mesh)
          mesh = get_element_counts(ball, mesh)
          if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(max_contact_ratio, &
             contact_elements*pi*ball%outer_radius/mesh%polar_elements/maxval(coarse%model_history(:, 1)))))
          mesh%radial_elements = max(min_radial, nint(mesh%radial_elements*refinement))
          mesh%polar_elements = nint(mesh%polar_elements*refinement)
       end associate
-      if (level == 0) options%snapshot_interval = 0.0_wp
+      if (level == 0) self%snapshot_interval = 0.0_wp
    end subroutine set_level
 
    !> Highest level of resolution, such that its drop has not too many steps and elements.
-   function get_highest_level(ball, options, sampling) result(level)
+   function get_highest_level(self, ball, sampling) result(level)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: level
       real(wp) :: n_step, n_padded
 
       level = 1
-      if (.not. options%chooses_resolution()) return
-      call count_work(ball, options, sampling, n_step, n_padded)
+      if (.not. self%chooses_resolution()) return
+      call count_work(self, ball, sampling, n_step, n_padded)
       do while (level < highest_level .and. n_step*n_padded*refinement_ratio**(3*level) < max_work)
          level = level + 1
       end do
    end function get_highest_level
 
    !> Numbers of steps and of elements of a drop at one resolution.
-   subroutine count_work(ball, options, sampling, n_step, n_padded, contact_time)
+   subroutine count_work(self, ball, sampling, n_step, n_padded, contact_time)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       !> Number of steps; number of elements with the lanes that are left empty.
       real(wp), intent(out) :: n_step, n_padded
@@ -189,68 +187,61 @@ contains
       type(error_type), allocatable :: error
       real(wp) :: interval, time
 
-      mesh = new_mesh(ball, options%mesh)
+      mesh = new_mesh(ball, self%mesh)
       n_padded = mesh%n_radial*n_element*ceiling(mesh%n_polar/real(n_element, wp))
       ! The run reports a material that cannot be.
-      call new_material(options%material, ball, material, error)
+      call new_material(self%material, ball, material, error)
       interval = 1/sampling%sample_rate
-      if (.not. allocated(error)) interval = options%step_safety*get_stable_interval(mesh%r, mesh%z, material, &
-         new_floor_contact(options%contact, ball, mesh))
+      if (.not. allocated(error)) interval = self%step_safety*get_stable_interval(mesh%r, mesh%z, material, &
+         new_floor_contact(self%contact, ball, mesh))
       time = typical_contact
       ! A contact is over when shear waves have crossed the ball.
       if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))
-      time = time + options%flight_before + options%flight_after
-      if (options%bounces > 1) time = sampling%duration
+      time = time + self%flight_before + self%flight_after
+      if (self%bounces > 1) time = sampling%duration
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
    end subroutine count_work
 
    !> Nodes that stick and slip, a layer on the floor, and thin walls need higher levels.
-   function get_expected_level(ball, options, contact) result(level)
+   function get_expected_level(self, ball, contact) result(level)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       type(force_history_type), intent(in) :: contact
       integer :: level
 
       level = 1
-      if (options%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
-      if (options%contact%friction > high_friction .or. options%contact%layer_stiffness > 0.0_wp) level = highest_level
+      if (self%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
+      if (self%contact%friction > high_friction .or. self%contact%layer_stiffness > 0.0_wp) level = highest_level
    end function get_expected_level
 
    !> Whether the resolution may be chosen: the user's keys do not grow.
-   function chooses_resolution(options) result(yes)
-      class(finite_element_options_type), intent(in) :: options
+   function chooses_resolution(self) result(yes)
+      class(finite_element_options_type), intent(in) :: self
       logical :: yes
 
-      yes = options%mesh%radial_elements == 0 .and. options%mesh%polar_elements == 0
+      yes = self%mesh%radial_elements == 0 .and. self%mesh%polar_elements == 0
    end function chooses_resolution
 
-   !> The level with elements of twice the size, if there is one.
-   function get_reference_level(options, level) result(reference)
-      class(finite_element_options_type), intent(in) :: options
-      integer, intent(in) :: level
-      integer :: reference
-
-      reference = merge(level - 2, level - 1, level > 2)
-   end function get_reference_level
-
-   !> Estimated error of a level divided by its difference from the reference level, for errors proportional to the square of
-   !> the element size; with elements of twice the size more, since these are often outside of that order.
-   function get_error_ratio(ball, options, level, history) result(ratio)
+   !> Convergence of a result: its difference from the level with elements of twice the size, if there is one, for errors
+   !> proportional to the square of the element size; with elements of twice the size more, since these are often outside of
+   !> that order.
+   function get_convergence(self, ball, level, history) result(convergence)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       integer, intent(in) :: level
       type(force_history_type), intent(in) :: history
-      real(wp) :: ratio
+      type(convergence_type) :: convergence
 
-      ratio = merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2)
+      convergence = convergence_type(reference=merge(level - 2, level - 1, level > 2), &
+         ratio=merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2), min_error=get_min_error(self, ball))
       ! Nodes that stick and slip converge more slowly.
-      if (options%contact%friction > 0.0_wp) ratio = 2*ratio
-   end function get_error_ratio
+      if (self%contact%friction > 0.0_wp) convergence%ratio = 2*convergence%ratio
+   end function get_convergence
 
    !> Minimum error with friction at which a sliding surface may begin to stick and slip on its own (`slip_friction`).
-   function get_min_error(ball, options) result(error)
+   function get_min_error(self, ball) result(error)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       real(wp) :: error(octave_count)
       type(mesh_options_type) :: automatic, mesh
       real(wp) :: octave, scale
@@ -258,10 +249,10 @@ contains
       logical :: slips
 
       error = 0.0_wp
-      slips = options%contact%friction > slip_friction(1) .and. options%contact%friction < slip_friction(2)
-      if (.not. slips .or. is_viscous(options%material)) return
+      slips = self%contact%friction > slip_friction(1) .and. self%contact%friction < slip_friction(2)
+      if (.not. slips .or. is_viscous(self%material)) return
       automatic = get_element_counts(ball, mesh_options_type())
-      mesh = get_element_counts(ball, options%mesh)
+      mesh = get_element_counts(ball, self%mesh)
       scale = get_shear_rate(ball)/get_shear_rate(slip_ball)
       do i = 1, octave_count
          ! The octave of `slip_ball` that corresponds to this one; octaves are 10**0.3 apart.
@@ -290,38 +281,38 @@ contains
    end function is_viscous
 
    !> Size of the snapshots; of automatic elements the largest that the levels of resolution can have.
-   function get_snapshot_shape(ball, options, sampling) result(extents)
+   function get_snapshot_shape(self, ball, sampling) result(extents)
+      class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(finite_element_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: extents(3)
       integer :: factor(2)
 
       factor = 1
-      if (options%chooses_resolution()) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
-      associate (counts => get_element_counts(ball, options%mesh))
-         extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(options, sampling)]
+      if (self%chooses_resolution()) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
+      associate (counts => get_element_counts(ball, self%mesh))
+         extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(self, sampling)]
       end associate
    end function get_snapshot_shape
 
    !> Maximum number of snapshots of a run.
-   pure function get_frame_count(options, sampling) result(n_frame)
-      class(finite_element_options_type), intent(in) :: options
+   pure function get_frame_count(self, sampling) result(n_frame)
+      class(finite_element_options_type), intent(in) :: self
       type(sampling_type), intent(in) :: sampling
       integer :: n_frame
 
       n_frame = 0
-      if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
+      if (self%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(self, sampling)
    end function get_frame_count
 
    !> Number of samples between two snapshots, at least 1.
-   pure function get_stride(options, sampling) result(stride)
+   pure function get_stride(self, sampling) result(stride)
       !> Options that ask for snapshots.
-      class(finite_element_options_type), intent(in) :: options
+      class(finite_element_options_type), intent(in) :: self
       type(sampling_type), intent(in) :: sampling
       integer :: stride
 
-      stride = max(1, nint(options%snapshot_interval*sampling%sample_rate))
+      stride = max(1, nint(self%snapshot_interval*sampling%sample_rate))
    end function get_stride
 
 end module thud_finite_element_options

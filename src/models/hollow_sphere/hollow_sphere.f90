@@ -3,7 +3,7 @@
 module thud_hollow_sphere
    use thud_ball, only: ball_type
    use thud_constants, only: pi
-   use thud_contact_source, only: coarse_step_error
+   use thud_contact_source, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_source_type
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, name_length
@@ -13,8 +13,7 @@ module thud_hollow_sphere
    use thud_new_field, only: choice_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
-   use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
-   use thud_source_model, only: source_model_type
+   use thud_source_model, only: convergence_type, source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
@@ -29,12 +28,12 @@ module thud_hollow_sphere
       !> Treatment of the momentum of wall that enters or leaves the flat cap, one of `flux_choices`.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
    contains
-      procedure, pass(options) :: get_error_ratio
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: solve => solve_hollow_sphere
-      procedure, pass(options) :: get_standard_modulus
-      procedure, pass(options) :: get_validity_limits
-      procedure, pass(options) :: compress
+      procedure :: get_convergence
+      procedure :: get_fields
+      procedure :: solve => solve_hollow_sphere
+      procedure :: get_standard_modulus
+      procedure :: get_validity_limits
+      procedure :: compress
    end type hollow_sphere_type
 
    !> The choices of `momentum_flux`.
@@ -46,7 +45,7 @@ module thud_hollow_sphere
    real(wp), parameter :: restitution_weights(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
    !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
-   type, extends(single_mass_type) :: shell_type
+   type, extends(contact_source_type) :: shell_type
       !> Outer radius R, m.
       real(wp) :: radius = 0.0_wp
       !> Deflection at which the flat cap meets the opposite wall and the cavity is closed, m.
@@ -70,27 +69,27 @@ module thud_hollow_sphere
 contains
 
    !> Key and allowed values.
-   function get_fields(options) result(fields)
-      class(hollow_sphere_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(hollow_sphere_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
-      fields = [choice_field('momentum_flux', options%momentum_flux, &
+      fields = [choice_field('momentum_flux', self%momentum_flux, &
          'term for the momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_fields
 
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
-   function get_standard_modulus(options) result(modulus)
-      class(hollow_sphere_type), intent(in) :: options
+   function get_standard_modulus(self) result(modulus)
+      class(hollow_sphere_type), intent(in) :: self
       real(wp) :: modulus
 
       modulus = 1.6e6_wp
    end function get_standard_modulus
 
    !> Limits of the assumptions: a thin shell, a wall that stays close to the sphere, and no gravity during the contact.
-   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+      class(hollow_sphere_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(hollow_sphere_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
@@ -101,9 +100,9 @@ contains
    end function get_validity_limits
 
    !> Force on each of two plates in a quasi-static compression: each plate flattens a cap of half their approach.
-   subroutine compress(ball, options, deflection, force, error)
+   subroutine compress(self, ball, deflection, force, error)
+      class(hollow_sphere_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(hollow_sphere_type), intent(in) :: options
       real(wp), intent(in) :: deflection(:)
       real(wp), intent(out) :: force(:)
       type(error_type), allocatable, intent(out) :: error
@@ -279,23 +278,24 @@ contains
          //' mm; allowed: less than its height, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
    end function get_failure
 
-   !> Estimated error of a result divided by its difference from the next coarser level. Only with the balance of momentum
-   !> does the force end without a jump: another force has an error that is proportional to the sampling interval.
-   function get_error_ratio(ball, options, level, history) result(ratio)
+   !> Convergence of a result. Only with the balance of momentum does the force end without a jump: another force has an
+   !> error that is proportional to the sampling interval.
+   function get_convergence(self, ball, level, history) result(convergence)
+      class(hollow_sphere_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(hollow_sphere_type), intent(in) :: options
       integer, intent(in) :: level
       type(force_history_type), intent(in) :: history
-      real(wp) :: ratio
+      type(convergence_type) :: convergence
 
-      ratio = merge(0.4_wp, 1.0_wp, options%momentum_flux == 'momentum_balance')
-   end function get_error_ratio
+      convergence%reference = level - 1
+      if (self%momentum_flux /= 'momentum_balance') convergence%ratio = 1.0_wp
+   end function get_convergence
 
    !> Force history of one drop.
-   subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error, receiver)
+   subroutine solve_hollow_sphere(self, ball, drop, sampling, history, error, receiver)
+      class(hollow_sphere_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(hollow_sphere_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
@@ -303,9 +303,9 @@ contains
       type(shell_type) :: shell
       integer :: choice
 
-      choice = findloc(flux_choices, options%momentum_flux, dim=1)
+      choice = findloc(flux_choices, self%momentum_flux, dim=1)
       if (choice == 0) then
-         error = input_error('&hollow_sphere: momentum_flux = '//quoted(options%momentum_flux) &
+         error = input_error('&hollow_sphere: momentum_flux = '//quoted(self%momentum_flux) &
             //' is not allowed; allowed: '//join_quoted(flux_choices))
          return
       end if

@@ -2,12 +2,12 @@
 module thud_impact_batch
    use, intrinsic :: iso_c_binding, only: c_bool, c_int
    use thud_constants, only: pi
+   use thud_contact_source, only: at_deflection, at_velocity
    use thud_hollow_sphere, only: shell_type
    use thud_kinds, only: wp
    use thud_rk4, only: rk4_step
    use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
    use thud_shell_series, only: expand_series, get_flows, series_batch_type, take_step
-   use thud_single_mass, only: at_deflection, at_velocity
    implicit none (type, external)
    private
 

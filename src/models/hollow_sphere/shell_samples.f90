@@ -240,7 +240,7 @@ contains
       if (max(impulse_residual, energy_residual) <= max_batch_residual) return
       ! The sums of the single solver, which include the stages of each step, decide. If it shortens the steps, the result is
       ! its own.
-      call solve_hollow_sphere(sample%ball, sample%drop, hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), &
+      call solve_hollow_sphere(hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), sample%ball, sample%drop, &
          sampling, history, error)
       computed = .not. allocated(error) .and. .not. has_quantity(history, 'shortened_time_step')
    end function is_computed

@@ -11,7 +11,8 @@ module thud_contact_phases
    implicit none (type, external)
    private
 
-   public :: begin_contact, get_event, get_event_function, has_left, impact_type, pass_event, update_maxima
+   public :: begin_contact, get_event, get_event_function, has_left, impact_type, pass_event, raise_peaks
+   public :: update_maxima
 
    !> A light floor may stop the source, so that it never leaves. The floor has captured the source, and the contact ends, if
    !> kinetic energy and force times deflection are both below this fraction of the initial energy.
@@ -169,11 +170,15 @@ contains
       type(impact_type), intent(inout) :: impact
       !> History, in which maxima and contact time are set.
       type(force_history_type), intent(inout) :: history
-      real(wp) :: state(source%n_state)
+      real(wp) :: center(2), components(size(history%component, 2)), state(source%n_state)
+      real(wp) :: elastic_force
 
       if (.not. source%touching) return
       state = get_relative_state(source, impact%motion)
-      call source%record_peaks(state, history)
+      center = source%get_center_motion(state)
+      history%max_deflection = max(history%max_deflection, center(1))
+      call source%get_components(state, components, elastic_force)
+      call raise_peaks(components, elastic_force, history)
       if (.not. impact%is_mobile) return
       associate (coupled => impact%motion)
          impact%peak_force = max(impact%peak_force, coupled%force)
@@ -186,6 +191,18 @@ contains
          coupled%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, coupled%receiver_motion)
       end associate
    end subroutine update_maxima
+
+   !> Raises the maxima of the forces by those of one instant.
+   pure subroutine raise_peaks(components, elastic_force, history)
+      !> Components of the force on the floor, N: [n_component].
+      real(wp), intent(in) :: components(:)
+      !> Force without the flux of momentum, N.
+      real(wp), intent(in) :: elastic_force
+      type(force_history_type), intent(inout) :: history
+
+      history%peak_elastic_force = max(history%peak_elastic_force, elastic_force)
+      history%peak_force = max(history%peak_force, history%peak_elastic_force, sum(components))
+   end subroutine raise_peaks
 
    !> Whether the source has left the floor for good, or the floor has captured it.
    pure function has_left(source, impact) result(left)

@@ -7,14 +7,16 @@
 module thud_contact_source
    use thud_drop, only: drop_type
    use thud_error, only: error_type, numerical_error
-   use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_rk4, only: ode_type
    use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
 
-   public :: coarse_step_error, contact_source_type
+   public :: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_source_type
+
+   !> Indices in the state of a single mass: deflection (m), velocity (m/s), impulse on the floor (N s), energy lost (J).
+   integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4
 
    !> Equations of motion of the source.
    type, abstract, extends(ode_type) :: contact_source_type
@@ -28,8 +30,7 @@ module thud_contact_source
       !> Whether the source touches the floor, and whether its deflection grows.
       logical :: touching = .true., compressing = .true.
    contains
-      procedure(record_sample_interface), deferred :: record_sample
-      procedure(record_peaks_interface), deferred :: record_peaks
+      procedure(get_components_interface), deferred :: get_components
       procedure :: get_center_motion
       procedure :: get_inner_energy
       procedure :: get_failure
@@ -37,29 +38,19 @@ module thud_contact_source
    end type contact_source_type
 
    abstract interface
-      !> Writes motion and forces of one sample into the history.
-      pure subroutine record_sample_interface(self, state, i, history)
-         import :: contact_source_type, force_history_type, wp
+      !> Components of the force at one instant.
+      pure subroutine get_components_interface(self, state, components, elastic_force)
+         import :: contact_source_type, wp
          implicit none (type, external)
          !> The source in its present phase.
          class(contact_source_type), intent(in) :: self
          !> State, relative to the floor: [n_state].
          real(wp), intent(in) :: state(:)
-         !> Index of the sample.
-         integer, intent(in) :: i
-         type(force_history_type), intent(inout) :: history
-      end subroutine record_sample_interface
-
-      !> Updates the maxima in the history from one instant of contact.
-      pure subroutine record_peaks_interface(self, state, history)
-         import :: contact_source_type, force_history_type, wp
-         implicit none (type, external)
-         !> The source in its present phase.
-         class(contact_source_type), intent(in) :: self
-         !> State, relative to the floor: [n_state].
-         real(wp), intent(in) :: state(:)
-         type(force_history_type), intent(inout) :: history
-      end subroutine record_peaks_interface
+         !> Components of the force on the floor, N: [n_component].
+         real(wp), intent(out) :: components(:)
+         !> Force without the flux of momentum, N.
+         real(wp), intent(out) :: elastic_force
+      end subroutine get_components_interface
    end interface
 
 contains

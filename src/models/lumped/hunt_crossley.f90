@@ -3,6 +3,7 @@
 module thud_hunt_crossley
    use thud_ball, only: ball_type
    use thud_contact_law, only: contact_law_type, get_contact_force
+   use thud_contact_source, only: at_deflection, at_impulse, at_loss, at_velocity, contact_source_type
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, signal_base
    use thud_field, only: field_type
@@ -12,7 +13,6 @@ module thud_hunt_crossley
    use thud_new_field, only: real_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
-   use thud_single_mass, only: at_deflection, at_impulse, at_loss, at_velocity, single_mass_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    use thud_zero_search, only: bisection_type
@@ -38,14 +38,14 @@ module thud_hunt_crossley
       !> Target coefficient of restitution.
       real(wp) :: restitution = 0.0_wp
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: solve
-      procedure, pass(options) :: compress
+      procedure :: get_fields
+      procedure :: check
+      procedure :: solve
+      procedure :: compress
    end type hunt_crossley_type
 
    !> Equation of motion M z'' = -F with F = k d^n (1 + 3/2 alpha d').
-   type, extends(single_mass_type) :: spring_type
+   type, extends(contact_source_type) :: spring_type
       type(contact_law_type) :: law
    contains
       procedure :: get_derivative
@@ -55,37 +55,37 @@ module thud_hunt_crossley
 contains
 
    !> Keys and allowed ranges.
-   function get_fields(options) result(fields)
-      class(hunt_crossley_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(hunt_crossley_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('stiffness', options%stiffness, '', &
+         real_field('stiffness', self%stiffness, '', &
          'contact stiffness, N/m^exponent; 0: derived from contact_time', '[0, 1e15]', derived_at_zero=.true.), &
-         real_field('contact_time', options%contact_time, 's', &
+         real_field('contact_time', self%contact_time, 's', &
          'target contact time; 0: derived from stiffness', '[0, 10]', derived_at_zero=.true.), &
-         real_field('exponent', options%exponent, '', 'exponent of the deflection in the contact force', '[1, 5]'), &
-         real_field('damping', options%damping, 's/m', &
+         real_field('exponent', self%exponent, '', 'exponent of the deflection in the contact force', '[1, 5]'), &
+         real_field('damping', self%damping, 's/m', &
          'damping coefficient alpha; 0: derived from restitution', '[0, 100]'), &
-         real_field('restitution', options%restitution, '', &
+         real_field('restitution', self%restitution, '', &
          'target coefficient of restitution; 0: derived from damping', '[0, 1]', derived_at_zero=.true.)]
    end function get_fields
 
    !> Returns an error if values are missing or contradict each other.
-   subroutine check(ball, options, sampling, error)
+   subroutine check(self, ball, sampling, error)
+      class(hunt_crossley_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(hunt_crossley_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
 
-      if (options%stiffness > 0.0_wp .eqv. options%contact_time > 0.0_wp) then
-         error = input_error('&hunt_crossley: stiffness = '//to_text(options%stiffness)//' with contact_time = ' &
-            //to_text(options%contact_time)//' s is not allowed; allowed: exactly one of them above 0')
-      else if (options%damping > 0.0_wp .and. options%restitution > 0.0_wp) then
-         error = input_error('&hunt_crossley: damping = '//to_text(options%damping)//' s/m with restitution = ' &
-            //to_text(options%restitution)//' is not allowed; allowed: at most one of them above 0')
-      else if (options%restitution > 0.0_wp .and. options%restitution < 0.01_wp) then
-         error = input_error('&hunt_crossley: restitution = '//to_text(options%restitution) &
+      if (self%stiffness > 0.0_wp .eqv. self%contact_time > 0.0_wp) then
+         error = input_error('&hunt_crossley: stiffness = '//to_text(self%stiffness)//' with contact_time = ' &
+            //to_text(self%contact_time)//' s is not allowed; allowed: exactly one of them above 0')
+      else if (self%damping > 0.0_wp .and. self%restitution > 0.0_wp) then
+         error = input_error('&hunt_crossley: damping = '//to_text(self%damping)//' s/m with restitution = ' &
+            //to_text(self%restitution)//' is not allowed; allowed: at most one of them above 0')
+      else if (self%restitution > 0.0_wp .and. self%restitution < 0.01_wp) then
+         error = input_error('&hunt_crossley: restitution = '//to_text(self%restitution) &
             //' is not allowed; allowed: 0 (not given) or 0.01 <= restitution <= 1')
       end if
    end subroutine check
@@ -207,24 +207,24 @@ contains
    end function new_spring
 
    !> Quasi-static force between two plates: k (deflection/2)^n.
-   subroutine compress(ball, options, deflection, force, error)
+   subroutine compress(self, ball, deflection, force, error)
+      class(hunt_crossley_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(hunt_crossley_type), intent(in) :: options
       real(wp), intent(in) :: deflection(:)
       real(wp), intent(out) :: force(:)
       type(error_type), allocatable, intent(out) :: error
 
-      force = options%stiffness*(deflection/2)**options%exponent
-      if (.not. options%stiffness > 0.0_wp) error = input_error('&hunt_crossley: stiffness = 0 is not allowed with ' &
+      force = self%stiffness*(deflection/2)**self%exponent
+      if (.not. self%stiffness > 0.0_wp) error = input_error('&hunt_crossley: stiffness = 0 is not allowed with ' &
          //'&compression, because contact_time gives a stiffness for a drop only; allowed: stiffness above 0, without ' &
          //'contact_time')
    end subroutine compress
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error, receiver)
+   subroutine solve(self, ball, drop, sampling, history, error, receiver)
+      class(hunt_crossley_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(hunt_crossley_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
@@ -233,11 +233,11 @@ contains
       real(wp) :: v0, damping, stiffness
 
       v0 = get_impact_velocity(drop)
-      damping = options%damping
-      if (options%restitution > 0.0_wp) damping = get_damping(options%restitution, v0)
-      stiffness = options%stiffness
-      if (options%contact_time > 0.0_wp) then
-         call get_stiffness(options%contact_time, options%exponent, damping, ball%mass, drop, stiffness, error)
+      damping = self%damping
+      if (self%restitution > 0.0_wp) damping = get_damping(self%restitution, v0)
+      stiffness = self%stiffness
+      if (self%contact_time > 0.0_wp) then
+         call get_stiffness(self%contact_time, self%exponent, damping, ball%mass, drop, stiffness, error)
       end if
       if (allocated(error)) then
          if (error%code >= signal_base) return
@@ -245,7 +245,7 @@ contains
             //' m/s gives no contact time; allowed: lower damping')
          return
       end if
-      spring = new_spring(ball%mass, stiffness, options%exponent, damping)
+      spring = new_spring(ball%mass, stiffness, self%exponent, damping)
       call solve_lumped(spring, drop, sampling, force_names, history, error, receiver)
    end subroutine solve
 

@@ -3,7 +3,7 @@
 !> return by gravity is another impact.
 module thud_lumped
    use thud_contact_phases, only: begin_contact, get_event, get_event_function, has_left, impact_type, no_event, &
-      pass_event, update_maxima
+      pass_event, raise_peaks, update_maxima
    use thud_contact_source, only: coarse_step_error, contact_source_type
    use thud_coupled_step, only: get_relative_state, take_coupled_step
    use thud_drop, only: drop_type, get_impact_velocity
@@ -122,25 +122,34 @@ contains
       end if
    end subroutine march
 
-   !> Writes one sample into the history.
+   !> Writes one sample into the history. Forces and the velocity of the floor may jump at first touch: their first sample is
+   !> the mean of both sides.
    pure subroutine record(source, impact, i, history)
       class(contact_source_type), intent(in) :: source
       type(impact_type), intent(in) :: impact
       !> Index of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
+      real(wp) :: center(2), state(source%n_state)
+      real(wp) :: share
 
+      share = merge(0.5_wp, 1.0_wp, i == 1)
+      state = get_relative_state(source, impact%motion)
+      center = source%get_center_motion(state)
+      history%deflection(i) = center(1)
+      history%velocity(i) = center(2)
+      if (source%touching) then
+         call source%get_components(state, history%component(i, :), history%elastic_force(i))
+         call raise_peaks(history%component(i, :), history%elastic_force(i), history)
+         history%component(i, :) = share*history%component(i, :)
+         history%floor_force(i) = sum(history%component(i, :))
+      end if
       associate (motion => impact%motion)
-         if (impact%is_mobile) then
-            history%floor_displacement(i) = motion%receiver_motion%displacement
-            history%floor_velocity(i) = motion%floor_velocity
-         end if
-         call source%record_sample(get_relative_state(source, motion), i, history)
+         if (allocated(history%model_history)) history%model_history(i, :) = motion%state(1:2*source%n_mass:2)
          if (.not. impact%is_mobile) return
-         ! Force and floor velocity may jump at first touch: the first sample is the mean of both sides. `record_sample` has
-         ! set the first force.
+         history%floor_displacement(i) = motion%receiver_motion%displacement
+         history%floor_velocity(i) = share*motion%floor_velocity
          if (i > 1) history%floor_force(i) = motion%force
-         if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
       end associate
    end subroutine record
 

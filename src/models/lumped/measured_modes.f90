@@ -37,11 +37,10 @@ module thud_measured_modes
       !> Whether the sum of the masses may differ from the mass of the ball.
       logical :: allow_mass_mismatch = .false.
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: solve
-      procedure, pass(options) :: couples
-      procedure, pass(options) :: get_cost
+      procedure :: get_fields
+      procedure :: check
+      procedure :: solve
+      procedure :: get_cost
    end type measured_modes_type
 
    !> Motion and force of one mode in closed form.
@@ -59,36 +58,36 @@ module thud_measured_modes
 contains
 
    !> Keys and allowed ranges.
-   function get_fields(options) result(fields)
-      class(measured_modes_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(measured_modes_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
-         '[0.001, 1000000]'), list_field('damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
-         '[0, 1)'), list_field('effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
-         '[1e-12, 1000000]'), logical_field('allow_mass_mismatch', options%allow_mass_mismatch, &
+         list_field('frequency', self%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
+         '[0.001, 1000000]'), list_field('damping_ratio', self%damping_ratio, '', 'damping ratios, one per mode', &
+         '[0, 1)'), list_field('effective_mass', self%effective_mass, 'kg', 'effective masses, one per mode', &
+         '[1e-12, 1000000]'), logical_field('allow_mass_mismatch', self%allow_mass_mismatch, &
          'effective masses need not add up to the mass of the ball')]
    end function get_fields
 
    !> Returns an error if lists do not fit each other or the ball.
-   subroutine check(ball, options, sampling, error)
+   subroutine check(self, ball, sampling, error)
+      class(measured_modes_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: total
 
-      associate (n => options%frequency%count)
+      associate (n => self%frequency%count)
          if (n == 0) then
             error = input_error('&measured_modes: frequency has no value; allowed: one frequency per mode, Hz')
-         else if (options%damping_ratio%count /= n .or. options%effective_mass%count /= n) then
+         else if (self%damping_ratio%count /= n .or. self%effective_mass%count /= n) then
             error = input_error('&measured_modes: frequency has '//to_text(n)//' values, damping_ratio ' &
-               //to_text(options%damping_ratio%count)//' and effective_mass '//to_text(options%effective_mass%count) &
+               //to_text(self%damping_ratio%count)//' and effective_mass '//to_text(self%effective_mass%count) &
                //'; allowed: as many of each')
          else
-            total = sum(options%effective_mass%values(:n))
-            if (abs(total - ball%mass) > mass_tolerance*ball%mass .and. .not. options%allow_mass_mismatch) then
+            total = sum(self%effective_mass%values(:n))
+            if (abs(total - ball%mass) > mass_tolerance*ball%mass .and. .not. self%allow_mass_mismatch) then
                error = input_error('&measured_modes: effective_mass adds up to '//to_text(total) &
                   //' kg; allowed: the mass of the ball, '//to_text(ball%mass)//' kg, or allow_mass_mismatch = .true.')
             end if
@@ -96,22 +95,22 @@ contains
       end associate
    end subroutine check
 
-   !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error, receiver)
+   !> Force history of one drop. Modes of a ball on a rigid floor do not apply to a mobile floor, which is ignored.
+   subroutine solve(self, ball, drop, sampling, history, error, receiver)
+      class(measured_modes_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type), intent(in), optional :: receiver
-      type(mode_type) :: modes(options%frequency%count)
+      type(mode_type) :: modes(self%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
       integer :: i, j, substeps
       logical :: released
 
-      modes = new_mode(options%frequency%values(:size(modes)), options%damping_ratio%values(:size(modes)), &
-         options%effective_mass%values(:size(modes)))
+      modes = new_mode(self%frequency%values(:size(modes)), self%damping_ratio%values(:size(modes)), &
+         self%effective_mass%values(:size(modes)))
       v0 = get_impact_velocity(drop)
       step = 1/sampling%sample_rate
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['modal_force'])
@@ -161,26 +160,18 @@ contains
       end if
    end subroutine check_history
 
-   !> Modes of a ball on a rigid floor do not apply to a mobile floor.
-   function couples(options) result(yes)
-      class(measured_modes_type), intent(in) :: options
-      logical :: yes
-
-      yes = .false.
-   end function couples
-
    !> Approximate time of a drop at one resolution on one core, s.
-   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
+   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
+      class(measured_modes_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
       real(wp), intent(in), optional :: contact_time
       real(wp) :: cost
       real(wp) :: rate
 
-      rate = max(sampling%sample_rate, checks_per_period*maxval(options%frequency%values(:options%frequency%count)))
-      cost = 5.0e-4_wp + min(sampling%duration, typical_contact)*rate*options%frequency%count*1.5e-8_wp
+      rate = max(sampling%sample_rate, checks_per_period*maxval(self%frequency%values(:self%frequency%count)))
+      cost = 5.0e-4_wp + min(sampling%duration, typical_contact)*rate*self%frequency%count*1.5e-8_wp
    end function get_cost
 
    !> One mode from its measured values.

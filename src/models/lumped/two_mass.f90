@@ -56,9 +56,9 @@ module thud_two_mass
       !> Damping ratio of the same motion.
       real(wp) :: belt_damping = 0.2_wp
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: solve
+      procedure :: get_fields
+      procedure :: check
+      procedure :: solve
    end type two_mass_type
 
    !> Equations of motion of belt and rim.
@@ -71,8 +71,7 @@ module thud_two_mass
       real(wp) :: sidewall_stiffness, sidewall_damping
    contains
       procedure :: get_derivative
-      procedure :: record_sample
-      procedure :: record_peaks
+      procedure :: get_components
       procedure :: get_center_motion
       procedure :: get_inner_energy
       procedure :: get_amplitude
@@ -81,52 +80,52 @@ module thud_two_mass
 contains
 
    !> Keys and allowed ranges.
-   function get_fields(options) result(fields)
-      class(two_mass_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(two_mass_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('belt_mass', options%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
+         real_field('belt_mass', self%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
          '(0, 1000000)'), &
-         real_field('inflation_pressure', options%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
-         real_field('contact_width', options%contact_width, 'm', &
+         real_field('inflation_pressure', self%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
+         real_field('contact_width', self%contact_width, 'm', &
          'contact area divided by deflection of the contact patch', &
          '[0, 100]'), &
-         real_field('carcass_stiffness', options%carcass_stiffness, 'N/m', &
+         real_field('carcass_stiffness', self%carcass_stiffness, 'N/m', &
          'force of the carcass divided by its deflection, at 20 mm', '[0, 1e12]'), &
-         real_field('carcass_exponent', options%carcass_exponent, '', &
+         real_field('carcass_exponent', self%carcass_exponent, '', &
          'exponent of the deflection in the force of the carcass', '[1.5, 5]'), &
-         real_field('contact_damping', options%contact_damping, 's/m', &
+         real_field('contact_damping', self%contact_damping, 's/m', &
          'damping force of the contact divided by elastic force and velocity', '[0, 100]'), &
-         real_field('belt_frequency', options%belt_frequency, 'Hz', &
+         real_field('belt_frequency', self%belt_frequency, 'Hz', &
          'natural frequency of the belt on the sidewall with fixed rim', '(0, 1000000]'), &
-         real_field('belt_damping', options%belt_damping, '', &
+         real_field('belt_damping', self%belt_damping, '', &
          'damping ratio of the belt on the sidewall with fixed rim', '[0, 10]')]
    end function get_fields
 
    !> Returns an error if the belt leaves no mass for the rim, or if the patch has no stiffness.
-   subroutine check(ball, options, sampling, error)
+   subroutine check(self, ball, sampling, error)
+      class(two_mass_type), intent(in) :: self
       !> The source, here the tyre.
       type(ball_type), intent(in) :: ball
-      class(two_mass_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. options%belt_mass < ball%mass) then
-         error = input_error('&two_mass: belt_mass = '//to_text(options%belt_mass)//' kg leaves no rim; allowed: below ' &
+      if (.not. self%belt_mass < ball%mass) then
+         error = input_error('&two_mass: belt_mass = '//to_text(self%belt_mass)//' kg leaves no rim; allowed: below ' &
             //'&ball mass = '//to_text(ball%mass)//' kg')
-      else if (.not. options%inflation_pressure*options%contact_width + options%carcass_stiffness > 0.0_wp) then
-         error = input_error('&two_mass: carcass_stiffness = '//to_text(options%carcass_stiffness) &
-            //' N/m with inflation_pressure = '//to_text(options%inflation_pressure)//' Pa and contact_width = ' &
-            //to_text(options%contact_width)//' m bears no load; allowed: a carcass or an inflated patch')
+      else if (.not. self%inflation_pressure*self%contact_width + self%carcass_stiffness > 0.0_wp) then
+         error = input_error('&two_mass: carcass_stiffness = '//to_text(self%carcass_stiffness) &
+            //' N/m with inflation_pressure = '//to_text(self%inflation_pressure)//' Pa and contact_width = ' &
+            //to_text(self%contact_width)//' m bears no load; allowed: a carcass or an inflated patch')
       end if
    end subroutine check
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error, receiver)
+   subroutine solve(self, ball, drop, sampling, history, error, receiver)
+      class(two_mass_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(two_mass_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
@@ -134,7 +133,7 @@ contains
       type(tyre_type) :: tyre
       type(sampling_type) :: finer
 
-      tyre = new_tyre(ball%mass, options)
+      tyre = new_tyre(ball%mass, self)
       finer = sampling
       call choose_steps(tyre, get_impact_velocity(drop), merge(step_angle, coupled_angle, is_rigid(receiver)), finer, error)
       if (allocated(error)) return
@@ -216,8 +215,7 @@ contains
       real(wp) :: force, sidewall
 
       valid = time >= 0.0_wp
-      components = get_components(self, state)
-      force = sum(components)
+      call self%get_components(state, components, force)
       associate (belt => state(at_belt_velocity), rim => state(at_rim_velocity))
          sidewall = self%sidewall_stiffness*(state(at_rim) - state(at_belt)) + self%sidewall_damping*(rim - belt)
          rate(at_belt) = belt
@@ -229,27 +227,18 @@ contains
       end associate
    end subroutine get_derivative
 
-   !> Components of the force on the floor: inflation pressure, carcass, damping, N.
-   pure function get_components(tyre, state) result(components)
-      class(tyre_type), intent(in) :: tyre
-      real(wp), intent(in) :: state(:)
-      real(wp) :: components(3)
-
-      components = 0.0_wp
-      if (tyre%touching) components = get_contact_force(tyre%law, state(at_belt), state(at_belt_velocity))
-   end function get_components
-
-   !> Updates the maxima of force and deflection.
-   pure subroutine record_peaks(self, state, history)
+   !> Components of the force on the floor: inflation pressure, carcass, damping.
+   pure subroutine get_components(self, state, components, elastic_force)
       class(tyre_type), intent(in) :: self
       real(wp), intent(in) :: state(:)
-      type(force_history_type), intent(inout) :: history
-      real(wp) :: center(2)
+      real(wp), intent(out) :: components(:)
+      !> The whole force, including damping: there is no flux of momentum.
+      real(wp), intent(out) :: elastic_force
 
-      center = self%get_center_motion(state)
-      history%peak_force = max(history%peak_force, sum(get_components(self, state)))
-      history%max_deflection = max(history%max_deflection, center(1))
-   end subroutine record_peaks
+      components = 0.0_wp
+      if (self%touching) components = get_contact_force(self%law, state(at_belt), state(at_belt_velocity))
+      elastic_force = sum(components)
+   end subroutine get_components
 
    !> Displacement, m, and velocity, m/s, of the center of mass: [2].
    pure function get_center_motion(self, state) result(center)
@@ -280,25 +269,5 @@ contains
 
       amplitude = self%rim_mass/(self%belt_mass + self%rim_mass)*sqrt(2*self%get_inner_energy(state)/self%sidewall_stiffness)
    end function get_amplitude
-
-   !> Writes motion and forces of one sample into the history.
-   pure subroutine record_sample(self, state, i, history)
-      class(tyre_type), intent(in) :: self
-      real(wp), intent(in) :: state(:)
-      integer, intent(in) :: i
-      type(force_history_type), intent(inout) :: history
-      real(wp) :: center(2)
-
-      center = self%get_center_motion(state)
-      history%deflection(i) = center(1)
-      history%velocity(i) = center(2)
-      history%model_history(i, :) = state([at_belt, at_rim])
-      if (allocated(history%floor_displacement)) then
-         history%model_history(i, :) = history%model_history(i, :) + history%floor_displacement(i)
-      end if
-      history%component(i, :) = get_components(self, state)
-      history%elastic_force(i) = sum(history%component(i, :))
-      history%floor_force(i) = history%elastic_force(i)
-   end subroutine record_sample
 
 end module thud_two_mass

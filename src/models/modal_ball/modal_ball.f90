@@ -38,19 +38,19 @@ module thud_modal_ball
    !> The model.
    type, extends(modal_ball_options_type) :: modal_ball_type
    contains
-      procedure, pass(options) :: solve
-      procedure, pass(options) :: compress
-      procedure, pass(options) :: get_cost
-      procedure, pass(options) :: get_standard_modulus
-      procedure, pass(options) :: get_validity_limits
+      procedure :: solve
+      procedure :: compress
+      procedure :: get_cost
+      procedure :: get_standard_modulus
+      procedure :: get_validity_limits
    end type modal_ball_type
 
 contains
 
    !> Approximate time of a drop at one resolution on one core, s.
-   function get_cost(ball, options, sampling, receiver, contact_time) result(cost)
+   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
+      class(modal_ball_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(receiver_type), intent(in), optional :: receiver
       real(wp), intent(in), optional :: contact_time
@@ -60,20 +60,20 @@ contains
       time = typical_contact
       ! The ball rises a little before the end is certain.
       if (present(contact_time)) time = 1.15_wp*contact_time
-      n_gap = options%get_ring_count()*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
-      n_ring_harmonic = 2*pi*options%get_ring_count()/options%outermost_angle
-      omega = min(2*pi*options%get_highest_frequency(), max_phase*sampling%sample_rate*sampling%substeps)
+      n_gap = self%get_ring_count()*merge(2.0_wp, 1.0_wp, self%floor_friction == 'stick')
+      n_ring_harmonic = 2*pi*self%get_ring_count()/self%outermost_angle
+      omega = min(2*pi*self%get_highest_frequency(), max_phase*sampling%sample_rate*sampling%substeps)
       n_mode = estimate_mode_count(ball, omega)
       n_family = 3 + omega/get_shear_velocity(ball)*ball%outer_radius
       cost = 7.3e-5_wp + n_gap*n_ring_harmonic*(3.5e-8_wp + 3.2e-11_wp*n_gap)
-      if (options%level > 0) then
+      if (self%level > 0) then
          ! An eigenproblem for each harmonic; level 0 shares those of level 1. See `get_degree` of `thud_sphere_modes`.
          n_polynomial = 5 + max(6.0_wp, omega/get_shear_velocity(ball)*ball%wall_thickness/2) &
             + 2.4_wp*sqrt(n_family/2*abs(log(1 - ball%wall_thickness/ball%outer_radius)))
          cost = cost + n_family*(1.4e-5_wp + 5.5e-8_wp*n_polynomial**2 + 2.1e-11_wp*n_polynomial**3)
       end if
       ! The amplitudes and rates of the modes, and Maxwell branches.
-      step_cost = 5.6e-7_wp + 2.1e-9_wp*n_mode*merge(7, 2, options%damping_law == 'fractional') &
+      step_cost = 5.6e-7_wp + 2.1e-9_wp*n_mode*merge(7, 2, self%damping_law == 'fractional') &
          + 1.0e-10_wp*n_gap*(2*n_family + n_gap)
       if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
       if (present(receiver)) then
@@ -85,42 +85,42 @@ contains
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
    !> modulus.
-   function get_standard_modulus(options) result(modulus)
-      class(modal_ball_type), intent(in) :: options
+   function get_standard_modulus(self) result(modulus)
+      class(modal_ball_type), intent(in) :: self
       real(wp) :: modulus
 
       modulus = 1.56e6_wp
    end function get_standard_modulus
 
    !> Limits of linear modes.
-   function get_validity_limits(ball, drop, options, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+      class(modal_ball_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
 
       limits = get_wall_limits(ball, history)
-      if (.not. options%contact_gravity) limits = [limits, get_gravity_limit(drop, history)]
+      if (.not. self%contact_gravity) limits = [limits, get_gravity_limit(drop, history)]
    end function get_validity_limits
 
    !> Force on each of two plates in a quasi-static compression.
-   subroutine compress(ball, options, deflection, force, error)
+   subroutine compress(self, ball, deflection, force, error)
+      class(modal_ball_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_type), intent(in) :: options
       real(wp), intent(in) :: deflection(:)
       real(wp), intent(out) :: force(:)
       type(error_type), allocatable, intent(out) :: error
 
-      call compress_modal_ball(ball, options, deflection, force, error)
+      call compress_modal_ball(ball, self, deflection, force, error)
    end subroutine compress
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error, receiver)
+   subroutine solve(self, ball, drop, sampling, history, error, receiver)
+      class(modal_ball_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      class(modal_ball_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
@@ -141,34 +141,34 @@ contains
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%has_means = .true.
       history%impact_velocity = get_impact_velocity(drop)
-      if (options%level > 0) then
+      if (self%level > 0) then
          history%model_history_name = [character(len=24) :: 'contact_radius_m', &
             ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']
       else
          history%model_history_name = [character(len=24) :: 'contact_radius_m']
       end if
       allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
-      rings = new_surface_rings(options%get_ring_count(), options%outermost_angle, options%floor_friction == 'stick')
-      call prepare(ball, options, rings, floor, interval, modes, static, contact, error)
+      rings = new_surface_rings(self%get_ring_count(), self%outermost_angle, self%floor_friction == 'stick')
+      call prepare(self, ball, rings, floor, interval, modes, static, contact, error)
       if (.not. allocated(error)) then
          state = new_ball_motion(modes, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
-            merge(drop%gravity, 0.0_wp, options%contact_gravity))
+            merge(drop%gravity, 0.0_wp, self%contact_gravity))
          if (state%floor_moves) then
             allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
          end if
          call march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
          call add_model_quantity(history, 'rings', '', real(size(rings%radius), wp))
          call add_model_quantity(history, 'highest_frequency', 'Hz', &
-            min(options%get_highest_frequency(), max_phase/(2*pi*interval)))
+            min(self%get_highest_frequency(), max_phase/(2*pi*interval)))
          call add_model_quantity(history, 'substeps', '', real(sampling%substeps, wp))
       end if
    end subroutine solve
 
    !> Sets the modes, the factors of their time steps, and the response of the rings.
-   subroutine prepare(ball, options, rings, floor, interval, modes, static, contact, error)
-      type(ball_type), intent(in) :: ball
+   subroutine prepare(self, ball, rings, floor, interval, modes, static, contact, error)
       !> Modes and damping.
-      class(modal_ball_options_type), intent(in) :: options
+      class(modal_ball_options_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
       type(surface_rings_type), intent(in) :: rings
       !> The floor under the ball.
       type(receiver_type), intent(in) :: floor
@@ -186,18 +186,18 @@ contains
       real(wp) :: highest_omega, own_response
       logical :: failed
 
-      highest_omega = min(2*pi*options%get_highest_frequency(), max_phase/interval)
-      if (allocated(options%families)) then
-         families = options%families
+      highest_omega = min(2*pi*self%get_highest_frequency(), max_phase/interval)
+      if (allocated(self%families)) then
+         families = self%families
       else
-         call get_families(ball, options%cavity_gas, highest_omega, families, error)
+         call get_families(ball, self%cavity_gas, highest_omega, families, error)
          if (allocated(error)) return
       end if
-      call set_modes(options, rings, highest_omega, families, modes)
+      call set_modes(self, rings, highest_omega, families, modes)
       allocate (zeta, mold=modes%omega)
-      call set_damping(options, modes, zeta)
+      call set_damping(self, modes, zeta)
       call set_factors(modes, zeta, interval)
-      call get_response(ball, options, rings, families, modes, flexibility, response, error)
+      call get_response(self, ball, rings, families, modes, flexibility, response, error)
       if (allocated(error)) return
       static = new_static_step(modes, interval, flexibility)
       ! Response of the rigid ball and of the floor.
@@ -211,9 +211,9 @@ contains
    end subroutine prepare
 
    !> Sets the modes that oscillate.
-   subroutine set_modes(options, rings, highest_omega, families, modes)
+   subroutine set_modes(self, rings, highest_omega, families, modes)
       !> Harmonics treated as quasi-static.
-      class(modal_ball_options_type), intent(in) :: options
+      class(modal_ball_options_type), intent(in) :: self
       type(surface_rings_type), intent(in) :: rings
       !> Highest angular frequency of modes that oscillate, rad/s.
       real(wp), intent(in) :: highest_omega
@@ -224,7 +224,7 @@ contains
       integer :: n, n_mode, highest
 
       do n = 0, ubound(families, 1)
-         associate (chosen => options%static_families)
+         associate (chosen => self%static_families)
             call limit_family(merge(0.0_wp, highest_omega, any(nint(chosen%values(:chosen%count)) == n)), families(n))
          end associate
       end do
@@ -246,9 +246,9 @@ contains
    end subroutine set_modes
 
    !> Displacements of the rings due to unit forces on them.
-   subroutine get_response(ball, options, rings, families, modes, flexibility, response, error)
+   subroutine get_response(self, ball, rings, families, modes, flexibility, response, error)
+      class(modal_ball_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
       !> Families that have modes: [0:highest].
       type(family_type), intent(in) :: families(0:)
@@ -268,7 +268,7 @@ contains
       integer :: n, i, highest
 
       highest = ubound(rings%shape_at_ring, 3)
-      basis = new_basis(ball, 0, options%cavity_gas)
+      basis = new_basis(ball, 0, self%cavity_gas)
       associate (n_gap => size(rings%shape_at_ring, 1))
          allocate (displacement(n_gap, 2, 0:highest), flexibility(n_gap, n_gap), response(n_gap, n_gap))
       end associate

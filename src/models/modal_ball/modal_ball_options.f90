@@ -9,7 +9,7 @@ module thud_modal_ball_options
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
    use thud_prony, only: check_fractional_loss
    use thud_sampling, only: sampling_type
-   use thud_source_model, only: source_model_type
+   use thud_source_model, only: convergence_type, source_model_type
    use thud_sphere_modes, only: family_type, get_families
    use thud_surface_rings, only: greatest_angle
    use thud_text, only: to_text
@@ -94,87 +94,87 @@ module thud_modal_ball_options
       !> Modes that levels 0 and 1 share; no key: [0:highest harmonic].
       type(family_type), allocatable :: families(:)
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: get_highest_frequency
-      procedure, pass(options) :: get_ring_count
-      procedure, pass(options) :: share_setup
-      procedure, pass(options) :: set_level
-      procedure, pass(options) :: get_highest_level
-      procedure, pass(options) :: chooses_resolution
-      procedure, pass(options) :: get_expected_level
-      procedure, pass(options) :: get_error_ratio
+      procedure :: get_fields
+      procedure :: check
+      procedure :: get_highest_frequency
+      procedure :: get_ring_count
+      procedure :: share_setup
+      procedure :: set_level
+      procedure :: get_highest_level
+      procedure :: chooses_resolution
+      procedure :: get_expected_level
+      procedure :: get_convergence
    end type modal_ball_options_type
 
 contains
 
    !> Keys and allowed ranges.
-   function get_fields(options) result(fields)
-      class(modal_ball_options_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(modal_ball_options_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('highest_frequency', options%highest_frequency, 'Hz', &
+         real_field('highest_frequency', self%highest_frequency, 'Hz', &
          'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]', &
          is_numerical=.true.), &
-         integer_field('rings', options%rings, &
+         integer_field('rings', self%rings, &
          'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
-         choice_field('damping_law', options%damping_law, 'damping law: loss factor as a function of frequency', &
+         choice_field('damping_law', self%damping_law, 'damping law: loss factor as a function of frequency', &
          [character(len=10) :: 'constant', 'rising', 'fractional']), &
          only_with('damping_law', ['rising    ', 'fractional', 'constant  '], [real_field('loss_factor', &
-         options%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', is_calibrated=.true.)]), &
-         only_with('damping_law', ['rising    ', 'fractional'], [real_field('loss_frequency', options%loss_frequency, 'Hz', &
+         self%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', is_calibrated=.true.)]), &
+         only_with('damping_law', ['rising    ', 'fractional'], [real_field('loss_frequency', self%loss_frequency, 'Hz', &
          'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]', &
          is_calibrated=.true.)]), &
-         only_with('damping_law', ['fractional'], [real_field('fractional_order', options%fractional_order, '', &
+         only_with('damping_law', ['fractional'], [real_field('fractional_order', self%fractional_order, '', &
          'order of the derivative, for fractional; 1: as rising', '(0, 1]')]), &
-         logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists volume changes'), &
-         logical_field('contact_gravity', options%contact_gravity, 'gravity acts also during the contact'), &
-         choice_field('floor_friction', options%floor_friction, 'friction of the floor: none or infinite (sticking)', &
+         logical_field('cavity_gas', self%cavity_gas, 'the gas in the cavity resists volume changes'), &
+         logical_field('contact_gravity', self%contact_gravity, 'gravity acts also during the contact'), &
+         choice_field('floor_friction', self%floor_friction, 'friction of the floor: none or infinite (sticking)', &
          [character(len=5) :: 'none', 'stick']), &
-         list_field('static_families', options%static_families, '', 'harmonics treated as quasi-static', &
+         list_field('static_families', self%static_families, '', 'harmonics treated as quasi-static', &
          '[0, 400]', whole=.true.)]
    end function get_fields
 
    !> Returns an error if no fractional law has this loss factor, if there is a single ring, or if the modes without inertia
    !> would creep more slowly than the contact.
-   subroutine check(ball, options, sampling, error)
+   subroutine check(self, ball, sampling, error)
+      class(modal_ball_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
 
-      if (options%rings == 1) then
+      if (self%rings == 1) then
          error = input_error('&modal_ball: rings = 1 cannot carry a pressure; allowed: from 2, or 0 for automatic')
-      else if (options%highest_frequency > 0.0_wp .and. options%highest_frequency < lowest_frequency) then
-         error = input_error('&modal_ball: highest_frequency = '//to_text(options%highest_frequency) &
+      else if (self%highest_frequency > 0.0_wp .and. self%highest_frequency < lowest_frequency) then
+         error = input_error('&modal_ball: highest_frequency = '//to_text(self%highest_frequency) &
             //' Hz is not allowed; allowed: from '//to_text(lowest_frequency)//' to 20000 Hz, or 0 for automatic')
-      else if (options%damping_law == 'fractional') then
-         call check_fractional_loss('modal_ball', options%fractional_order, options%loss_factor, options%loss_frequency, &
+      else if (self%damping_law == 'fractional') then
+         call check_fractional_loss('modal_ball', self%fractional_order, self%loss_factor, self%loss_frequency, &
             error)
       end if
    end subroutine check
 
    !> Computes the modes of levels 0 and 1.
-   subroutine share_setup(ball, options, sampling)
+   subroutine share_setup(self, ball, sampling)
+      class(modal_ball_options_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(inout) :: options
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable :: error
       real(wp) :: highest_omega
 
-      options%level = 1
-      options%coarse_frequency = get_coarse_frequency(ball)
-      highest_omega = min(2*pi*max(get_level_frequency(options, 0), get_level_frequency(options, 1)), &
+      self%level = 1
+      self%coarse_frequency = get_coarse_frequency(ball)
+      highest_omega = min(2*pi*max(get_level_frequency(self, 0), get_level_frequency(self, 1)), &
          max_phase*sampling%sample_rate*sampling%substeps*max_refinement)
       ! After an error there are no families; the drop repeats it, and returns the error.
-      call get_families(ball, options%cavity_gas, highest_omega, options%families, error)
+      call get_families(ball, self%cavity_gas, highest_omega, self%families, error)
    end subroutine share_setup
 
    !> Sets the resolution: modes, rings around the contact of the coarser drop, and time steps.
-   subroutine set_level(ball, options, level, sampling, coarse)
+   subroutine set_level(self, ball, level, sampling, coarse)
+      class(modal_ball_options_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(inout) :: options
       integer, intent(in) :: level
       type(sampling_type), intent(inout) :: sampling
       type(force_history_type), intent(in) :: coarse
@@ -182,46 +182,46 @@ contains
       real(wp) :: contact_steps
       integer :: refinement
 
-      if (level > 1 .and. allocated(options%families)) deallocate (options%families)
-      options%level = level
-      options%coarse_frequency = get_coarse_frequency(ball)
+      if (level > 1 .and. allocated(self%families)) deallocate (self%families)
+      self%level = level
+      self%coarse_frequency = get_coarse_frequency(ball)
       refinement = 2**level
       contact_steps = coarse%contact_time*sampling%sample_rate*sampling%substeps
       ! Sticking rings converge slowly; without them few steps suffice.
-      if (contact_steps > 0.0_wp .and. options%floor_friction /= 'stick') then
+      if (contact_steps > 0.0_wp .and. self%floor_friction /= 'stick') then
          refinement = min(2*refinement, max(refinement/2, ceiling(min_steps/contact_steps)))
       end if
       sampling%substeps = sampling%substeps*refinement
-      if (options%rings > 0 .or. .not. allocated(coarse%model_history)) return
+      if (self%rings > 0 .or. .not. allocated(coarse%model_history)) return
       ! A ball with few modes may have a larger contact than one with more.
-      if (has_few_modes(options, options%coarse_frequency)) return
-      options%outermost_angle = min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
+      if (has_few_modes(self, self%coarse_frequency)) return
+      self%outermost_angle = min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
          + added_rings*greatest_angle/(coarse_rings - 1))
    end subroutine set_level
 
    !> Highest level of resolution: if the user sets the resolution, it does not grow.
-   function get_highest_level(ball, options, sampling) result(level)
+   function get_highest_level(self, ball, sampling) result(level)
+      class(modal_ball_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
       integer :: level
 
-      level = merge(highest_level, 1, options%chooses_resolution() &
-         .and. .not. has_few_modes(options, get_coarse_frequency(ball)))
+      level = merge(highest_level, 1, self%chooses_resolution() &
+         .and. .not. has_few_modes(self, get_coarse_frequency(ball)))
    end function get_highest_level
 
    !> Whether the input leaves rings or modes open.
-   function chooses_resolution(options) result(yes)
-      class(modal_ball_options_type), intent(in) :: options
+   function chooses_resolution(self) result(yes)
+      class(modal_ball_options_type), intent(in) :: self
       logical :: yes
 
-      yes = options%rings == 0 .or. .not. options%highest_frequency > 0.0_wp
+      yes = self%rings == 0 .or. .not. self%highest_frequency > 0.0_wp
    end function chooses_resolution
 
    !> Level that most of 80 random balls reach with such contacts and numbers of modes.
-   function get_expected_level(ball, options, contact) result(level)
+   function get_expected_level(self, ball, contact) result(level)
+      class(modal_ball_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(in) :: options
       type(force_history_type), intent(in) :: contact
       integer :: level
       real(wp) :: n_mode
@@ -231,8 +231,8 @@ contains
       if (n_mode > many_modes(1) .or. maxval(contact%model_history) < small_contact*ball%outer_radius) level = 2
       if (n_mode > many_modes(2)) level = 3
       ! Rings of thin walls that stick do not converge.
-      if (options%floor_friction == 'stick' .and. ball%wall_thickness < thin_wall*ball%outer_radius) level = 3
-      if (options%get_error_ratio(ball, level, contact) > usual_ratio) level = level + 1
+      if (self%floor_friction == 'stick' .and. ball%wall_thickness < thin_wall*ball%outer_radius) level = 3
+      if (get_error_ratio(ball, contact) > usual_ratio) level = level + 1
    end function get_expected_level
 
    !> Approximate number of modes up to a frequency, within about a third: waves in the cross section of the wall, and
@@ -267,12 +267,20 @@ contains
       velocity = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))
    end function get_shear_velocity
 
-   !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
-   !> (docs/modal_ball.md).
-   function get_error_ratio(ball, options, level, history) result(ratio)
+   !> Convergence of a result: its difference from the next coarser level.
+   function get_convergence(self, ball, level, history) result(convergence)
+      class(modal_ball_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
-      class(modal_ball_options_type), intent(in) :: options
       integer, intent(in) :: level
+      type(force_history_type), intent(in) :: history
+      type(convergence_type) :: convergence
+
+      convergence = convergence_type(reference=level - 1, ratio=get_error_ratio(ball, history))
+   end function get_convergence
+
+   !> Estimated error of a result divided by that difference: it is found from random balls (docs/modal_ball.md).
+   function get_error_ratio(ball, history) result(ratio)
+      type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 
@@ -282,40 +290,40 @@ contains
    end function get_error_ratio
 
    !> Number of rings: that of the user, fewer at level 0, or that of the level of resolution.
-   pure function get_ring_count(options) result(n_ring)
-      class(modal_ball_options_type), intent(in) :: options
+   pure function get_ring_count(self) result(n_ring)
+      class(modal_ball_options_type), intent(in) :: self
       integer :: n_ring
 
-      n_ring = nint(merge(coarse_rings, default_rings*ratio**(options%level - 1), options%level == 0))
-      if (options%rings > 0) n_ring = max(2, nint(options%rings*ratio**(options%level - 1)))
+      n_ring = nint(merge(coarse_rings, default_rings*ratio**(self%level - 1), self%level == 0))
+      if (self%rings > 0) n_ring = max(2, nint(self%rings*ratio**(self%level - 1)))
    end function get_ring_count
 
    !> Highest frequency of oscillating modes at the level of resolution, Hz.
-   pure function get_highest_frequency(options) result(frequency)
-      class(modal_ball_options_type), intent(in) :: options
+   pure function get_highest_frequency(self) result(frequency)
+      class(modal_ball_options_type), intent(in) :: self
       real(wp) :: frequency
 
-      frequency = get_level_frequency(options, options%level)
+      frequency = get_level_frequency(self, self%level)
    end function get_highest_frequency
 
    !> Highest frequency of oscillating modes at a level of resolution, Hz: automatic, or that of the user at level 1, lower
    !> at level 0. If the user leaves out modes that matter, the other levels have them, so that the error is known.
-   pure function get_level_frequency(options, level) result(frequency)
-      class(modal_ball_options_type), intent(in) :: options
+   pure function get_level_frequency(self, level) result(frequency)
+      class(modal_ball_options_type), intent(in) :: self
       integer, intent(in) :: level
       real(wp) :: frequency
 
-      if (options%highest_frequency > 0.0_wp .and. (level == 1 &
-         .or. .not. has_few_modes(options, options%coarse_frequency))) then
-         frequency = options%highest_frequency*ratio**(level - 1)
+      if (self%highest_frequency > 0.0_wp .and. (level == 1 &
+         .or. .not. has_few_modes(self, self%coarse_frequency))) then
+         frequency = self%highest_frequency*ratio**(level - 1)
       else
-         frequency = get_automatic_frequency(options, options%coarse_frequency, level)
+         frequency = get_automatic_frequency(self, self%coarse_frequency, level)
       end if
    end function get_level_frequency
 
    !> Highest frequency of oscillating modes at a level of resolution where the user leaves it open, Hz.
-   pure function get_automatic_frequency(options, coarse_frequency, level) result(frequency)
-      class(modal_ball_options_type), intent(in) :: options
+   pure function get_automatic_frequency(self, coarse_frequency, level) result(frequency)
+      class(modal_ball_options_type), intent(in) :: self
       !> That of level 0 without sticking, Hz.
       real(wp), intent(in) :: coarse_frequency
       integer, intent(in) :: level
@@ -323,18 +331,18 @@ contains
 
       frequency = coarse_frequency*ratio**level
       ! Rings that are released lose the energy of modes without inertia.
-      if (options%floor_friction == 'stick') frequency = 2*frequency
+      if (self%floor_friction == 'stick') frequency = 2*frequency
    end function get_automatic_frequency
 
    !> Whether the user's highest frequency is so low that even level 0 has more modes where it is automatic.
-   pure function has_few_modes(options, coarse_frequency) result(yes)
-      class(modal_ball_options_type), intent(in) :: options
+   pure function has_few_modes(self, coarse_frequency) result(yes)
+      class(modal_ball_options_type), intent(in) :: self
       !> Automatic frequency of level 0 without sticking, Hz.
       real(wp), intent(in) :: coarse_frequency
       logical :: yes
 
-      yes = options%highest_frequency > 0.0_wp .and. options%highest_frequency*ratio &
-         < get_automatic_frequency(options, coarse_frequency, 0)
+      yes = self%highest_frequency > 0.0_wp .and. self%highest_frequency*ratio &
+         < get_automatic_frequency(self, coarse_frequency, 0)
    end function has_few_modes
 
 end module thud_modal_ball_options
