@@ -46,6 +46,7 @@ from typing import Literal, TypedDict, Unpack, overload
 from thud.base._schema import (
 {names})
 from thud.case.case import Case
+from thud.case.constructions import Construction
 from thud.impact.impact import Impact
 '''
 # A model is given by name, in its place or as a keyword; the first is the default.
@@ -292,7 +293,7 @@ def python_module(schema: Entry) -> str:
         "\n# Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.\n",
         f"CLASS_LIMITS = {tuple(schema['class_limits'])!r}\n",
         table("Single-number ratings of a level in a room, with symbols, bands and standards.",
-              "RATINGS: dict[RoomRequiredRating, str]",
+              "RATINGS: dict[RoomRating, str]",
               [f"{quoted(name)}: {quoted(title)}" for name, title in schema["ratings"].items()]),
         table("Values of the standard ball by model and key; without a model for free modes alone.",
               "STANDARD_BALL: dict[tuple[str, str], float]",
@@ -329,7 +330,9 @@ def python_calls(schema: Entry) -> str:
         parts.append(f"\nclass {name}Options({base}, total=False):\n")
         parts += [f"    {key['name']}: {python_type(key)}\n" for key in members]
         if base == "TypedDict":
-            parts.append("    floor: FloorOptions | None\n    room: Room | None\n")
+            parts.append(
+                "    floor: FloorOptions | Construction | str | None\n    room: Room | None\n"
+            )
     parts.append(OF_CASE)
     for model in models:
         words = {"options": f"{class_name(model)}Options", "by": f" by the model ``{model}``"}

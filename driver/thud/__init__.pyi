@@ -12,6 +12,12 @@ from .case.case import (
     read_case as read_case,
     write_case as write_case,
 )
+from .case.constructions import (
+    Construction as Construction,
+    Constructions as Constructions,
+    construction as construction,
+    constructions as constructions,
+)
 from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
@@ -29,12 +35,6 @@ from .export.room_sound import (
 )
 from .export.sound_levels import (
     SoundLevels as SoundLevels,
-)
-from .floors.constructions import (
-    Construction as Construction,
-    Constructions as Constructions,
-    construction as construction,
-    constructions as constructions,
 )
 from .floors.floor_comparison import (
     FloorComparison as FloorComparison,

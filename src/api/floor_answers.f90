@@ -1,5 +1,6 @@
 !> Answers on floors and the rooms below them; see `thud_answer`.
 module thud_floor_answers
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_ascending, only: get_ascending_order
    use thud_band, only: band_type, find_bands
    use thud_bundle, only: bundle_type
@@ -22,7 +23,7 @@ module thud_floor_answers
    use thud_request, only: request_type
    use thud_result_bundle, only: add_history, add_room_level
    use thud_ritz_system, only: get_mode_values
-   use thud_room, only: check_below, get_room_bands, room_level_type
+   use thud_room, only: check_below, get_rating_index, get_room_bands, room_level_type, use_standard_positions
    use thud_room_prediction, only: get_area, get_box, get_positions, predict_room
    implicit none (type, external)
    private
@@ -117,7 +118,7 @@ contains
       if (allocated(error) .or. .not. allocated(on_floor)) return
       call add_history(bundle, 'on_floor.', on_floor)
       if (.not. case%has_room) return
-      call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, .true., prediction, error)
+      call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, prediction, error)
       if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
    end subroutine answer_floor_impact
 
@@ -133,7 +134,7 @@ contains
 
       call prepare_floor(case, state, error)
       if (.not. allocated(error)) call predict_room(case, state, request%get_array('force'), &
-         request%get_number('sample_rate'), .true., prediction, error)
+         request%get_number('sample_rate'), prediction, error)
       if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
    end subroutine answer_room_level
 
@@ -154,12 +155,17 @@ contains
       call get_modes_and_box(case, modes, plate, box, error)
       if (allocated(error)) return
       associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
-         call get_positions(case%room, box, ball, microphone)
+         call get_positions(use_standard_positions(case%room, get_rating_index(case%room)), box, ball, microphone)
          if (size(stated_ball) > 0) ball = reshape(stated_ball, [2, size(stated_ball)/2])
          if (size(stated_microphone) > 0) microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
       end associate
       call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), ball, microphone, &
          request%get_number('pressure') > 0.0_wp, .true., room, get_highest(request, box))
+      if (.not. all(ieee_is_finite(room%mean))) then
+         error = input_error('balls: all positions lie on rigid supports, which do not move; allowed: at least one ' &
+            //'elsewhere')
+         return
+      end if
       call bundle%add_array('sides', [3], box%sides)
       call bundle%add_array('ball', shape(ball), ball)
       call bundle%add_array('microphone', shape(microphone), microphone)

@@ -217,16 +217,18 @@ contains
          //' from the nominal levels): the level in the room is not that of a standard source')
    end subroutine add_source_warning
 
-   !> Adds a warning on bands that are left out of the prediction by modes.
+   !> Adds a warning on bands below the crossover that are statistical: their modes are not resolved, or would take too long.
    subroutine add_modes_warning(prediction, warnings)
       type(room_level_type), intent(in) :: prediction
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
 
-      if (prediction%n_left_out == 0) return
-      call add(warnings, '&room: reverberation_time: the prediction by modes ends at ' &
-         //trim(get_band_name(prediction%bands(prediction%n_modal)))//' Hz, below the frequency at which three modes of ' &
-         //'the room overlap, '//fixed(prediction%crossover, 0)//' Hz')
+      associate (next => prediction%n_modal + 1)
+         if (next > size(prediction%bands)) return
+         if (prediction%bands(next)%center <= prediction%crossover) call add(warnings, '&room: from ' &
+            //trim(get_band_name(prediction%bands(next)))//' Hz on the level is statistical, below the frequency at which ' &
+            //'three modes of the room overlap, '//fixed(prediction%crossover, 0)//' Hz')
+      end associate
    end subroutine add_modes_warning
 
    !> Adds warnings on a room of unusual height and a room that is not as large as the floor.

@@ -15,7 +15,7 @@ module thud_floor_model
    implicit none (type, external)
    private
 
-   public :: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support
+   public :: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support, unknown_support
 
    !> Length of the text that says what limits the validity of a floor.
    integer, parameter :: reason_length = 112
@@ -23,6 +23,10 @@ module thud_floor_model
    !> Simply supported edges without further supports; of large floors the middle, as far as modes reach
    !> the highest frequency of a rating.
    character(len=*), parameter :: uncoupled_support = 'uncoupled'
+
+   !> Edges of which nothing is known: the force under the source is that of simply supported ones, the level in the room a
+   !> mean with that of clamped ones.
+   character(len=*), parameter :: unknown_support = 'unknown'
 
    !> What is computed once of a floor, and handed on.
    type :: floor_state_type
@@ -273,7 +277,7 @@ contains
       end if
    end subroutine get_radiating_modes
 
-   !> Whether the sound in the room below can be predicted by the modes of the floor; by default, if it radiates.
+   !> Whether the modes that radiate are those of the floor; by default they are.
    pure function has_room_modes(options) result(yes)
       class(floor_model_type), intent(in) :: options
       logical :: yes

@@ -4,7 +4,7 @@ module thud_measured_mobility_floor
    use thud_band, only: band_type
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_field, only: field_type, list_type
+   use thud_field, only: field_type, list_type, name_length
    use thud_floor_model, only: floor_model_type, floor_state_type, reason_length
    use thud_floor_modes, only: floor_modes_type
    use thud_injected_energy, only: get_mean_conductances
@@ -44,6 +44,8 @@ module thud_measured_mobility_floor
       procedure, pass(options) :: get_radiator
       procedure, pass(options) :: get_radiating_modes
       procedure, pass(options) :: has_room_modes
+      procedure, pass(options) :: get_room_modes
+      procedure, pass(options) :: get_support
    end type measured_mobility_floor_type
 
 contains
@@ -155,20 +157,15 @@ contains
          conductance = 1/get_resistance(plate)
    end subroutine get_radiator
 
-   !> Modes of the plate, simply supported: its radiation factor. The floor has another mobility, and other modes.
+   !> Modes of the plate: the floor has another mobility, and other modes.
    subroutine get_radiating_modes(options, state, plate, modes, error)
       class(measured_mobility_floor_type), intent(in) :: options
       type(floor_state_type), intent(in) :: state
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
-      type(plate_floor_type) :: radiator
-      type(floor_state_type) :: prepared
 
-      radiator = options%radiator
-      radiator%air = options%air
-      call radiator%prepare(prepared, error)
-      if (.not. allocated(error)) call radiator%get_radiating_modes(prepared, plate, modes, error)
+      call options%get_room_modes(state, options%get_support(), plate, modes, error)
    end subroutine get_radiating_modes
 
    !> The mobility of one point contains no shapes of modes.
@@ -178,6 +175,30 @@ contains
 
       yes = .false.
    end function has_room_modes
+
+   !> Modes of the plate with another support of its edges.
+   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
+      class(measured_mobility_floor_type), intent(in) :: options
+      type(floor_state_type), intent(in) :: state
+      character(len=*), intent(in) :: support
+      type(plate_type), intent(out) :: plate
+      type(floor_modes_type), intent(out) :: modes
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: max_frequency
+      type(plate_floor_type) :: radiator
+
+      radiator = options%radiator
+      radiator%air = options%air
+      call radiator%get_room_modes(state, support, plate, modes, error, max_frequency)
+   end subroutine get_room_modes
+
+   !> Support of the edges of the plate.
+   pure function get_support(options) result(support)
+      class(measured_mobility_floor_type), intent(in) :: options
+      character(len=name_length) :: support
+
+      support = options%radiator%get_support()
+   end function get_support
 
    !> Frequency band of the measurement.
    subroutine get_validity(options, state, lowest, highest, reason)

@@ -55,7 +55,7 @@ contains
       fields = [ &
          path_field('file', options%file, 'file of the modes: frequencies, loss factors, shapes on a grid'), &
          real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
-         //'statistical levels in the room are means', '(0, 1)'), &
+         //'levels in the room are means over positions', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)'), &
          real_field('residual_compliance', options%residual_compliance, 'm/N', &
          'static compliance at the source of the modes above those of the file; 0: that of the plate', '[0, 1]'), &

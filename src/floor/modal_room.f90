@@ -33,7 +33,7 @@ module thud_modal_room
    real(wp), parameter :: sample_ratio = 2.56_wp
 
    !> Maximum number of modes of the room times frequencies: time.
-   real(wp), parameter :: max_values = 1.0e8_wp
+   real(wp), parameter :: max_values = 3.5e7_wp
 
    !> Number of frequencies whose answers of the room are in memory at once.
    integer, parameter :: chunk_size = 64
@@ -61,14 +61,13 @@ module thud_modal_room
 
    !> Levels at positions.
    type :: modal_room_type
-      !> Number of bands, from the lowest, in which the sound is modal, and of those above that are left out because they
-      !> would take too long.
-      integer :: n_band = 0, n_left_out = 0
+      !> Number of bands, from the lowest, in which the sound is modal.
+      integer :: n_band = 0
       !> Maximum Fast levels, dB re 20 uPa: [n_band, n_microphone, n_ball].
       real(wp), allocatable :: level(:, :, :)
-      !> Energy mean over the positions, dB, standard deviation of the levels, and that of their mean, dB, without balls on
-      !> rigid supports: [n_band].
-      real(wp), allocatable :: mean(:), spread(:), mean_spread(:)
+      !> Energy mean over the positions, dB, and standard deviation of their levels, dB, without balls on rigid supports:
+      !> [n_band].
+      real(wp), allocatable :: mean(:), spread(:)
       !> Sound pressure, Pa: [n_sample, n_microphone, n_ball], at this many samples per second.
       real(wp), allocatable :: pressure(:, :, :)
       real(wp) :: sample_rate = 0.0_wp
@@ -88,7 +87,7 @@ module thud_modal_room
 
    !> Answers of the room to the volume flow into a pair of half waves along length and width, at some frequencies.
    type :: answers_type
-      !> Sound pressure at the microphones, real parts before imaginary ones, Pa s/m3: [n_pair, 2*n_microphone, n_line].
+      !> Sound pressure at the microphones, real parts before imaginary ones, Pa s/m3: [2*n_microphone, n_pair, n_line].
       real(wp), allocatable :: pressure(:, :, :)
       !> Power into the room and its losses per mean-square flow, Pa s/m3: [n_pair, n_line].
       real(wp), allocatable :: input(:, :), loss(:, :)
@@ -177,10 +176,9 @@ contains
          n_line = int(highest*duration)
          if (get_room_mode_count(box, highest)*n_line <= max_values) exit
          room%n_band = room%n_band - 1
-         room%n_left_out = room%n_left_out + 1
       end do
       allocate (room%level(room%n_band, size(microphone, 2), size(ball, 2)))
-      allocate (room%mean(room%n_band), room%spread(room%n_band), room%mean_spread(room%n_band))
+      allocate (room%mean(room%n_band), room%spread(room%n_band))
       allocate (room%floor_input(size(ball, 2)), room%floor_loss(size(ball, 2)), room%room_input(size(ball, 2)), &
          room%room_loss(size(ball, 2)), source=0.0_wp)
       if (room%n_band == 0) return
@@ -209,11 +207,6 @@ contains
          associate (level => room%level(i, :, moving))
             room%mean(i) = 10*log10(sum(10**(level/10))/size(level))
             room%spread(i) = sqrt(get_variance(reshape(level, [size(level)])))
-            ! Balls and microphones are samples of their own; n of them estimate a variance with n - 1 degrees of freedom.
-            associate (n_microphone => size(level, 1), n_ball => size(level, 2))
-               room%mean_spread(i) = sqrt(get_variance(sum(level, dim=1)/n_microphone)/max(n_ball - 1, 1) &
-                  + get_variance(sum(level, dim=2)/n_ball)/max(n_microphone - 1, 1))
-            end associate
          end associate
       end do
    end subroutine get_modal_room
@@ -285,7 +278,7 @@ contains
             end do
             do i = 1, n
                associate (here => flow(:, 2*n_ball*(i - 1) + 1:2*n_ball*i))
-                  pressure = get_transposed_product(answers%pressure(:, :, i), here)
+                  pressure = get_product(answers%pressure(:, :, i), here)
                   sound(before + i, :, :) = cmplx( &
                      pressure(:n_microphone, :n_ball) - pressure(n_microphone + 1:, n_ball + 1:), &
                      pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
@@ -566,22 +559,26 @@ contains
       !> Positions of the microphones, m: [3, n_microphone].
       real(wp), intent(in) :: microphone(:, :)
       type(answers_type), intent(out) :: answers
-      real(wp), allocatable :: shape(:, :), height(:)
-      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(microphone, 2))
+      real(wp), allocatable :: shape(:, :), height(:, :), part(:, :, :)
+      complex(wp) :: amplitude(size(frequency))
       real(wp) :: natural, decay
-      integer :: i, j, k, n
+      integer :: i, j, k, n, n_height, n_line
 
       n = size(microphone, 2)
-      allocate (answers%pressure(size(lx), 2*n, size(frequency)))
-      allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
+      n_line = size(frequency)
+      allocate (answers%pressure(2*n, size(lx), n_line))
+      allocate (answers%input(size(lx), n_line), answers%loss(size(lx), n_line), source=0.0_wp)
       shape = get_cosines(lx, microphone(1, :)/box%sides(1))*get_cosines(ly, microphone(2, :)/box%sides(2))
-      height = microphone(3, :)/box%sides(3)
+      ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
+      n_height = int(2*highest*box%sides(3)/box%air%sound_speed)
+      height = get_cosines([(k, k=0, n_height)], microphone(3, :)/box%sides(3)) &
+         *spread([((-1)**k, k=0, n_height)], 2, n)
+      allocate (part(0:n_height, n_line, 2))
       do i = 1, size(lx)
          k = 0
-         pressure = 0.0_wp
          do
             natural = get_mode_frequency(box, lx(i), ly(i), k)
-            if (natural > highest) exit
+            if (natural > highest .or. k > n_height) exit
             answers%n_mode = answers%n_mode + 1
             decay = 6*log(10.0_wp)/get_reverberation_time(box, natural)
             associate (w => 2*pi*frequency, stiffness => get_modal_stiffness(box, lx(i), ly(i), k))
@@ -589,14 +586,14 @@ contains
                answers%input(i, :) = answers%input(i, :) + amplitude%re
                answers%loss(i, :) = answers%loss(i, :) + (amplitude%re**2 + amplitude%im**2)*decay/stiffness
             end associate
-            ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
-            do j = 1, n
-               pressure(:, j) = pressure(:, j) + (-1)**k*cos(k*pi*height(j))*shape(i, j)*amplitude
-            end do
+            part(k, :, 1) = amplitude%re
+            part(k, :, 2) = amplitude%im
             k = k + 1
          end do
-         answers%pressure(i, :n, :) = transpose(pressure%re)
-         answers%pressure(i, n + 1:, :) = transpose(pressure%im)
+         do j = 1, 2
+            answers%pressure((j - 1)*n + 1:j*n, i, :) = spread(shape(i, :), 2, n_line) &
+               *get_transposed_product(height(:k, :), part(:k - 1, :, j))
+         end do
       end do
    end subroutine get_answers
 

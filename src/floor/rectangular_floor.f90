@@ -3,7 +3,8 @@ module thud_rectangular_floor
    use thud_double_plate, only: double_plate_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
-   use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support
+   use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support, &
+      unknown_support
    use thud_floor_modes, only: floor_modes_type, get_floor_modes, get_mode_limit, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
@@ -20,7 +21,7 @@ module thud_rectangular_floor
    public :: base_floor_type, rectangular_floor_type
 
    !> Supports of the edges.
-   character(len=*), parameter :: supports(*) = [character(len=7) :: 'simple', 'clamped', 'free', 'elastic']
+   character(len=*), parameter :: supports(*) = [character(len=7) :: unknown_support, 'simple', 'clamped', 'free', 'elastic']
 
    !> Minimum distance of the source from a rigid line, m: the radius of the contact.
    real(wp), parameter :: min_distance = 0.05_wp
@@ -54,7 +55,7 @@ module thud_rectangular_floor
       !> Relative position of the source along length and width.
       real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
       !> Support of the edges.
-      character(len=name_length) :: support = 'simple'
+      character(len=name_length) :: support = unknown_support
       !> Springs along the edges x = 0, x = length, y = 0 and y = width, or one value for all: stiffness against deflection
       !> per length, N/m2, and against rotation, N.
       type(list_type) :: support_stiffness, support_rotation
@@ -110,7 +111,7 @@ contains
 
       fields = [ &
          real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
-         //'statistical levels in the room are means', '(0, 1)'), &
+         //'levels in the room are means over positions', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
@@ -479,7 +480,7 @@ contains
       type(edge_type) :: edge(4)
 
       select case (support)
-       case ('simple', uncoupled_support)
+       case (unknown_support, 'simple', uncoupled_support)
          edge = edge_type(rigid_support, 0.0_wp)
        case ('clamped')
          edge = edge_type(rigid_support, rigid_support)

@@ -14,24 +14,24 @@ module thud_room
    use thud_modal_radiation, only: modal_radiation_type
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
-   use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level, get_rounded, get_standardization, &
-      rating_names
-   use thud_response_spread, only: get_band_variance, get_level_spread
+   use thud_rating, only: find_rated_bands, get_a_weighted_level, get_standardization, rating_names
    use thud_text, only: to_text
-   use thud_transient_energy, only: get_fast_history, get_fast_maximum
+   use thud_transient_energy, only: get_fast_maximum
    implicit none (type, external)
    private
 
-   public :: check_below, check_below_subceiling, check_room, few_modes, get_completed_room, get_reverberation_times
-   public :: get_octave_levels, get_rated, get_ratings, get_room_bands, get_room_fields, get_room_level, &
-      judge_requirement, modal_radiation
-   public :: room_level_type, room_type, standard_positions
+   public :: add_ratings, band_record_type, check_below, check_below_subceiling, check_room, get_band_records
+   public :: get_completed_room, get_rating_index, get_reverberation_times, get_room_bands, get_room_fields, get_room_level
+   public :: modal_radiation, positions_of_rating, room_level_type, room_type, use_standard_positions
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
 
-   !> Radiation factor by the modes of the floor; positions of the standards.
-   character(len=*), parameter :: modal_radiation = 'modes', standard_positions = 'standard'
+   !> Radiation factor by the modes of the floor.
+   character(len=*), parameter :: modal_radiation = 'modes'
+
+   !> Positions of ball and microphone: those of the standard of the rating, 5 of KS F 2810-2, or 16 even ones.
+   character(len=*), parameter :: positions_of_rating = 'rating', standard_positions = 'standard'
 
    !> Band sets of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
@@ -45,14 +45,8 @@ module thud_room
    !> Natural logarithm of an energy decay of 60 dB.
    real(wp), parameter :: decay_of_60_db = 6*log(10.0_wp)
 
-   !> Number of modes in a band below which the statistical result is unreliable.
-   real(wp), parameter :: few_modes = 5.0_wp
-
    !> Least ratio of the energies of the modes above the room to those of the modes beyond it.
    real(wp), parameter :: min_energy_ratio = 1.02_wp
-
-   !> Time step of a history, s: 4 % of the detector's time constant.
-   real(wp), parameter :: history_step = 5.0e-3_wp
 
    !> Height of a room of which neither height nor volume is stated, m.
    real(wp), parameter :: default_height = 2.5_wp
@@ -89,12 +83,12 @@ module thud_room
       real(wp) :: corner_x = 0.0_wp, corner_y = 0.0_wp
       !> Radiation factor of the floor: by its `modes`, or by `iso_12354`.
       character(len=name_length) :: radiation = modal_radiation
-      !> Positions of ball and microphone: `standard` or `even` ones.
-      character(len=name_length) :: positions = standard_positions
-      !> Maximum rating that is required, dB; 0: none.
+      !> Positions of ball and microphone: those of the rating, `standard` or `even` ones.
+      character(len=name_length) :: positions = positions_of_rating
+      !> The rating that is asked for, one of `rating_names`.
+      character(len=name_length) :: rating = rating_names(2)
+      !> Maximum of that rating that is required, dB; 0: none.
       real(wp) :: required = 0.0_wp
-      !> The rating that it refers to, one of `rating_names`.
-      character(len=name_length) :: required_rating = rating_names(1)
    end type room_type
 
    !> A prediction in one-third-octave bands.
@@ -116,41 +110,41 @@ module thud_room
       real(wp), allocatable :: radiation_factor(:), loss_factor(:)
       !> Reverberation time of the room, s: [n_band].
       real(wp), allocatable :: reverberation_time(:)
-      !> Numbers of modes of the floor and of the room in the band: [n_band].
-      real(wp), allocatable :: floor_modes(:), room_modes(:)
-      !> Maximum Fast level in the room, dB re 20 uPa, and its time after the impact, s: [n_band].
-      real(wp), allocatable :: level(:), time(:)
       !> Fractions of the energy that enters the room, over all times: from the floor, directly or through a ceiling, and
       !> from each flanking wall: [n_band, 1 + n_wall].
       real(wp), allocatable :: path_share(:, :)
-      !> Expected standard deviation of that level for one source and one microphone position, dB: [n_band].
-      real(wp), allocatable :: spread(:)
-      !> Ratings in the order of `rating_names`, not rounded, dB.
-      real(wp) :: rating(size(rating_names)) = 0.0_wp
-      !> Octave bands, their levels and times, as above: [n_octave].
-      type(band_type), allocatable :: octaves(:)
-      real(wp), allocatable :: octave_level(:), octave_time(:)
-      !> Levels by the modes of floor and room, dB, and spread of positions, dB: [n_band]; not allocated for floors without
-      !> modes. From band `n_modal` + 1 on, they are statistical.
-      integer :: n_modal = 0
-      real(wp), allocatable :: modal_level(:), modal_spread(:)
-      !> Frequency at which three modes of the room overlap, Hz, and number of bands below it that have no modal level
-      !> because it would take too long.
-      real(wp) :: crossover = 0.0_wp
-      integer :: n_left_out = 0
-      !> Standard deviation of the mean over positions, dB: [n_band].
-      real(wp), allocatable :: mean_spread(:)
-      !> The same for simply supported and for clamped edges: [n_band, 2].
+      !> Maximum Fast level in the room, dB re 20 uPa, energy mean over the positions for the rating of octaves, and for the
+      !> others: [n_band, 2].
+      real(wp), allocatable :: rated_level(:, :)
+      !> That for the rating that is asked for, and its standard uncertainty, dB: [n_band].
+      real(wp), allocatable :: level(:), uncertainty(:)
+      !> The level with simply supported and with clamped edges, dB: [n_band, 2].
       real(wp), allocatable :: edge_level(:, :)
-      !> Contributions to the intervals of the ratings, differences from them, dB: [2, n_contribution, n_rating].
-      real(wp), allocatable :: contribution(:, :, :)
-      !> Means of the ratings of both predictions in the order of `rating_names`, not rounded, dB, and the ends of their
-      !> intervals, dB: [2, n_rating].
-      real(wp) :: rated(size(rating_names)) = 0.0_wp
-      real(wp) :: interval(2, size(rating_names)) = 0.0_wp
-      !> Times after the impact, s: [n_time], and level of the Fast detector in each band, dB: [n_time, n_band].
-      real(wp), allocatable :: history_time(:), history(:, :)
+      !> Number of bands whose level follows from the modes of floor and room; the others are statistical.
+      integer :: n_modal = 0
+      !> Frequency at which three modes of the room overlap, Hz.
+      real(wp) :: crossover = 0.0_wp
+      !> Octave bands, their levels, dB, and what the energy sum of the levels of their one-third-octave bands exceeds them,
+      !> dB, as these have their maxima at other times: [n_octave].
+      type(band_type), allocatable :: octaves(:)
+      real(wp), allocatable :: octave_level(:), octave_excess(:)
+      !> Ratings in the order of `rating_names`, not rounded, dB, and their standard uncertainty, dB.
+      real(wp) :: rating(size(rating_names)) = 0.0_wp
+      real(wp) :: rating_uncertainty = 0.0_wp
+      !> Standard uncertainties that add up to it by their squares, dB: [n_contribution].
+      real(wp), allocatable :: contribution(:)
+      !> Probability that the requirement of the room is met.
+      real(wp) :: probability = 0.0_wp
    end type room_level_type
+
+   !> A quantity of a prediction in its bands.
+   type :: band_record_type
+      character(len=name_length) :: name
+      !> Unit, empty for ratios.
+      character(len=8) :: unit
+      !> Values: [n_band].
+      real(wp), allocatable :: values(:)
+   end type band_record_type
 
    !> Energies of the subsystems in one band, dE/dt = -A E, and their weights in the detector.
    type :: band_energies_type
@@ -168,7 +162,7 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [21].
+      !> One field per component: [n_field].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -192,11 +186,11 @@ contains
          choice_field('radiation', room%radiation, 'radiation factor of the floor, by its modes or by ISO 12354-1', &
          [character(len=9) :: modal_radiation, 'iso_12354']), &
          choice_field('positions', room%positions, &
-         'positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each', &
-         [character(len=8) :: standard_positions, 'even']), &
-         real_field('required', room%required, 'dB', 'maximum rating that is required; 0: none', '[0, 200]'), &
-         choice_field('required_rating', room%required_rating, 'rating that required refers to (KS F 2863-2, ISO ' &
-         //'717-2, ISO 16283-2)', rating_names)]
+         'positions of ball and microphone: those of the rating, 5 standard ones each (octaves), or 16 even ones each', &
+         [character(len=8) :: positions_of_rating, standard_positions, 'even']), &
+         choice_field('rating', room%rating, 'rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2)', &
+         rating_names), &
+         real_field('required', room%required, 'dB', 'maximum of that rating that is required; 0: none', '[0, 200]')]
    end function get_room_fields
 
    !> Checks the numbers of reverberation times and of values of the walls.
@@ -308,7 +302,7 @@ contains
       call find_rated_bands(third_set, bands, error)
    end subroutine get_room_bands
 
-   !> Predicts the level in the room.
+   !> Statistical level in the room.
    !>
    !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
    !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
@@ -325,11 +319,10 @@ contains
       type(room_level_type), intent(out) :: prediction
       type(band_energies_type) :: energies(size(bands))
       type(room_type) :: room
-      real(wp), dimension(size(bands)) :: width, maximum, floor_decay
+      real(wp) :: maximum(size(bands))
       integer :: i
 
       room = get_completed_room(stated_room, plate)
-      width = bands%upper - bands%lower
       prediction%bands = bands
       prediction%conductance = radiation%conductance
       prediction%surface_mass = get_surface_mass(plate)
@@ -340,103 +333,93 @@ contains
       prediction%loss_factor = get_total_loss(plate, room%air, bands%center, &
          (radiation%radiation_factor + radiation%upper_factor)/2)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
-      prediction%floor_modes = get_mode_density(plate)*width
-      prediction%room_modes = get_room_mode_density(room, bands%center)*width
-      allocate (prediction%level(size(bands)), prediction%time(size(bands)), prediction%spread(size(bands)))
       allocate (prediction%path_share(size(bands), 1 + room%walls%lengths%count))
-      floor_decay = 2*pi*bands%center*prediction%loss_factor
       do i = 1, size(bands)
          energies(i) = get_band_energies(plate, radiation, room, prediction, i)
-         call get_fast_maximum(energies(i)%loss_matrix, energies(i)%initial_energy, energies(i)%weight, maximum(i), &
-            prediction%time(i))
+         call get_fast_maximum(energies(i)%loss_matrix, energies(i)%initial_energy, energies(i)%weight, maximum(i))
          prediction%path_share(i, :) = get_path_shares(energies(i), size(prediction%path_share, 2))
-         prediction%spread(i) = get_level_spread([ &
-            get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
-            get_band_variance(3, get_room_mode_density(room, bands(i)%center), &
-            decay_of_60_db/prediction%reverberation_time(i), width(i))])
       end do
       prediction%level = 10*log10(maximum/reference_pressure**2)
+      prediction%rated_level = spread(prediction%level, 2, 2)
       call add_octaves(energies, prediction)
-      prediction%rating = get_ratings(prediction, prediction%level)
-      call add_history(energies, prediction)
+      call add_ratings(prediction)
    end subroutine get_room_level
 
-   !> Levels of octaves that belong to levels of one-third-octave bands, dB: energy sums, less what the sums of the
-   !> statistical levels exceed the maxima of their sum.
-   pure function get_octave_levels(prediction, level) result(octave_level)
-      !> A prediction with its statistical levels.
-      type(room_level_type), intent(in) :: prediction
-      !> Levels of the one-third-octave bands, such as those by the modes, dB: [n_band].
+   !> Adds the levels of octaves and the ratings that follow from the levels of one-third-octave bands.
+   pure subroutine add_ratings(prediction)
+      !> A prediction with the levels at the positions for ratings.
+      type(room_level_type), intent(inout) :: prediction
+
+      prediction%octave_level = get_octave_sums(prediction%rated_level(:, 1)) - prediction%octave_excess
+      associate (level => prediction%rated_level(:, 2))
+         prediction%rating = [get_a_weighted_level(octave_set, prediction%octave_level), &
+            get_a_weighted_level(third_set, level), get_a_weighted_level(third_set, level &
+            + get_standardization(prediction%reverberation_time, prediction%volume))]
+      end associate
+   end subroutine add_ratings
+
+   !> Levels of the energy sums of the one-third-octave bands of each octave, dB: [n_octave].
+   pure function get_octave_sums(level) result(octave_level)
+      !> Levels of the one-third-octave bands, dB: [n_band].
       real(wp), intent(in) :: level(:)
       real(wp) :: octave_level(size(level)/bands_per_octave)
 
-      octave_level = prediction%octave_level + 10*log10(get_sums(level)/get_sums(prediction%level))
-   contains
+      octave_level = 10*log10(sum(reshape(10**(level/10), [bands_per_octave, size(octave_level)]), dim=1))
+   end function get_octave_sums
 
-      !> Energy sums of the bands of each octave: [n_octave].
-      pure function get_sums(level) result(energy)
-         real(wp), intent(in) :: level(:)
-         real(wp) :: energy(size(level)/bands_per_octave)
-
-         energy = sum(reshape(10**(level/10), [bands_per_octave, size(energy)]), dim=1)
-      end function get_sums
-   end function get_octave_levels
-
-   !> Ratings of levels in the room, in the order of `rating_names`, not rounded, dB.
-   pure function get_ratings(prediction, level) result(rating)
-      !> A prediction for the same room, with its statistical levels.
+   !> The quantities of a prediction in its bands, for all that writes them.
+   pure function get_band_records(prediction) result(records)
       type(room_level_type), intent(in) :: prediction
-      !> Levels of the one-third-octave bands, such as those by the modes, dB: [n_band].
-      real(wp), intent(in) :: level(:)
-      real(wp) :: rating(size(rating_names))
+      type(band_record_type), allocatable :: records(:)
 
-      rating = [get_a_weighted_level(octave_set, get_octave_levels(prediction, level)), &
-         get_a_weighted_level(third_set, level), get_a_weighted_level(third_set, level &
-         + get_standardization(prediction%reverberation_time, prediction%volume))]
-   end function get_ratings
+      records = [ &
+         band_record_type('level', 'dB', prediction%level), &
+         band_record_type('uncertainty', 'dB', prediction%uncertainty), &
+         band_record_type('simple_level', 'dB', prediction%edge_level(:, 1)), &
+         band_record_type('clamped_level', 'dB', prediction%edge_level(:, 2)), &
+         band_record_type('energy', 'J', prediction%energy), &
+         band_record_type('conductance', 's/kg', prediction%conductance), &
+         band_record_type('radiation_factor', '', prediction%radiation_factor), &
+         band_record_type('loss_factor', '', prediction%loss_factor), &
+         band_record_type('reverberation_time', 's', prediction%reverberation_time)]
+   end function get_band_records
 
-   !> A rating by the mean of both predictions, and the ends of its interval, not rounded, dB.
-   pure function get_rated(prediction, name) result(rated)
-      type(room_level_type), intent(in) :: prediction
-      !> One of `rating_names`.
-      character(len=*), intent(in) :: name
-      !> Mean, lower and upper end.
-      real(wp) :: rated(3)
-
-      associate (i => findloc(rating_names == name, .true., dim=1))
-         rated = [prediction%rated(i), prediction%interval(:, i)]
-      end associate
-   end function get_rated
-
-   !> Verdict on the requirement of a room: whether all levels of the interval, rounded, are at most the required one.
-   pure function judge_requirement(room, prediction) result(verdict)
-      !> A room with a requirement.
+   !> Index of the rating that is asked for.
+   pure function get_rating_index(room) result(number)
       type(room_type), intent(in) :: room
-      type(room_level_type), intent(in) :: prediction
-      character(len=38) :: verdict
+      integer :: number
 
-      associate (rated => get_rounded(get_rated(prediction, room%required_rating)))
-         verdict = 'undecided'
-         if (rated(3) <= room%required) verdict = 'met'
-         if (rated(2) > room%required) verdict = 'not met'
-         if (.not. prediction%source_conforms) verdict = 'undecided: the source does not conform'
-      end associate
-   end function judge_requirement
+      number = findloc(rating_names == room%rating, .true., dim=1)
+   end function get_rating_index
 
-   !> Levels of the octaves. The detector is linear in the energies, so an octave needs the sum of the energies of its
-   !> one-third-octave bands; the maximum of the sum is at most the sum of the maxima.
+   !> Whether ball and microphone have the standard positions for a rating: unless stated, for the octaves of KS F 2810-2.
+   pure function use_standard_positions(room, rating) result(yes)
+      type(room_type), intent(in) :: room
+      !> Index of the rating.
+      integer, intent(in) :: rating
+      logical :: yes
+
+      yes = room%positions == standard_positions &
+         .or. room%positions == positions_of_rating .and. rating_names(rating) == 'octaves'
+   end function use_standard_positions
+
+   !> What the energy sums of one-third-octave bands exceed the levels of octaves by. The detector is linear in the energies,
+   !> so an octave needs the sum of the energies of its one-third-octave bands; the maximum of the sum is at most the sum of
+   !> the maxima.
    subroutine add_octaves(energies, prediction)
       !> Energies of the one-third-octave bands, three for each octave: [n_band].
       type(band_energies_type), intent(in) :: energies(:)
+      !> Prediction with statistical levels.
       type(room_level_type), intent(inout) :: prediction
       type(error_type), allocatable :: error
-      real(wp), allocatable :: loss_matrix(:, :), initial_energy(:), weight(:)
+      real(wp), allocatable :: loss_matrix(:, :), initial_energy(:), weight(:), sums(:)
       real(wp) :: maximum
       integer :: i, j, n, at
 
       call find_rated_bands(octave_set, prediction%octaves, error)
       n = size(energies(1)%initial_energy)
-      allocate (prediction%octave_level(size(prediction%octaves)), prediction%octave_time(size(prediction%octaves)))
+      allocate (prediction%octave_excess(size(prediction%octaves)))
+      sums = get_octave_sums(prediction%level)
       allocate (initial_energy(bands_per_octave*n), weight(bands_per_octave*n))
       do i = 1, size(prediction%octaves)
          allocate (loss_matrix(bands_per_octave*n, bands_per_octave*n), source=0.0_wp)
@@ -448,32 +431,11 @@ contains
                weight(at + 1:at + n) = third%weight
             end associate
          end do
-         call get_fast_maximum(loss_matrix, initial_energy, weight, maximum, prediction%octave_time(i))
-         prediction%octave_level(i) = 10*log10(maximum/reference_pressure**2)
+         call get_fast_maximum(loss_matrix, initial_energy, weight, maximum)
+         prediction%octave_excess(i) = sums(i) - 10*log10(maximum/reference_pressure**2)
          deallocate (loss_matrix)
       end do
    end subroutine add_octaves
-
-   !> Level of the Fast detector against time, until the slowest band lies about 30 dB below its maximum.
-   pure subroutine add_history(energies, prediction)
-      !> Energies of the bands: [n_band].
-      type(band_energies_type), intent(in) :: energies(:)
-      type(room_level_type), intent(inout) :: prediction
-      real(wp) :: duration
-      integer :: i, n
-
-      ! Half of the slower 60 dB decay, that of the room or that of the detector.
-      duration = maxval(prediction%time) + max(maxval(prediction%reverberation_time), fast_reverberation)/2
-      n = nint(duration/history_step)
-      prediction%history_time = [(i*history_step, i=1, n)]
-      allocate (prediction%history(n, size(energies)))
-      do i = 1, size(energies)
-         associate (third => energies(i))
-            prediction%history(:, i) = 10*log10(get_fast_history(third%loss_matrix, third%initial_energy, third%weight, &
-               history_step, n)/reference_pressure**2)
-         end associate
-      end do
-   end subroutine add_history
 
    !> Energies of a band: floor, walls, room, ceiling cavity and the floor beyond the room, with the flows between them.
    !>

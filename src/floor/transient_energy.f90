@@ -6,7 +6,7 @@ module thud_transient_energy
    implicit none (type, external)
    private
 
-   public :: get_fast_maximum, get_fast_history
+   public :: get_fast_maximum
 
    !> Rate of the Fast detector, 1/s: its time constant is 0.125 s (IEC 61672-1).
    real(wp), parameter :: fast_rate = 8.0_wp
@@ -26,7 +26,7 @@ contains
 
    !> Maximum of the Fast detector's response y to a weighted sum of energies: dE/dt = -A E,
    !> y' = fast_rate (w.E - y), y(0) = 0.
-   pure subroutine get_fast_maximum(loss_matrix, initial_energy, weight, maximum, time)
+   pure subroutine get_fast_maximum(loss_matrix, initial_energy, weight, maximum)
       !> A, 1/s; column j has the total loss rate of subsystem j on the diagonal, and elsewhere the negative rates of its
       !> flows to the others: [n, n].
       real(wp), intent(in) :: loss_matrix(:, :)
@@ -34,8 +34,8 @@ contains
       real(wp), intent(in) :: initial_energy(:)
       !> Weights w: [n].
       real(wp), intent(in) :: weight(:)
-      !> Maximum of y, and its time, s.
-      real(wp), intent(out) :: maximum, time
+      !> Maximum of y.
+      real(wp), intent(out) :: maximum
       real(wp) :: step(size(initial_energy) + 1, size(initial_energy) + 1)
       real(wp), dimension(size(initial_energy) + 1) :: state, next
       integer :: i
@@ -43,38 +43,17 @@ contains
       step = get_exponential(search_step*get_system_matrix(loss_matrix, weight))
       state = [initial_energy, 0.0_wp]
       maximum = 0.0_wp
-      time = 0.0_wp
       do i = 1, nint(search_time/search_step)
          next = matmul(step, state)
          ! At time 0 the slope is zero if no subsystem with a weight has energy yet; the first step may still have a maximum.
          if ((i == 1 .or. get_rise(weight, state) > 0.0_wp) .and. get_rise(weight, next) <= 0.0_wp) then
-            call refine(loss_matrix, weight, state, (i - 1)*search_step, maximum, time)
+            call refine(loss_matrix, weight, state, maximum)
             ! The remaining energy cannot raise the detector above this maximum.
             if (maxval(abs(weight))*sum(next(:size(initial_energy))) < maximum) return
          end if
          state = next
       end do
    end subroutine get_fast_maximum
-
-   !> Response of the Fast detector to a weighted sum of energies, at equal time steps from one step after the impact on:
-   !> [n_step].
-   pure function get_fast_history(loss_matrix, initial_energy, weight, interval, n_step) result(detector)
-      !> As in `get_fast_maximum`: [n, n], [n], [n].
-      real(wp), intent(in) :: loss_matrix(:, :), initial_energy(:), weight(:)
-      !> Time step, s.
-      real(wp), intent(in) :: interval
-      integer, intent(in) :: n_step
-      real(wp) :: detector(n_step)
-      real(wp) :: step(size(initial_energy) + 1, size(initial_energy) + 1), state(size(initial_energy) + 1)
-      integer :: i
-
-      step = get_exponential(interval*get_system_matrix(loss_matrix, weight))
-      state = [initial_energy, 0.0_wp]
-      do i = 1, n_step
-         state = matmul(step, state)
-         detector(i) = state(size(state))
-      end do
-   end function get_fast_history
 
    !> Matrix M of energies and detector: [E, y]' = M [E, y].
    pure function get_system_matrix(loss_matrix, weight) result(matrix)
@@ -104,15 +83,13 @@ contains
    end function get_rise
 
    !> Locates the maximum inside a step in which the response turns from rise to fall.
-   pure subroutine refine(loss_matrix, weight, state, begin, maximum, time)
+   pure subroutine refine(loss_matrix, weight, state, maximum)
       !> As in `get_fast_maximum`: [n, n], [n].
       real(wp), intent(in) :: loss_matrix(:, :), weight(:)
       !> Energies and response at the beginning of the step: [n + 1].
       real(wp), intent(in) :: state(:)
-      !> Time of the beginning, s.
-      real(wp), intent(in) :: begin
-      !> Maximum so far and its time, s; replaced by a larger maximum.
-      real(wp), intent(inout) :: maximum, time
+      !> Maximum so far; replaced by a larger one.
+      real(wp), intent(inout) :: maximum
       real(wp) :: matrix(size(state), size(state)), trial(size(state))
       real(wp) :: low, high, offset, rise, next_offset
       integer :: i
@@ -135,9 +112,7 @@ contains
          offset = next_offset
          if (.not. (next_offset > low .and. next_offset < high)) offset = (low + high)/2
       end do
-      if (trial(size(trial)) <= maximum) return
-      maximum = trial(size(trial))
-      time = begin + offset
+      maximum = max(maximum, trial(size(trial)))
    end subroutine refine
 
 end module thud_transient_energy

@@ -41,7 +41,7 @@ module thud_rating
 
    !> Symbols, bands and standards of these ratings.
    character(len=60), parameter :: rating_titles(size(rating_names)) = [character(len=60) :: &
-      'L_iA,Fmax of octaves (KS F 2863-2)', 'L_iA,Fmax of one-third octaves (ISO 717-2)', &
+      'L_iA,Fmax of octaves (KS F ISO 717-2)', 'L_iA,Fmax of one-third octaves (ISO 717-2)', &
       'standardized L_iA,Fmax of one-third octaves (ISO 16283-2)']
 
    !> Reference volume, m3, and reverberation time, s (ISO 16283-2).

@@ -8,7 +8,7 @@ module thud_floor_columns
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_room, only: get_room_bands, room_level_type
+   use thud_room, only: get_room_bands, get_rating_index, room_level_type
    implicit none (type, external)
    private
 
@@ -34,8 +34,7 @@ contains
       names = [character(len=column_name_length) :: get_level_names('contact', bands), 'floor_work_J']
       if (.not. case%has_room) return
       call get_room_bands(room_bands, error)
-      names = [character(len=column_name_length) :: names, get_level_names('room', room_bands), 'room_rating_dB', &
-         'standardized_rating_dB']
+      names = [character(len=column_name_length) :: names, get_level_names('room', room_bands), 'room_rating_dB']
    end function get_floor_columns
 
    !> Names of the columns of levels.
@@ -76,7 +75,7 @@ contains
       else
          values(:n_band) = impact%assessment%level(impact%assessment%first_band:, 2)
       end if
-      if (case%has_room) values(n_band + 2:) = [room%level, room%rating(2:)]
+      if (case%has_room) values(n_band + 2:) = [room%level, room%rating(get_rating_index(case%room))]
    end subroutine get_floor_values
 
 end module thud_floor_columns

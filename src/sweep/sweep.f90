@@ -285,7 +285,7 @@ contains
       real(wp), allocatable :: all_quantities(:)
       integer :: i
 
-      scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels, modal_room=.false.)
+      scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels)
       do i = 1, size(columns)
          if (.not. allocated(error)) call fields(columns(i)%field)%set_number(values(i), columns(i)%entry, error)
       end do

@@ -102,7 +102,7 @@ def answer(tables: Tables) -> str:
         drops = [impact, impact.on_floor] if impact.on_floor else [impact]
         numbers = [array for drop in drops for array in (drop.floor_force, drop.levels())]
         if case.room:
-            numbers.append(np.array(thud.predict_level(impact).rating.a_weighted))
+            numbers.append(np.array(thud.predict_level(impact).rating.level))
     except thud.ThudError as error:
         return f"sentence {error}" if "\n" in str(error) or not str(error) else ""
     return "" if all(np.isfinite(array).all() for array in numbers) else "not finite"

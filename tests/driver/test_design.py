@@ -12,7 +12,7 @@ from conftest import REPOSITORY, naming
 from matplotlib.collections import LineCollection
 
 import thud
-from thud.level.rating import Requirement
+from thud.level.rating import PredictedRating, Requirement
 from thud.plot.study_figures import _draw_limits
 from thud.plot.style import empty_axes
 
@@ -201,7 +201,8 @@ def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
 def room_design(tmp_path_factory: pytest.TempPathFactory) -> thud.Design:
     """Return a map of floors by the shell model, in a room with two reverberation times."""
     path = tmp_path_factory.mktemp("room") / "deck.nml"
-    room = thud.Room(volume=60.0, reverberation_time=(*6 * (0.5,), *6 * (0.6,)))
+    times = (*6 * (0.5,), *6 * (0.6,))
+    room = thud.Room(volume=60.0, reverberation_time=times, rating="octaves")
     case = thud.construction("concrete 180, screed on 10 MN/m3").case(
         thud.Case(model=thud.HollowSphere(), room=room)
     )
@@ -210,15 +211,15 @@ def room_design(tmp_path_factory: pytest.TempPathFactory) -> thud.Design:
         {
             "case": str(path),
             "parameters": {
-                "thickness": {"values": [160, 240, 300], "unit": "mm"},
+                "thickness": {"values": [120, 240, 300], "unit": "mm"},
                 "plate.layer_stiffness": {"values": [4, 8, 30], "unit": "MN/m3"},
             },
         }
     )
 
 
-def test_octave_rating_is_that_of_single_predictions(room_design: thud.Design) -> None:
-    found = room_design.octave_rating
+def test_rating_is_that_of_single_predictions(room_design: thud.Design) -> None:
+    found = room_design.room_rating
     assert found is not None
     assert found.dims == room_design.axes
     case = thud.read_case(Path(str(room_design.dataset.attrs["study"]).split('"')[3]))
@@ -226,13 +227,12 @@ def test_octave_rating_is_that_of_single_predictions(room_design: thud.Design) -
     for i, thickness in enumerate(room_design.dataset["thickness"].values):
         for j, stiffness in enumerate(room_design.dataset[room_design.axes[1]].values):
             floor = replace(case.floor, thickness=thickness, layer_stiffness=stiffness)
-            expected = thud.predict_level(thud.solve(replace(case, floor=floor))).octave_rating
-            # An upper bound: bands of an octave have their maxima at almost the same time.
-            assert 0 <= found.values[i, j] - expected.a_weighted < 0.02
+            prediction = thud.predict_level(thud.solve(replace(case, floor=floor)))
+            assert found.values[i, j] == pytest.approx(prediction.rating.level, abs=1e-6)
 
 
 def test_map_of_a_room_has_the_limits_of_the_korean_classes(room_design: thud.Design) -> None:
-    found = room_design.octave_rating
+    found = room_design.room_rating
     assert found is not None
     rows = dict(room_design.rows())
     assert rows["class 4 or better (KS F 2863-2)"] == str(int((found < 49.5).sum()))
@@ -247,7 +247,7 @@ def test_map_of_a_room_has_the_limits_of_the_korean_classes(room_design: thud.De
 
 def test_map_of_a_room_answers_which_floors_meet_its_requirement(tmp_path: Path) -> None:
     """The color was another rating than that of the lines, and the requirement was ignored."""
-    room = thud.Room(volume=50.0, required=50.0, required_rating="thirds")
+    room = thud.Room(volume=50.0, required=40.0)
     case = thud.construction("concrete 180, screed on 10 MN/m3").case(
         thud.Case(model=thud.HollowSphere(), room=room)
     )
@@ -258,18 +258,18 @@ def test_map_of_a_room_answers_which_floors_meet_its_requirement(tmp_path: Path)
     found = result.dataset["room_rating"]
     assert result.room_rating is not None
     assert result.room_rating.values == pytest.approx(found.values)
-    met = found < 50.5
+    met = found < 40.5
     assert 0 < int(met.sum()) < 5
     rows = dict(result.rows())
-    assert rows["meets 50 dB"] == f"{int(met.sum())} of 5"
+    assert rows["rating at most 40 dB"] == f"{int(met.sum())} of 5"
     assert rows["samples whose source conforms"] == "0"
     smallest = 1e3 * float(result.dataset["thickness"][met.values].min())
     texts = [row for row in result.rows() if row[0] == "  at thickness, mm"]
     assert float(texts[0][1]) == pytest.approx(smallest)
     figure = result.plot()
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["required, 50 dB"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["required, 40 dB"]
     two = thud.design({**study, "parameters": {**parameters, "volume": {"values": [40, 60]}}})
-    assert two.plot().legends[0].get_texts()[0].get_text() == "required, 50 dB"
+    assert two.plot().legends[0].get_texts()[0].get_text() == "required, 40 dB"
 
 
 @pytest.mark.parametrize(("lowest", "verdict"), [(49.4, "met"), (49.5, "not met")])
@@ -277,14 +277,14 @@ def test_map_rounds_the_rating_as_the_verdict_does(
     room_design: thud.Design, lowest: float, verdict: str
 ) -> None:
     """A floor of 49.4 dB met 49 dB by its verdict, and did not in the map."""
-    found = room_design.octave_rating
+    found = room_design.room_rating
     assert found is not None
-    level = room_design.dataset["room_level"] + lowest - float(found.min()) + 1e-9
-    shifted = replace(
-        room_design, dataset=room_design.dataset.assign(room_level=level), required=49.0
-    )
-    assert dict(shifted.rows())["meets 49 dB"] == f"{int(verdict == 'met')} of {found.size}"
-    assert Requirement("octaves", 49.0, lowest, (lowest, lowest)).verdict == verdict
+    rating = found + lowest - float(found.min()) + 1e-9
+    dataset = room_design.dataset.assign(room_rating=rating)
+    shifted = replace(room_design, dataset=dataset, required=49.0)
+    met = f"{int(verdict == 'met')} of {found.size}"
+    assert dict(shifted.rows())["rating at most 49 dB"] == met
+    assert Requirement(49.0, PredictedRating("octaves", lowest, 0.1, {})).verdict == verdict
 
 
 def test_design_of_one_parameter_is_a_curve() -> None:
@@ -295,5 +295,5 @@ def test_design_of_one_parameter_is_a_curve() -> None:
 
 def test_map_without_a_room_has_no_classes() -> None:
     result = thud.design(MODAL)
-    assert result.octave_rating is None
+    assert result.room_rating is None
     assert not any("KS F" in row[0] for row in result.rows())

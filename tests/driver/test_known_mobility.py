@@ -46,7 +46,8 @@ def test_level_of_a_plate_changes_by_its_mobility(
         for low, high in zip(bands.lower[rated], bands.upper[rated], strict=True)
     ])  # fmt: skip
     assert np.abs(change).max() > 1
-    assert known.level - plate.level == pytest.approx(change, abs=0.05)
+    statistical = slice(known.n_modal, None)
+    assert (known.level - plate.level)[statistical] == pytest.approx(change[statistical], abs=0.05)
 
 
 def test_mobility_of_a_large_plate_has_the_level_of_the_plate() -> None:
@@ -56,17 +57,14 @@ def test_mobility_of_a_large_plate_has_the_level_of_the_plate() -> None:
     known, plate = (
         thud.predict_level(floor=each, room=room) for each in (known_floor(large), large)
     )
-    assert known.level[2:] == pytest.approx(plate.level[2:], abs=0.3)
+    above = slice(max(2, known.n_modal), None)
+    assert known.level[above] == pytest.approx(plate.level[above], abs=0.3)
 
 
-def test_one_point_has_no_prediction_by_modes(floor: thud.MeasuredMobility) -> None:
+def test_one_point_has_the_modes_of_its_plate_in_the_room(floor: thud.MeasuredMobility) -> None:
     known = thud.predict_level(floor=floor, room=ROOM)
-    assert known.n_modal == 0
-    assert not known.has_edges
-    assert known.rated == known.rating.a_weighted
-    assert "no modal prediction" in repr(known)
-    assert any("no prediction by modes" in warning for warning in known.warnings)
-    assert {row[2] for row in known.rows()[1:]} == {"–"}
+    assert known.n_modal == thud.predict_level(floor=PLATE, room=ROOM).n_modal > 0
+    assert known.has_edges
     with pytest.raises(thud.InputError, match=naming("this floor has no modes")):
         thud.modal_room(known.source, floor, ROOM)
 

@@ -39,12 +39,9 @@ def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelOpti
         found = thud.predict_level(blocked, floor, thud.Room())
         assert many.room_level is not None
         assert many.room_rating is not None
-        assert many.standardized_rating is not None
         assert many.floor_work is not None
         assert many.room_level[i] == pytest.approx(found.level, abs=1e-9)
-        assert many.room_rating[i] == pytest.approx(found.rating.a_weighted, abs=1e-9)
-        expected = found.standardized_rating.a_weighted
-        assert many.standardized_rating[i] == pytest.approx(expected, abs=1e-9)
+        assert many.room_rating[i] == pytest.approx(found.rating.level, abs=1e-9)
         moved = thud.solve(model=model, floor=floor).on_floor
         assert moved is not None
         assert many.floor_work[i] == pytest.approx(moved.floor_work, rel=1e-12)
@@ -127,20 +124,18 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     axes = {"thickness": {"values": THICKNESSES}, "volume": {"values": [40.0, 60.0]}}
     study = {"case": str(path), "parameters": axes}
     found = thud.design(study)
-    rating = found.dataset["standardized_rating"]
-    assert many.standardized_rating is not None
-    # The volume is standardized away but for what flows back into the floor.
-    assert rating.values[:, 0] == pytest.approx(rating.values[:, 1], abs=0.1)
-    assert rating.values[:, 0] == pytest.approx(many.standardized_rating[2:], abs=0.1)
-    octaves = found.octave_rating
-    assert octaves is not None
-    assert ("lowest rating, dB", f"{float(octaves.min()):.2f}") in found.rows()
+    rating = found.dataset["room_rating"]
+    assert many.room_rating is not None
+    assert rating.shape == (2, 2)
+    # A larger room is quieter.
+    assert (rating.values[:, 0] > rating.values[:, 1]).all()
+    assert ("lowest rating, dB", f"{float(rating.min()):.2f}") in found.rows()
     thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
     assert found.dataset["room_level"].dims[-1] == "room_third"
     draws = {"kind": "random", "size": 4}
     parameters = {"reverberation_time(1)": {"low": 0.4, "high": 0.6}}
     spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
-    assert any(row[0] == "rating, standardized" for row in spread.rows())
+    assert any(row[0] == "rating of the room" for row in spread.rows())
     dataset = many.to_xarray()
     assert dataset["room_level"].shape == (4, 12)
     assert dataset["contact_third_level"].shape == (4, 15)

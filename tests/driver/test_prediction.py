@@ -22,6 +22,7 @@ from thud.cli import main
 from thud.floors.prediction import _force_change
 from thud.impact.room_level import new_room_level
 from thud.level.assessment import octave_limits
+from thud.level.rating import class_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,16 +50,11 @@ def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -
     assert (found.floor.thickness, found.room.volume) == (0.2, 40)
     assert [float(row["level_dB"]) for row in rows] == pytest.approx(found.level, abs=1e-9)
     assert [float(row["nominal_Hz"]) for row in rows] == found.frequency.tolist()
-    shown = re.findall(r"\(((?:KS F|ISO) [\d-]+)\) +(\d+ dB \(\d+ to \d+\))", done.stdout)
-    assert shown == [
-        ("KS F 2863-2", found.octave_text),
-        ("ISO 717-2", found.rated_text),
-        ("ISO 16283-2", found.standardized_text),
-    ]
-    statistical = re.search(r"statistical (\S+) dB, modal (\S+) dB", done.stdout)
-    assert statistical is not None
-    assert float(statistical[1]) == pytest.approx(found.rating.a_weighted, abs=0.051)
-    assert float(statistical[2]) == pytest.approx(found.modal_rating.a_weighted, abs=0.051)
+    summary = f90nml.read(folder / "summary.nml")["room_summary"]
+    ratings = found.ratings.values()
+    assert summary["level"] == pytest.approx([entry.level for entry in ratings])
+    assert summary["uncertainty"] == pytest.approx(found.rating.uncertainty)
+    assert str(found.rating) in " ".join(done.stdout.split())
     assert f"&room: {found.source_warnings[0]}" in done.stderr
 
 
@@ -102,7 +98,9 @@ def test_standardization_takes_room_and_reverberation_out(shell: thud.Impact) ->
     reference = thud.predict_level(shell, thud.Plate(), thud.Room())
     assert reference.standardized == pytest.approx(reference.level)
     larger = thud.predict_level(shell, thud.Plate(), thud.Room(volume=100.0))
-    assert larger.level == pytest.approx(reference.level - 10 * np.log10(2), abs=0.1)
+    # Above the modal bands.
+    half = reference.level - 10 * np.log10(2)
+    assert larger.level[-4:] == pytest.approx(half[-4:], abs=0.1)
     times = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
     longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_time=times))
     assert longer.reverberation_time.tolist() == list(times)
@@ -162,16 +160,8 @@ def test_implausibly_low_rating_raises_a_warning(shell: thud.Impact) -> None:
     quiet = thud.predict_level(shell, floor, thud.Room(ceiling_mass=30.0, ceiling_depth=0.5))
     for prediction in quiet, thud.predict_level(shell, thud.Plate(), thud.Room()):
         warned = any("flanking paths, gaps" in text for text in prediction.warnings)
-        assert warned == (prediction.rated < 30)
-    assert quiet.rated < 30
-
-
-def test_difference_of_both_predictions_ends_with_the_modes(shell: thud.Impact) -> None:
-    prediction = thud.predict_level(shell, thud.Plate(), thud.Room())
-    difference = prediction.modal_level - prediction.level
-    n = prediction.n_modal
-    assert prediction.model_difference[:n] == pytest.approx(difference[:n], abs=0)
-    assert np.isnan(prediction.model_difference[n:]).all()
+        assert warned == (prediction.rating.level < 30)
+    assert quiet.rating.level < 30
 
 
 def test_prediction_is_held_against_measured_levels(shell: thud.Impact) -> None:
@@ -236,23 +226,15 @@ def test_prediction_without_floor_or_room_is_refused(shell: thud.Impact) -> None
         thud.predict_level(shell, thud.Plate(thickness=0.0), thud.Room())
 
 
-def test_walls_ceiling_octaves_and_history_are_written(
+def test_walls_ceiling_and_octaves_are_written(
     run: Run, case_file: CaseFile, shell: thud.Impact
 ) -> None:
-    more = "volume = 40\n wall_lengths = 5, 4\n ceiling_mass = 12\n reverberation_time = 0.8"
+    more = "volume = 40\n wall_lengths = 5, 4\n ceiling_mass = 12\n positions = 'even'"
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
     assert done.returncode == 0, done.stderr
-    assert "Room of 40.0 m3, reverberation time 0.80 s." in done.stdout
-    # The shell does not conform.
-    assert re.search(r"\(KS F 2863-2\) +\d\d dB \(\d\d to \d\d\)\s+class not stated", done.stdout)
     folder = case_file(ROOM_CASE).parent / "out"
     octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
-    history = np.genfromtxt(folder / "room_history.csv", delimiter=",", skip_header=1)
     levels = np.genfromtxt(folder / "room_levels.csv", delimiter=",", names=True)
-    # The maximum of a history in steps of 5 ms, and none above that of the prediction.
-    highest = history[:, 1:].max(axis=0)
-    assert highest == pytest.approx(levels["level_dB"], abs=0.01)
-    assert (highest <= levels["level_dB"] + 1e-9).all()
     assert octaves["nominal_Hz"].tolist() == [63, 125, 250, 500]
     sums = 10 * np.log10((10 ** (levels["level_dB"].reshape(4, 3) / 10)).sum(axis=1))
     assert (octaves["level_dB"] <= sums + 1e-9).all()
@@ -260,9 +242,9 @@ def test_walls_ceiling_octaves_and_history_are_written(
     assert room is not None
     assert room.wall_lengths == (5, 4)
     found = thud.predict_level(shell, thud.Plate(thickness=0.2), room)
+    assert octaves["level_dB"] == pytest.approx(found.octave_level, abs=1e-9)
     bare = thud.predict_level(shell, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
     assert (found.level[6:] < bare.level[6:] - 8).all()
-    assert f"{found.spread[0]:.1f} to" in found.warnings[0]
 
 
 @pytest.mark.slow
@@ -270,7 +252,7 @@ def test_run_draws_the_chain(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
     case.write_text(ROOM_CASE, encoding="utf-8")
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet", "--all"]) == 0
-    for name in ("room", "room_decay", "room_positions", "floor_modes"):
+    for name in ("room", "room_positions", "floor_modes"):
         assert (tmp_path / "out" / f"{name}.svg").exists()
 
 
@@ -284,7 +266,7 @@ def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatc
         return bridge.ask(question, **request)
 
     monkeypatch.setattr("thud.floors.prediction.ask", ask)
-    assert {"room", "room_decay", "room_positions"} <= set(plot.case_figures(impact))
+    assert {"room", "room_positions"} <= set(plot.case_figures(impact))
     assert predicted.count("room_level") == 1
 
 
@@ -357,27 +339,9 @@ def test_share_that_is_radiated_is_that_of_one_side() -> None:
     assert least[1].any()
 
 
-def test_maxima_are_drawn_on_their_decays(shell: thud.Impact) -> None:
+def test_force_that_is_not_that_on_the_floor_raises_a_warning(shell: thud.Impact) -> None:
     found = thud.predict_level(shell, thud.Plate(), thud.Room())
-    (axes,) = plot.draw_decay(found).axes
-    *decays, maxima = [line.get_xydata() for line in axes.get_lines()]
-    for decay, (time, level) in zip(decays, maxima, strict=True):
-        # Its steps are a hundredth of a second or less.
-        assert np.interp(time, *np.transpose(decay)) == pytest.approx(level, abs=0.1)
-        assert decay[np.argmax(decay[:, 1]), 0] == pytest.approx(time, abs=10)
-
-
-def test_few_modes_of_floor_or_room_raise_a_warning(shell: thud.Impact) -> None:
-    found = thud.predict_level(shell, thud.Plate(), thud.Room())
-    found = replace(found, source_warnings=())
-    many = np.full(12, found.few_modes)
-    for change in ({"floor_modes": many - 1e-9}, {"room_modes": many - 1e-9}):
-        one = replace(found, **{"floor_modes": many, "room_modes": many} | change)
-        assert one.has_few_modes.all()
-        assert len(one.warnings) == 1
-        assert f"{one.spread.max():.1f} to {one.spread.min():.1f} dB" in one.warnings[0]
-    enough = replace(found, floor_modes=many, room_modes=many)
-    assert not enough.has_few_modes.any()
+    enough = replace(found, source_warnings=())
     assert enough.warnings == ()
     # The force that is used is the right one, or its change is stated.
     for force, change, words in (
@@ -393,10 +357,21 @@ def test_few_modes_of_floor_or_room_raise_a_warning(shell: thud.Impact) -> None:
 def test_single_numbers_are_those_of_the_levels(shell: thud.Impact) -> None:
     room = thud.Room(volume=70.0, reverberation_time=0.8)
     found = thud.predict_level(shell, thud.Plate(), room)
-    assert found.rating == thud.rating(found.level, "third")
-    assert found.octave_rating == thud.rating(found.octave_level)
     assert found.standardized == pytest.approx(thud.standardized_level(found.level, 0.8, 70.0))
-    assert found.standardized_rating == thud.rating(found.standardized, "third")
+    levels = {"thirds": found.level, "standardized": found.standardized}
+    for name, bands in (*((name, "third") for name in levels), ("octaves", "octave")):
+        expected = thud.rating(levels.get(name, found.octave_level), bands)  # type: ignore[arg-type]
+        entry = found.ratings[name]  # type: ignore[index]
+        assert entry.level == pytest.approx(expected.a_weighted, abs=1e-9)
+        assert entry.rounded == expected.rounded
+        parts = [*entry.contributions.values()]
+        assert entry.uncertainty == pytest.approx(np.hypot.reduce(parts))
+        assert parts == sorted(parts, reverse=True)
+    assert found.rating == found.ratings["thirds"]
+    # The energy mean of both edges, where the sound is modal.
+    edges = np.array([found.simple_level, found.clamped_level])
+    assert found.level == pytest.approx(10 * np.log10((10 ** (edges / 10)).mean(axis=0)))
+    assert (edges[0] != edges[1]).nonzero()[0].tolist() == list(range(found.n_modal))
     measured = thud.RoomLevels(
         "more", "third", thud.get_bands("third").nominal, np.linspace(80, 40, 15)[None]
     )
@@ -430,23 +405,29 @@ def test_reverberation_time_holds_the_losses_that_its_room_has(
     shell: thud.Impact,
     kind: Any,  # noqa: ANN401
 ) -> None:
-    room = thud.Room(volume=30.0, reverberation_time=0.9, reverberation_of=kind)
-    found = thud.predict_level(shell, thud.Plate(thickness=0.1), room)
+    """Above the crossover."""
+    room = thud.Room(height=8.0, reverberation_time=0.9, reverberation_of=kind)
+    plate = thud.Plate(length=12.0, width=10.0, thickness=0.1)
+    found = thud.predict_level(shell, plate, room)
+    assert found.n_modal < 3
     air = room.air_density * room.sound_speed
     radiated = air * found.radiation_factor / found.mass_per_area
-    returned = radiated * found.floor_modes / found.room_modes
+    floor_density = 120 * np.sqrt(12) / (2 * 3500 * 0.1)
+    room_density = 4 * np.pi * 960 * BAND_CENTERS**2 / room.sound_speed**3
+    returned = radiated * floor_density / room_density
     decay = 6 * np.log(10) / 0.9
-    for k, band in enumerate(found.frequency):
+    time = np.linspace(0, 1, 20001)
+    for k in range(found.n_modal, 12):
         loss = 2 * np.pi * BAND_CENTERS[k] * found.loss_factor[k]
         room_loss = decay if kind == "finished" else decay + returned[k]
-        pressure = air * room.sound_speed / room.volume
+        pressure = air * room.sound_speed / found.volume
         # Energies of floor and room, and the square of the pressure after the detector.
         rates = [[-loss, returned[k], 0], [radiated[k], -room_loss, 0], [0, 8 * pressure, -8]]
         values, vectors = np.linalg.eig(np.array(rates))
         parts = vectors[2] * np.linalg.solve(vectors, [found.energy[k], 0, 0])
-        square = (parts * np.exp(np.outer(found.history_time, values))).sum(axis=1).real
-        expected = 10 * np.log10(square / 2e-5**2)
-        assert found.history[:, k] == pytest.approx(expected, abs=1e-6), band
+        square = (parts * np.exp(np.outer(time, values))).sum(axis=1).real
+        expected = 10 * np.log10(square.max() / 2e-5**2)
+        assert found.level[k] == pytest.approx(expected, abs=1e-4), k
 
 
 def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
@@ -470,7 +451,7 @@ def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
 def test_modal_bands_that_take_too_long_are_named(
     run: Run, case_file: CaseFile, shell: thud.Impact
 ) -> None:
-    """The prediction by modes of a room with a long reverberation time ended without a warning."""
+    """Bands below the crossover of a very live room were statistical without a warning."""
 
     def predict(time: float) -> thud.RoomPrediction:
         room = thud.Room(volume=40.0, reverberation_time=(time,))
@@ -481,7 +462,7 @@ def test_modal_bands_that_take_too_long_are_named(
 
     long, short = predict(20.0), predict(3.0)
     (warning,) = [text for text in long.warnings if "three modes" in text]
-    assert f"ends at {long.frequency[long.n_modal - 1]:g} Hz" in warning
+    assert f"from {long.frequency[long.n_modal]:g} Hz on" in warning
     assert f"overlap, {limit(20.0):.0f} Hz" in warning
     assert not any("three modes" in text for text in short.warnings)
     assert short.n_modal == np.count_nonzero(limit(3.0) >= BAND_CENTERS)
@@ -509,7 +490,9 @@ def test_walls_take_their_power_from_the_losses_of_the_edges(shell: thud.Impact)
 
     def level(edges: Literal["building", "absorption"], **walls: object) -> NDArray[np.float64]:
         room = thud.Room(radiation="iso_12354", **walls)  # type: ignore[arg-type]
-        return thud.predict_level(shell, thud.Plate(edges=edges), room).level
+        found = thud.predict_level(shell, thud.Plate(edges=edges), room)
+        # Modal levels follow the loss of the modes.
+        return found.level[found.n_modal :]
 
     walls: dict[str, object] = {"wall_lengths": (5, 4, 5, 4), "wall_junction": "index"}
     soft, stiff = ({**walls, "junction_index": index} for index in (80, -5))
@@ -531,10 +514,10 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     assert found.level == pytest.approx(impact.room_level.level, abs=1e-12)
     tables = {"floor": {"name": "plate"}, "room": {}}
     assert thud.solve_many({}, tables_case(tables)).room_rating == pytest.approx(
-        [found.rating.a_weighted], abs=1e-9
+        [found.rating.level], abs=1e-9
     )
     done = run(case_file("&floor name = 'plate' /\n&room /\n"), "-o", "out")
-    assert found.rated_text in done.stdout
+    assert str(found.rating) in " ".join(done.stdout.split())
     assert "does not conform" not in done.stderr
     with pytest.raises(thud.InputError, match=naming("floor is missing")):
         thud.predict_level()
@@ -575,84 +558,73 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
     room = thud.Room(volume=50.0, reverberation_time=1.5)
     floor = thud.Plate(thickness=0.2)
     source = thud.solve(thud.Case(floor=floor, room=room))
-    found = thud.predict_level(source, floor, room)
+    found = thud.predict_level(source, floor, replace(room, rating=name))
     assert found.requirement is None
     assert list(found.ratings) == list(_schema.RATINGS)
-    mean = (found.ratings[name].a_weighted + found.modal_ratings[name].a_weighted) / 2
-    low, high = (math.floor(end + 0.5) for end in found.interval_of(name))
-    # The three ratings of this room differ.
-    assert len({rating.rounded for rating in found.ratings.values()}) == 3
-    assert high - low > 1
+    rating = found.ratings[name]
+    assert found.ratings["standardized"].rounded < found.ratings["thirds"].rounded
+    reach = math.ceil(rating.uncertainty)
     for limit, verdict in (
-        (high, "met"), (high - 1, "undecided"), (low, "undecided"), (low - 1, "not met")
+        (rating.rounded + reach + 1, "met"), (rating.rounded, "undecided"),
+        (rating.rounded - 1, "undecided"), (rating.rounded - reach - 1, "not met"),
     ):  # fmt: skip
-        strict = replace(room, required=limit, required_rating=name)
-        judged = thud.predict_level(source, floor, strict).requirement
+        strict = replace(room, required=limit, rating=name)
+        prediction = thud.predict_level(source, floor, strict)
+        judged = prediction.requirement
         assert judged is not None
-        assert (judged.required, judged.verdict) == (limit, verdict)
-        assert judged.level == pytest.approx(mean, abs=1e-9)
+        assert (judged.limit, judged.verdict) == (limit, verdict)
+        distance = limit + 0.5 - prediction.rating.rounded
+        chance = (1 + math.erf(distance / math.sqrt(2) / judged.rating.uncertainty)) / 2
+        assert judged.probability == pytest.approx(chance)
         keys = f"volume = 50\n reverberation_time = 1.5\n required = {limit}"
-        text = ROOM_CASE.replace("volume = 40", f"{keys}\n required_rating = '{name}'")
+        text = ROOM_CASE.replace("volume = 40", f"{keys}\n rating = '{name}'")
         text = text.replace("&model name = 'hollow_sphere' /\n", "")
         done = run(case_file(text), "-o", f"out_{limit}")
-        words = f"at most {limit:.1f} dB: {verdict} ({low} to {high})."
-        assert f"Required of {name}: {words}" in done.stdout
+        assert f"meets {limit:g} dB with {100 * judged.probability:.0f} %" in " ".join(
+            done.stdout.split()
+        )
         summary = f90nml.read(case_file(text).parent / f"out_{limit}" / "summary.nml")
         assert summary["room_summary"]["verdict"] == verdict
-        assert summary["room_summary"]["level"] == pytest.approx(
-            [rating.a_weighted for rating in found.ratings.values()], abs=1e-9
-        )
-        page = thud.compare_floors({"floor": thud.predict_level(source, floor, strict)})
-        assert ("required, dB", f"{limit} ({name}): {verdict}") in page.rows()
+        assert summary["room_summary"]["probability"] == pytest.approx(judged.probability, abs=1e-9)
+        page = thud.compare_floors({"floor": prediction})
+        shown = f"{limit} ({name}): {verdict}, {100 * judged.probability:.0f} %"
+        assert ("required, dB", shown) in page.rows()
 
 
-@pytest.mark.parametrize(
-    ("name", "class_text"),
-    [
-        ("concrete 220, screed on 15 MN/m3", "class 4; interval: class 3 to no class"),
-        ("concrete 220", "no class (class 4: at most 49 dB)"),
-    ],
-)
-def test_rating_of_octaves_is_the_mean_of_both_predictions(name: str, class_text: str) -> None:
-    """It was that of one-third octaves, moved by the difference of the statistical ratings."""
-    room = thud.Room(length=5, width=4, height=2.5)
-    found = thud.predict_level(floor=thud.construction(name), room=room)
-
-    def octaves(level: np.ndarray) -> float:
-        sums = 10 * np.log10((10 ** (level.reshape(4, 3) / 10)).sum(axis=1))
-        return thud.rating(sums).a_weighted
-
-    both = octaves(found.level), octaves(found.modal_level)
-    assert found.rated_of("octaves") == pytest.approx(np.mean(both), abs=0.03)
-    assert found.class_text == class_text
-    low, high = found.interval_of("octaves")
-    assert low < min(both) < max(both) < high
-    assert found.all_contributions["octaves"]["model"][1] == pytest.approx(
-        abs(both[0] - both[1]) / 2, abs=0.03
-    )
+def test_class_is_that_of_the_rating_of_octaves() -> None:
+    room = thud.Room(length=5, width=4, height=2.5, rating="octaves")
+    for name, korean in (("concrete 220", 0), ("concrete 220, screed on 15 MN/m3", 3)):
+        found = thud.predict_level(floor=name, room=room)
+        sums = 10 * np.log10((10 ** (found.level.reshape(4, 3) / 10)).sum(axis=1))
+        assert found.rating.level == pytest.approx(thud.rating(sums).a_weighted, abs=0.03)
+        assert found.class_text == class_text(korean)
 
 
-def test_standardized_rating_is_almost_free_of_the_reverberation_time() -> None:
-    found = thud.predict_level(floor=thud.Plate(), room=thud.Room(volume=50.0))
-    name = "reverberation_time"
-    assert found.contributions[name][1] > 0.4
-    assert max(map(abs, found.all_contributions["standardized"][name])) < 0.2
+@pytest.mark.parametrize("function", [thud.predict_level, thud.tapping_level, thud.solve])
+def test_floor_is_a_construction_or_its_name(function: Any) -> None:  # noqa: ANN401
+    entry = thud.construction("concrete 180")
+    results = [function(floor=floor) for floor in ("concrete 180", entry, entry.floor)]
+    assert repr(results[0]) == repr(results[1])
+    if function is thud.solve:
+        assert results[0].case.room == thud.Room()
+    else:
+        assert repr(results[0]) == repr(results[2])
+    with pytest.raises(thud.InputError, match=naming("'concrete 180'")):
+        function(floor="conrete 180")
 
 
 def test_level_that_is_not_finite_gets_a_sentence() -> None:
     """It ended with a traceback: cannot convert float NaN to integer."""
-    room, octaves = {"few_modes": 5.0}, {"level": np.zeros(4)}
-    bands = {name: np.zeros(12) for name in ("level", "modal_level", "simple_level")}
-    bands |= {"frequency": np.arange(12.0), "clamped_level": np.where(np.arange(12) < 2, np.nan, 0)}
+    bands = {"frequency": np.arange(12.0), "level": np.where(np.arange(12) < 2, np.nan, 0)}
     with pytest.raises(thud.NumericalError, match=naming("not finite", "0, 1 Hz")):
-        new_room_level({"room": room, "room_octaves": octaves, "room_bands": bands})
+        new_room_level({"room": {}, "room_bands": bands})
 
 
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
         ({"support": "elastic"}, ("elastic", "support_stiffness", "support_rotation")),
-        ({"support_stiffness": (1e8,)}, ("support_stiffness", "simple", "elastic")),
+        ({"support_stiffness": (1e8,)}, ("support_stiffness", "unknown", "elastic")),
         ({"support": "clamped", "support_rotation": (1e8,)}, ("support_rotation", "clamped")),
     ],
 )
@@ -723,13 +695,13 @@ def test_walls_have_one_construction_or_one_each(shell: thud.Impact) -> None:
     assert (soft.path_shares[:, 4] < 0.03 * one.path_shares[:, 4]).all()
 
 
-def test_covering_lowers_both_predictions_by_its_improvement(shell: thud.Impact) -> None:
+def test_covering_lowers_the_levels_by_its_improvement(shell: thud.Impact) -> None:
     bare = thud.predict_level(shell, thud.Plate(), thud.Room())
     octaves = (1.0, 3.0, 6.0, 10.0)
     covered = thud.predict_level(shell, thud.Plate(covering_improvement=octaves), thud.Room())
     expected = np.repeat(octaves, 3)
     assert bare.level - covered.level == pytest.approx(expected, abs=1e-6)
-    assert bare.modal_level - covered.modal_level == pytest.approx(expected, abs=1e-6)
+    assert bare.simple_level - covered.simple_level == pytest.approx(expected, abs=1e-6)
     assert bare.clamped_level - covered.clamped_level == pytest.approx(expected, abs=1e-6)
     with pytest.raises(thud.InputError, match=naming("covering_improvement", 3, 4, 12)):
         thud.predict_level(shell, thud.Plate(covering_improvement=(1, 2, 3)), thud.Room())
@@ -752,7 +724,7 @@ def test_bands_beyond_the_modes_are_those_of_the_simply_supported_floor(
 ) -> None:
     """Polynomials resolve few waves of light floors: levels fell by up to 27 dB without a word."""
     room = thud.Room(volume=50.0)
-    simple = thud.predict_level(shell, floor, room)
+    simple = thud.predict_level(shell, replace(floor, support="simple"), room)
     clamped = thud.predict_level(shell, replace(floor, support="clamped"), room)
     assert clamped.level[-4:] == pytest.approx(simple.level[-4:], abs=2.0)
     assert (simple.n_modal, clamped.n_modal) == (7, 7)
@@ -766,8 +738,8 @@ def test_finished_room_decays_as_stated_below_a_light_floor(shell: thud.Impact) 
         thud.predict_level(shell, floor, thud.Room(reverberation_time=(time,)))
         for time in (0.3, 1.2)
     )
-    # The floor alone absorbed so much at 50 Hz that both times gave one level.
-    assert long.level[0] > short.level[0] + 1.5
+    # The floor alone absorbed so much that both times gave one level.
+    assert (long.level[long.n_modal :] > short.level[long.n_modal :] + 1.5).all()
 
 
 @pytest.mark.parametrize("keys", [{}, {"subceiling_thickness": 0.0125, "cavity_depth": 0.247}])

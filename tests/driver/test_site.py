@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 THEORY = (
     *("hollow_sphere", "lumped_models", "modal_ball", "finite_elements", "compression"),
-    *("ball_impedance", "floors", "rooms", "levels", "recordings_theory"),
+    *("ball_impedance", "floors", "room_theory", "levels", "recordings_theory"),
 )
 TUTORIALS = [path.stem for path in (REPOSITORY / "docs/tutorials").glob("*.md")]
 SIZE = 15e6  # bytes

@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 import thud
 from thud.base._schema import KEYS
-from thud.impact.quantities import RATING
+from thud.impact.quantities import ROOM_RATING
 from thud.studies import sampling
 from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
@@ -315,7 +315,7 @@ def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
     levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
     # A set without result has no rating.
     rating = draw.normal(50, 20, 201)
-    rated = xr.Dataset({RATING: ("sample", rating), "status": ("sample", [0] * 200 + [1])})
+    rated = xr.Dataset({ROOM_RATING: ("sample", rating), "status": ("sample", [0] * 200 + [1])})
 
     def spread(level: np.ndarray) -> tuple[str, ...]:
         ordered = np.sort(level)
@@ -350,9 +350,8 @@ def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
     assert int(rows["all criteria conform"]) == found.dataset["conforms"].sum()
     # Of a room, the lowest rating.
     rating = xr.zeros_like(found.dataset["margin"]) + np.arange(6.0).reshape(3, 2)[::-1]
-    bands = rating.expand_dims(room_third=12, axis=-1)
-    dataset = found.dataset.assign(standardized_rating=rating, room_level=bands)
-    rows = dict(Design(dataset, found.axes, None, "case", rating_name="standardized").rows())
+    dataset = found.dataset.assign(room_rating=rating)
+    rows = dict(Design(dataset, found.axes, None, "case").rows())
     assert (rows["  at height, cm"], rows["  at mass, kg"]) == ("110", "2.4")
 
 

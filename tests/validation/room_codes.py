@@ -31,7 +31,7 @@ def fast_maximum(  # noqa: PLR0913 - a floor and a room
 ) -> float:
     """Return the maximum Fast level, dB re 20 uPa, of energies of floor and room (DOP853).
 
-    `modes` are the numbers of modes of floor and room in the band; energy flows back so that equal
+    `modes` are the modes per hertz of floor and room; energy flows back so that equal
     energies of the modes are in equilibrium. The reverberation time is that of the bare room.
     """
     omega = 2 * np.pi * frequency

@@ -82,9 +82,9 @@ MeasuredMobilityEdges = Literal["building", "laboratory", "absorption"]
 RoomReverberationOf = Literal["finished", "bare"]
 RoomWallJunction = Literal["cross", "t", "index"]
 RoomRadiation = Literal["modes", "iso_12354"]
-RoomPositions = Literal["standard", "even"]
-RoomRequiredRating = Literal["octaves", "thirds", "standardized"]
-RectangularFloorSupport = Literal["simple", "clamped", "free", "elastic"]
+RoomPositions = Literal["rating", "standard", "even"]
+RoomRating = Literal["octaves", "thirds", "standardized"]
+RectangularFloorSupport = Literal["unknown", "simple", "clamped", "free", "elastic"]
 BandSet = Literal["octave", "third"]
 
 
@@ -315,13 +315,13 @@ class Room(Group):
     radiation : str
         Radiation factor of the floor, by its modes or by ISO 12354-1; "modes", "iso_12354".
     positions : str
-        Positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones
-        each; "standard", "even".
-    required : float
-        Maximum rating that is required; 0: none, dB; 0 <= required <= 200.
-    required_rating : str
-        Rating that required refers to (KS F 2863-2, ISO 717-2, ISO 16283-2); "octaves", "thirds",
+        Positions of ball and microphone: those of the rating, 5 standard ones each (octaves), or
+        16 even ones each; "rating", "standard", "even".
+    rating : str
+        Rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2); "octaves", "thirds",
         "standardized".
+    required : float
+        Maximum of that rating that is required; 0: none, dB; 0 <= required <= 200.
     """
 
     length: float = 0.0
@@ -346,9 +346,9 @@ class Room(Group):
     corner_x: float = 0.0
     corner_y: float = 0.0
     radiation: RoomRadiation = "modes"
-    positions: RoomPositions = "standard"
+    positions: RoomPositions = "rating"
+    rating: RoomRating = "thirds"
     required: float = 0.0
-    required_rating: RoomRequiredRating = "octaves"
 
 
 @dataclass(frozen=True, eq=False)
@@ -584,12 +584,12 @@ class RectangularFloor(Group):
     Attributes
     ----------
     source_x : float
-        Relative source position along the length; statistical levels in the room are means; 0 <
+        Relative source position along the length; levels in the room are means over positions; 0 <
         source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
     support : str
-        Support of the edges; "simple", "clamped", "free", "elastic".
+        Support of the edges; "unknown", "simple", "clamped", "free", "elastic".
     support_stiffness : sequence of float
         Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
         y at 0 and width), N/m2; 0 <= support_stiffness <= 1e+14.
@@ -647,7 +647,7 @@ class RectangularFloor(Group):
 
     source_x: float = 0.5
     source_y: float = 0.5
-    support: RectangularFloorSupport = "simple"
+    support: RectangularFloorSupport = "unknown"
     support_stiffness: Sequence[float] = ()
     support_rotation: Sequence[float] = ()
     line_x: Sequence[float] = ()
@@ -940,7 +940,7 @@ class ModalFloor(Group):
     file : str
         File of the modes: frequencies, loss factors, shapes on a grid.
     source_x : float
-        Relative source position along the length; statistical levels in the room are means; 0 <
+        Relative source position along the length; levels in the room are means over positions; 0 <
         source_x < 1.
     source_y : float
         Relative source position along the width; 0 < source_y < 1.
@@ -1178,8 +1178,8 @@ LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]] = {
 CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 
 # Single-number ratings of a level in a room, with symbols, bands and standards.
-RATINGS: dict[RoomRequiredRating, str] = {
-    "octaves": "L_iA,Fmax of octaves (KS F 2863-2)",
+RATINGS: dict[RoomRating, str] = {
+    "octaves": "L_iA,Fmax of octaves (KS F ISO 717-2)",
     "thirds": "L_iA,Fmax of one-third octaves (ISO 717-2)",
     "standardized": "standardized L_iA,Fmax of one-third octaves (ISO 16283-2)",
 }
@@ -1300,9 +1300,9 @@ KEYS = (
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
     Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
-    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
+    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("plate", "plate", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("plate", "plate", "support", "choice", "", "support of the edges", ('unknown', 'simple', 'clamped', 'free', 'elastic')),
     Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1338,9 +1338,9 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "density", "real", "kg/m3", "density of the layers", (), 10.0, 20000.0),
     Key("laminate_floor", "laminate_floor", "added_mass", "real", "kg/m2", "mass without stiffness on the plate, as gravel", (), 0.0, 1000.0),
     Key("laminate_floor", "laminate_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('unknown', 'simple', 'clamped', 'free', 'elastic')),
     Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1377,10 +1377,10 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
-    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('simple', 'clamped', 'free', 'elastic')),
+    Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('unknown', 'simple', 'clamped', 'free', 'elastic')),
     Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
@@ -1422,7 +1422,7 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("measured_mobility", "measured_mobility", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("modal_floor", "modal_floor", "file", "text", "", "file of the modes: frequencies, loss factors, shapes on a grid"),
-    Key("modal_floor", "modal_floor", "source_x", "real", "", "relative source position along the length; statistical levels in the room are means", (), 0.0, 1.0),
+    Key("modal_floor", "modal_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
     Key("modal_floor", "modal_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("modal_floor", "modal_floor", "residual_compliance", "real", "m/N", "static compliance at the source of the modes above those of the file; 0: that of the plate", (), 0.0, 1.0),
     Key("modal_floor", "modal_floor", "thickness", "real", "m", "thickness of the plate that radiates into a room; 0: none", (), 0.0, 2.0),
@@ -1454,7 +1454,7 @@ KEYS = (
     Key("room", "room", "corner_x", "real", "m", "position of the room along the length of a larger floor", (), 0.0, 100.0),
     Key("room", "room", "corner_y", "real", "m", "position of the room along the width of a larger floor", (), 0.0, 100.0),
     Key("room", "room", "radiation", "choice", "", "radiation factor of the floor, by its modes or by ISO 12354-1", ('modes', 'iso_12354')),
-    Key("room", "room", "positions", "choice", "", "positions of ball and microphone in the modal room: 5 standard ones each, or 16 even ones each", ('standard', 'even')),
-    Key("room", "room", "required", "real", "dB", "maximum rating that is required; 0: none", (), 0.0, 200.0),
-    Key("room", "room", "required_rating", "choice", "", "rating that required refers to (KS F 2863-2, ISO 717-2, ISO 16283-2)", ('octaves', 'thirds', 'standardized')),
+    Key("room", "room", "positions", "choice", "", "positions of ball and microphone: those of the rating, 5 standard ones each (octaves), or 16 even ones each", ('rating', 'standard', 'even')),
+    Key("room", "room", "rating", "choice", "", "rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2)", ('octaves', 'thirds', 'standardized')),
+    Key("room", "room", "required", "real", "dB", "maximum of that rating that is required; 0: none", (), 0.0, 200.0),
 )

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from thud.case.case import Case
-    from thud.floors.constructions import Construction
+    from thud.case.constructions import Construction
     from thud.floors.floor_comparison import FloorComparison
 
 
@@ -43,7 +43,7 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
 
     With ``--list`` print the constructions of the library instead.
     """
-    from thud.floors.constructions import constructions
+    from thud.case.constructions import constructions
 
     if options.list is not None:
         print_results(format_rows(constructions(options.list).rows()))
@@ -111,7 +111,7 @@ def _floor_cases(
 
     Both are by their names; the constructions themselves are returned, too.
     """
-    from thud.floors.constructions import construction
+    from thud.case.constructions import construction
 
     cases: dict[str, Case] = {}
     chosen: dict[str, Construction] = {}
@@ -254,7 +254,7 @@ LISTEN = Command(
 )
 
 PREDICT = Command(
-    "level in the room below each floor, with its interval, tables and a report",
+    "level in the room below each floor, with its uncertainty, tables and a report",
     (
         *_FLOORS,
         argument(

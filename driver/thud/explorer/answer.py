@@ -27,9 +27,10 @@ from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
 from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
+from thud.level.rating import rated_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
-from thud.report.predicted_floor import contribution_title, octave_texts
+from thud.report.predicted_floor import CONTRIBUTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -214,34 +215,22 @@ def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
 
 
 def _room(prediction: RoomPrediction) -> Answer:
-    """Return the levels in the room below, dB, with the range of the rating and its causes."""
-    low, high = prediction.interval
+    """Return the levels in the room below, dB, with the uncertainty of the rating."""
     return {
         "frequency": to_json(prediction.frequency),
         "level": to_json(prediction.level),
-        "modal_level": to_json(prediction.modal_level[: prediction.n_modal]),
-        "rated": {"value": prediction.rated, "low": low, "high": high},
-        "interval": prediction.rated_text,
+        "uncertainty": to_json(prediction.uncertainty),
         "contributions": [
-            [contribution_title(name, prediction), *ends]
-            for name, ends in prediction.contributions.items()
+            [CONTRIBUTIONS[name].title, -value, value]
+            for name, value in prediction.rating.contributions.items()
         ],
         "ratings": _ratings_text(prediction),
     }
 
 
 def _ratings_text(prediction: RoomPrediction) -> str:
-    """Return the ratings, the class, the levels of octaves and the verdict on a requirement."""
-    both = f"statistical {prediction.rating.rounded} dB"
-    if prediction.n_modal:
-        both += f", by modes {prediction.modal_rating.rounded} dB"
-    iso_717, korean, iso_16283 = prediction.standards
-    known = f", {prediction.class_text}" if prediction.class_text else ""
-    words = [
-        f"{prediction.rated_name} {prediction.rated_text}{iso_717}, {both}",
-        f"octaves {prediction.octave_text}{korean}{known}",
-        f"standardized {prediction.standardized_text}{iso_16283}",
-        f"levels of octaves, {', '.join(octave_texts(prediction))}",
-    ]
-    required = prediction.requirement
-    return "; ".join([*words, *([str(required)] if required else [])])
+    """Return the ratings, the class, and the levels of octaves."""
+    octaves = zip(rated_bands("octave"), prediction.octave_level, strict=True)
+    levels = ", ".join(f"{level:.1f} dB at {frequency:g} Hz" for frequency, level in octaves)
+    ratings = [f"{prediction.title_of(name)} {entry}" for name, entry in prediction.ratings.items()]
+    return "; ".join(filter(None, [*ratings, prediction.class_text, f"octaves {levels}"]))

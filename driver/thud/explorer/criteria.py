@@ -5,27 +5,20 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import RATINGS
 from thud.level.assessment import VERDICTS
-from thud.level.rating import level_texts
 from thud.report.page import STANDARDS
+from thud.report.predicted_floor import CAVEAT, verdict_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from thud.base._schema import LimitsSource, RoomRequiredRating
+    from thud.base._schema import LimitsSource
     from thud.floors.prediction import RoomPrediction
     from thud.level.assessment import Criterion, Verdict
 
 # Code of the result of a verdict or of a requirement; the page reads no words.
 RESULTS = {verdict: verdict.replace(" ", "_") for verdict in VERDICTS}
 RESULTS |= {"met": RESULTS[VERDICTS[0]], "not met": RESULTS[VERDICTS[1]]}
-# Bands of the ratings of a room.
-BANDS: dict[RoomRequiredRating, str] = {
-    "octaves": "octaves",
-    "thirds": "one-third octaves",
-    "standardized": "one-third octaves, standardized",
-}
 # Maximum number of criteria with values in a headline.
 MAX_NAMED = 2
 TRANSCRIBED = "Nominal value and tolerance of these tables, from a published transcription."
@@ -124,28 +117,19 @@ def _standard(verdict: Verdict) -> str:
 
 
 def room_headline(prediction: RoomPrediction) -> dict[str, str]:
-    """Return the headline of the level in a room; with a requirement, of its rating.
-
-    It names the bands of the rating, as ratings of other bands differ.
-    """
-    required = prediction.requirement
-    name = required.rating if required else "thirds"
-    title = RATINGS[name] if prediction.is_ball else f"A-weighted level ({name})"
-    if required:
-        # A source that does not conform is named after the verdict.
-        result, words = RESULTS[required.verdict], f"{required.verdict}: "
-        level, interval = required.level, required.interval
-        parts = [f"{title}, required {required.required:g} dB"]
-        if not required.conforms:
-            parts.append(required.shown_verdict)
-        parts.append(f"{prediction.rated_name}{prediction.standards[0]} {prediction.rated_text}")
-    else:
-        result, words, parts = "level", "", [f"{title} with its range"]
-        level, interval = prediction.rated, prediction.interval
-    if prediction.class_text:
-        parts.append(f"KS F 2863-2: {prediction.class_text}")
-    mean, ends = level_texts(level, interval)
-    return _texts(result, f"{words}{mean}", "; ".join(parts), f" {ends}, {BANDS[name]}")
+    """Return the headline of the level in a room, of its rating that is asked for."""
+    required, rating = prediction.requirement, prediction.rating
+    also = f", standard uncertainty {rating.uncertainty:.1f} dB"
+    parts = [
+        prediction.title_of(rating.name), verdict_text(prediction), prediction.class_text,
+        prediction.source_note, CAVEAT,
+    ]  # fmt: skip
+    detail = "; ".join(filter(None, parts))
+    level = f"{rating.rounded} dB"
+    if required is None:
+        return _texts("level", level, detail, also)
+    result = RESULTS[required.verdict]
+    return _texts(result, f"{required.verdict}: {level}", detail, f"{also}; {required.chance}")
 
 
 def _listed(causes: Mapping[str, str], unknown: Sequence[str] = ()) -> tuple[str, str]:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, RATINGS, STANDARD_BALL
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL_GROUPS
+from thud.case.constructions import constructions
 from thud.case.keys import humanize
 from thud.explorer.models import condition_of, is_folded, users_of
-from thud.floors.constructions import constructions
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -144,7 +144,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         "advanced": is_folded(key),
         "condition": condition_of(key),
     }
-    if key.name == "required_rating":
+    if (key.group, key.name) == ("room", "rating"):
         # The bands stand in the help: the column has no room for both.
         standards = {name: text.partition("(")[2].rstrip(")") for name, text in RATINGS.items()}
         field |= {"choices": standards, "help": "; ".join(RATINGS.values())}

@@ -13,6 +13,7 @@ from thud.base._schema import FiniteElement
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import scaled
+from thud.case.constructions import constructions
 from thud.case.keys import find_key, key_owners, limits, value_in, with_values
 from thud.explorer.answer import new_case
 from thud.explorer.criteria import model_headline
@@ -20,12 +21,11 @@ from thud.explorer.form import fields_by_key
 from thud.explorer.messages import lower
 from thud.explorer.models import MODEL_FACTS, Facts
 from thud.explorer.recording import read_copies
-from thud.floors.constructions import constructions
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.level.assessment import VERDICTS, get_criteria
-from thud.level.rating import meets
+from thud.level.rating import MET
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
 
@@ -67,8 +67,8 @@ THICKNESS_STEP = 0.01
 STIFFNESS_STEP = 0.1
 FLOOR_STEPS = 15
 FLOOR_NOTE = (
-    "Each layer alone; the level need not fall with each step, as modes of the room move. Met by "
-    "the whole range leaves the uncertainty of the prediction as margin, met by the mean none."
+    "Each layer alone; the level need not fall with each step, as modes of the room move. A "
+    f"requirement is met if its probability is at least {100 * MET:.0f} %."
 )
 # Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
 # over the width of its range.
@@ -123,9 +123,9 @@ def _improve_floor(case: Case) -> Work:
     """Search for each layer of a floor the smallest change that meets the requirement of the room.
 
     Thicknesses grow in steps of 10 mm, stiffnesses fall in steps of 10 %. The level need not fall
-    with each step, so the first step that meets the requirement is the smallest. Two answers are
-    given where both are found: by the mean rating, and by its whole interval. If no change meets it
-    by the whole interval, constructions of the library on the same structural floor are tried.
+    with each step, so the first step is the smallest. Two answers are given where both exist: with
+    a level at the limit, and with a requirement that is met. Without the latter, constructions of
+    the library on the same structural floor are tried.
     """
     prediction = predict_level(compute(case))
     required = prediction.requirement
@@ -152,9 +152,9 @@ def _improve_floor(case: Case) -> Work:
         if not names:
             none = "This floor has no single layer that could be changed."
         elif reached:
-            none += f" Tried, with the lowest mean level reached: {'; '.join(reached)}."
+            none += f" Tried, with the lowest level reached: {'; '.join(reached)}."
     note = FLOOR_NOTE
-    if not any(change["is_whole"] for change in changes):
+    if not changes:
         built = yield from _constructions_that_meet(case, len(names) * length, length)
         known = "Constructions of the library on the same structural floor that meet it: "
         missing = "No construction of the library on the same structural floor meets it."
@@ -172,9 +172,9 @@ def _has_layer(floor: FloorOptions | None, name: str) -> bool:
 def _floor_changes(
     case: Case, name: str, begin: float, length: float
 ) -> Generator[tuple[float, float], None, tuple[list[dict[str, Any]], str]]:
-    """Return the changes of a layer that meet the requirement by the mean and by the interval.
+    """Return the smallest change of a layer that meets the requirement, if one does.
 
-    Also return the tried values, and the lowest level with its interval, in words.
+    Also return the tried values, and the lowest level, in words.
     """
     start = float(getattr(case.floor, name))
     _, high = limits(find_key(name, key_owners(case))[0], case)
@@ -192,19 +192,16 @@ def _floor_changes(
         if required is None:
             break
         levels[value] = required
-        is_whole = required.verdict == "met"
-        if is_whole or (not changes and meets(required.level, required.required)):
-            change = _change(case, name, start, value) | {"is_whole": is_whole}
-            by = "whole range" if is_whole else "mean, undecided over the range"
-            change["text"] += f": {required.shown}, met by the {by}"
+        if required.verdict == "met":
+            change = _change(case, name, start, value)
+            change["text"] += f": {required}"
             changes.append(change)
-        if is_whole:
             break
     if not levels:
         return changes, ""
-    field, best = _field(case, name), min(levels.values(), key=lambda entry: entry.level)
+    field, best = _field(case, name), min(levels.values(), key=lambda entry: entry.rating.level)
     ends = (f"{scaled(value, -field['power']):.3g}" for value in (start, list(levels)[-1]))
-    return changes, f"{lower(field['label'])} {' to '.join(ends)} {field['unit']}, {best.shown}"
+    return changes, f"{lower(field['label'])} {' to '.join(ends)} {field['unit']}, {best}"
 
 
 def _requirement(case: Case) -> Requirement | None:
@@ -235,9 +232,8 @@ def _constructions_that_meet(
     for i, entry in enumerate(entries):
         yield begin + length * i / len(entries), begin + length * (i + 1) / len(entries)
         required = _requirement(entry.case(case))
-        if required and meets(required.level, required.required):
-            by = "whole range" if required.verdict == "met" else "mean"
-            result[f"{entry.name}: {required.shown}, by the {by}"] = required.level
+        if required and required.verdict == "met":
+            result[f"{entry.name}: {required}"] = required.rating.level
     return sorted(result, key=lambda text: result[text])[:MAX_NAMED]
 
 

@@ -169,7 +169,7 @@ FLOOR_FACTS = {
     "plate": Facts(
         "Plate",
         "Concrete slabs, with floating floor, ceiling and covering",
-        "Rectangular plates; the range of the level names what is not known.",
+        "Rectangular plates; the uncertainty of the level names what is not known.",
     ),
     "laminate_floor": Facts(
         "Cross-laminated timber",
@@ -236,8 +236,7 @@ SHOWN = {
     "measured_mobility": ("pole_frequency", "damping_ratio", "length", "width", "thickness"),
     "modal_floor": ("file", "thickness"),
     "room": (
-        "length", "width", "height", "reverberation_time", "ceiling_mass", "required",
-        "required_rating",
+        "length", "width", "height", "reverberation_time", "ceiling_mass", "required", "rating",
     ),
 }  # fmt: skip
 

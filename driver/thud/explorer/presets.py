@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import STANDARD_BALL, Ball, FiniteElement
 from thud.case.case import Case
+from thud.case.constructions import construction
 from thud.explorer.models import changed_values, input_case
-from thud.floors.constructions import construction
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal import butter, resample, sosfilt
+from scipy.special import exprel
 
 from thud.base.checks import refuse_value, require_whole
 from thud.base.immutable import Immutable
 from thud.export.sound_levels import (
     RATE,
     REFERENCE_PRESSURE,
-    TIME_CONSTANT,
     SoundLevels,
     band_sections,
     fast_histories,
+    fast_history,
     get_deviation,
     maximum_levels,
     measured_levels,
@@ -78,7 +79,7 @@ class FloorSound(Immutable):
         Sound pressure, Pa, from the impact on.
     level, reference : SoundLevels
         Levels of the sound, and those that it should have: in modal bands the levels at the
-        position, in others the statistical ones.
+        position, in others those of the prediction.
     """
 
     name: str
@@ -125,36 +126,20 @@ def new_floor_sound(
 ) -> FloorSound:
     """Return the sound of one floor; the arguments are those of `listen`."""
     n_modal = prediction.n_modal
-    step = prediction.history_time[0]
-    square = _mean_square(prediction)
     modal = np.zeros(0)
     if n_modal:
         position, modal = _modal_pressure(prediction, position)
     else:
         position = None
-    count = max(math.ceil(len(square) * step * RATE), len(modal) + MARGIN)
-    time = np.arange(1, count + 1) / RATE
-    modal = np.append(modal, np.zeros(count - len(modal)))
-    histories = REFERENCE_PRESSURE**2 * 10 ** (prediction.history / 10)
-    target = _interpolated(time, prediction.history_time, histories)
-    target[:n_modal] = fast_histories(modal, range(n_modal))
+    square = _mean_square(prediction, len(modal) + MARGIN)
+    modal = np.append(modal, np.zeros(square.shape[1] - len(modal)))
+    target = np.vstack([fast_histories(modal, range(n_modal)), fast_history(square)])
     modal = _limited(modal, n_modal)
     reference = maximum_levels(target, modal, n_modal)
-    middle = (np.arange(len(square)) + 0.5) * step
-    envelopes = np.sqrt(_interpolated(time, middle, square[:, n_modal:]))
-    # What the filter has removed may decay longest.
-    audible = np.flatnonzero((modal**2 > END * (modal**2).max()) | envelopes.any(axis=0))
-    end = audible[-1] + 1
-    pressure, level = _realization(modal[:end], envelopes[:, :end], reference, seed)
+    envelopes = np.sqrt(square)
+    pressure, level = _realization(modal, envelopes, reference, seed)
     pressure = resample(pressure, RATIO * len(pressure))
     return FloorSound(name, prediction, n_modal, position, pressure, level, reference)
-
-
-def _interpolated(time: Array, known_time: Array, values: Array) -> Array:
-    """Return columns of values at other times, as rows; zero at the impact and after the end."""
-    known_time = np.append(0.0, known_time)
-    rows = [np.interp(time, known_time, np.append(0.0, column), right=0.0) for column in values.T]
-    return np.array(rows).reshape(-1, len(time))
 
 
 def _realization(
@@ -172,26 +157,24 @@ def _realization(
     return pressure, level
 
 
-def _mean_square(prediction: RoomPrediction) -> Array:
-    """Return the mean-square pressure of each band, Pa2, in steps of the history, until it is over.
+def _mean_square(prediction: RoomPrediction, count: int) -> Array:
+    """Return the mean-square pressure of each band of noise, Pa2, at `RATE`, until it is over.
 
-    It is the constant input in each step that gives the Fast detector the predicted history.
+    The energy of the floor decays by its loss factor and enters the room, where it decays with the
+    reverberation time: a difference of both decays, that gives the predicted level. `count` is the
+    minimum number of samples.
     """
-    step = prediction.history_time[0]
-    kept = math.exp(-step / TIME_CONSTANT)
-    output = REFERENCE_PRESSURE**2 * 10 ** (prediction.history / 10)
-    before = np.vstack([np.zeros_like(output[:1]), output[:-1]])
-    square = np.maximum((output - kept * before) / (1 - kept), 0.0)
-    # The history ends 30 dB below the maximum of the slowest band; its last decay continues.
-    end = END * square.max(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        decay = np.log(square[-2] / square[-1])
-        steps = np.where(square[-1] > end, np.log(square[-1] / end) / decay, 0.0)
-    steps = np.where(np.isfinite(steps) & (steps > 0), steps, 0.0)
-    count = math.ceil(min(steps.max(), MAX_SOUND / step))
-    more = np.arange(1, count + 1)[:, None]
-    tail = np.where(steps > 0, square[-1] * np.exp(-more * np.where(steps > 0, decay, 0.0)), 0.0)
-    return np.vstack([square, tail])
+    bands = np.s_[prediction.n_modal :, np.newaxis]
+    room = 6 * math.log(10) / prediction.reverberation_time[bands]
+    floor = 2 * math.pi * prediction.frequency[bands] * prediction.loss_factor[bands]
+    slow, fast = np.minimum(room, floor), np.maximum(room, floor)
+    if slow.size:
+        duration = min(float(-math.log(END) / slow.min()), MAX_SOUND)
+        count = max(count, math.ceil(duration * RATE))
+    time = np.arange(1, count + 1) / RATE
+    square = time * exprel(-(fast - slow) * time) * np.exp(-slow * time)
+    level = REFERENCE_PRESSURE**2 * 10 ** (prediction.level[bands] / 10)
+    return np.asarray(square * level / fast_history(square).max(axis=1, keepdims=True))
 
 
 def _modal_pressure(
@@ -211,7 +194,7 @@ def _modal_pressure(
     pressure = room.pressure[position[0] - 1, position[1] - 1]
     # The record is periodic.
     samples = resample(pressure, round(len(pressure) * RATE / room.sample_rate))
-    change = prediction.modal_level[: prediction.n_modal] - room.mean
+    change = prediction.simple_level[: prediction.n_modal] - room.mean
     if np.abs(change).max() > MIN_CHANGE:
         level = room.level[position[0] - 1, position[1] - 1]
         samples = _changed(samples, prediction.frequency[: len(change)], level, change)

@@ -124,7 +124,8 @@ def listen(
 
     Up to the crossover of the room it is the sound pressure of the modes of floor and room at one
     position, above it noise in one-third-octave bands. The mean-square pressure of the noise decays
-    as predicted; its gain gives each band the predicted maximum Fast level.
+    as floor and room do; its gain gives each band the predicted maximum Fast level. Edges whose
+    support is not known are simply supported.
 
     Parameters
     ----------

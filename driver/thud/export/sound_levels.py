@@ -56,14 +56,14 @@ class SoundLevels(Immutable):
 def fast_histories(pressure: Array, indices: Sequence[int]) -> Array:
     """Return the squared pressure after the Fast detector in bands, Pa2, (n_band, n_sample)."""
     sections, _, _ = band_sections()
-    rows = [_fast_history(sosfilt(sections[band], pressure)) for band in indices]
+    rows = [fast_history(sosfilt(sections[band], pressure) ** 2) for band in indices]
     return np.array(rows).reshape(-1, len(pressure))
 
 
-def _fast_history(pressure: Array) -> Array:
-    """Return the squared pressure after the Fast detector, Pa2, shape (n_sample,)."""
+def fast_history(square: Array) -> Array:
+    """Return a squared pressure after the Fast detector, Pa2, along the last axis."""
     kept = math.exp(-1 / (TIME_CONSTANT * RATE))
-    return np.asarray(lfilter([1 - kept], [1, -kept], pressure**2))
+    return np.asarray(lfilter([1 - kept], [1, -kept], square))
 
 
 def measured_levels(pressure: Array) -> SoundLevels:
@@ -75,7 +75,7 @@ def measured_levels(pressure: Array) -> SoundLevels:
 def _weighted_history(pressure: Array) -> Array:
     """Return the A-weighted squared pressure after the Fast detector, Pa2, shape (n_sample,)."""
     gain = _a_weighting(np.asarray(np.fft.rfftfreq(len(pressure), 1 / RATE), float))
-    return _fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)))
+    return fast_history(np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure)) ** 2)
 
 
 def _a_weighting(frequency: Array) -> Array:

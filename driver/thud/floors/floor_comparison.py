@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from thud.base._schema import RATINGS
 from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
 from thud.base.files import Page
 from thud.case.case import Case
+from thud.case.constructions import Construction, with_floor
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
@@ -51,28 +52,18 @@ class FloorComparison(Displayed, Page):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, with a column for each floor."""
-        octaves = [
-            f"{f:g} Hz octave, {prediction}, dB"
-            for prediction in ("by modes", "statistical")
-            for f in rated_bands("octave")
-        ]
+        # The standards of the ratings are for the ball.
+        titled = min(self.predictions.values(), key=lambda prediction: prediction.is_ball)
         titles = (
-            "", "floor", "force", "source", "L_iA,Fmax (ISO 717-2)", "by modes, dB",
-            "statistical, dB", "of octaves (KS F 2863-2)", "of octaves by modes, dB",
-            "of octaves statistical, dB", "class (KS F 2863-2)",
-            "standardized (ISO 16283-2)", "required, dB", *octaves,
+            "", "floor", "force", "source",
+            *(f"{titled.title_of(name)}, dB (standard uncertainty)" for name in RATINGS),
+            "class (KS F 2863-2)", "required, dB",
+            *(f"{frequency:g} Hz octave, dB" for frequency in rated_bands("octave")),
             "energy into the bearing floor, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
         )  # fmt: skip
-        columns = (_column(*item) for item in self.predictions.items())
-        rows = list(zip(titles, *columns, strict=True))
+        rows = zip(titles, *(_column(*item) for item in self.predictions.items()), strict=True)
         # Rows that say something of a floor.
-        rows = [row for row in rows if row[0] not in _OPTIONAL or any(row[1:])]
-        if all(prediction.is_ball for prediction in self.predictions.values()):
-            return rows
-        # The standards of the ratings are for the ball.
-        without = [re.sub(r" \((ISO|KS) [^)]*\)", "", title) for title, *_ in rows]
-        names = [title.replace("L_iA,Fmax", "A-weighted level") for title in without]
-        return [(name, *row[1:]) for name, row in zip(names, rows, strict=True)]
+        return [row for row in rows if row[0] not in _OPTIONAL or any(row[1:])]
 
     def figure(self) -> Figure:
         """Return ratings, levels and what they follow from as a matplotlib figure."""
@@ -96,20 +87,20 @@ class FloorComparison(Displayed, Page):
         """Return the names of the floors and their levels."""
         items = self.predictions.items()
         result = (
-            ", ".join(filter(None, (f"{name} {p.rated_text}", p.source_note))) for name, p in items
+            ", ".join(filter(None, (f"{name} {p.sentence}", p.source_note))) for name, p in items
         )
         return f"<FloorComparison: {', '.join(result)}>"
 
 
 def compare_floors(
-    cases: Mapping[str, Case | RoomPrediction], *, progress: bool = False
+    cases: Mapping[str, Case | RoomPrediction | Construction | str], *, progress: bool = False
 ) -> FloorComparison:
     """Compare the levels of impacts below several floors.
 
     Parameters
     ----------
     cases
-        Predictions, or cases with floor and room to compute, by name.
+        By name: predictions, cases with floor and room, constructions or names of constructions.
     progress
         Show a progress bar.
 
@@ -122,11 +113,12 @@ def compare_floors(
     result: dict[str, RoomPrediction] = {}
     for name, entry in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
         require_kind("name", name, str)
-        require_kind(name, entry, Case | RoomPrediction)
+        require_kind(name, entry, Case | RoomPrediction | Construction | str)
         if isinstance(entry, RoomPrediction):
             result[name] = entry
             continue
-        missing = [group for group in ("model", "floor", "room") if getattr(entry, group) is None]
+        case = entry if isinstance(entry, Case) else with_floor(Case(), entry)
+        missing = [group for group in ("model", "floor", "room") if getattr(case, group) is None]
         if missing:
             refuse(
                 f"{name}: the case has no {' and no '.join(f'&{group}' for group in missing)}",
@@ -134,7 +126,7 @@ def compare_floors(
                 + ", and with &model beside &modes" * ("model" in missing),
             )
         try:
-            result[name] = predict_level(compute(entry))
+            result[name] = predict_level(compute(case))
         except ThudError as error:
             message = f"{name}: {error}"
             raise type(error)(message) from error
@@ -148,17 +140,10 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         prediction.floor.name.replace("_", " "),
         prediction.force,
         _source(prediction),
-        prediction.rated_text,
-        str(prediction.modal_rating.rounded) if prediction.n_modal else "",
-        str(prediction.rating.rounded),
-        prediction.octave_text,
-        str(prediction.modal_ratings["octaves"].rounded) if prediction.n_modal else "",
-        str(prediction.octave_rating.rounded),
+        *(f"{rating.rounded} ({rating.uncertainty:.1f})" for rating in prediction.ratings.values()),
         # In few words, as the columns are as wide as their cells.
-        "not stated" if prediction.source_note else prediction.class_text.partition(" (")[0],
-        prediction.standardized_text,
+        prediction.class_text.partition(" (")[0],
         _required(prediction),
-        *(f"{level:.1f}" if prediction.n_modal else "" for level in prediction.modal_octave_level),
         *(f"{level:.1f}" for level in prediction.octave_level),
         f"{1e3 * prediction.energy.sum():.3g}",
         _tapping(prediction),
@@ -173,11 +158,12 @@ def _source(prediction: RoomPrediction) -> str:
 
 
 def _required(prediction: RoomPrediction) -> str:
-    """Return the requirement of a room and the verdict, its reason aside; empty without one."""
+    """Return the requirement of a room and the verdict on it; empty without one."""
     required = prediction.requirement
     if required is None:
         return ""
-    return f"{required.required:g} ({required.rating}): {required.verdict}"
+    chance = f"{100 * required.probability:.0f} %"
+    return f"{required.limit:g} ({required.rating.name}): {required.verdict}, {chance}"
 
 
 def _tapping(prediction: RoomPrediction) -> str:

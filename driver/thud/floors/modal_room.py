@@ -1,8 +1,8 @@
 """Levels in a modal room below a floor, for positions of ball and microphone.
 
-This is the deterministic counterpart of the statistical prediction at low frequencies. The floor
-moves in its modes, the air in a rectangular room with rigid walls in its own; the reaction of the
-air is included only as radiation in the loss factor of the floor.
+The floor moves in its modes, the air in a rectangular room with rigid walls in its own; the
+reaction of the air is included only as radiation in the loss factor of the floor. Edges whose
+support is not known are simply supported.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class ModalRoom(Displayed):
     frequency : ndarray, shape (n_band,)
         Rounded mid frequencies of the one-third-octave bands from 50 Hz to the crossover.
     crossover : float
-        Frequency above which three modes of the room overlap, Hz; the sound is statistical above.
+        Frequency above which three modes of the room overlap, Hz.
     balls : ndarray, shape (n_ball, 2)
         Positions of the ball on the floor, from the corner of the room, m.
     microphones : ndarray, shape (n_microphone, 3)
@@ -81,27 +81,19 @@ class ModalRoom(Displayed):
     pressure: Array
     sample_rate: float
 
-    @property
-    def statistical(self) -> Array:
-        """Levels and spread of the statistical prediction, dB, shape (2, n_band)."""
-        n = len(self.frequency)
-        return np.array([self.prediction.level[:n], self.prediction.spread[:n]])
-
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each band."""
         header = (
-            "band, Hz", "mean, dB", "spread, dB", "minimum, dB", "maximum, dB",
-            "statistical, dB", "its spread, dB",
+            "band, Hz", "mean, dB", "standard deviation, dB", "minimum, dB", "maximum, dB",
         )  # fmt: skip
         columns = (
             self.mean, self.spread, self.level.min(axis=(0, 1)), self.level.max(axis=(0, 1)),
-            *self.statistical,
         )  # fmt: skip
         cells = [[f"{v:.1f}" for v in column] for column in columns]
         return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self) -> Figure:
-        """Draw the levels of all positions and the statistical prediction."""
+        """Draw the levels of all positions."""
         from thud.plot.room_figures import draw_modal_room
 
         return draw_modal_room(self)
@@ -135,8 +127,8 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     Parameters
     ----------
     source
-        Impact of any model, or a recording. As in the statistical prediction, the force is that on
-        the floor, or that on a rigid floor if the model has no other.
+        Impact of any model, or a recording. As in `predict_level`, the force is that on the
+        floor, or that on a rigid floor if the model has no other.
     floor, room
         Floor and room; by default those of the impact's case.
     balls : array_like, shape (n_ball, 2), optional

@@ -1,4 +1,4 @@
-"""Level in the room below an impact, by transient statistical energy analysis."""
+"""Level in the room below an impact, by the modes of floor and room and statistically above."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base._schema import Room
+from thud.base._schema import RATINGS, Room
 from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
-from thud.floors.constructions import Construction
+from thud.case.constructions import Construction, with_floor
 from thud.floors.survey import RoomLevels
 from thud.impact.compute import compute
 from thud.impact.floor_impact import FloorImpact, new_floor_impact
@@ -22,10 +22,10 @@ from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, SOURCES, force_exposure_levels
 from thud.level.rating import (
-    Rating,
+    PredictedRating,
     Requirement,
-    class_range,
-    range_text,
+    class_of,
+    class_text,
     rating,
     standardized_level,
 )
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import FloorOptions, RoomRequiredRating
+    from thud.base._schema import FloorOptions, RoomRating
 
     Array = NDArray[np.float64]
 
@@ -75,40 +75,18 @@ class RoomPrediction(RoomLevel, Displayed):
     source_warnings: tuple[str, ...]
 
     @property
-    def rating(self) -> Rating:
-        """Single-number rating of the statistical levels in the room."""
-        return rating(self.level, BANDS)
-
-    @property
-    def modal_rating(self) -> Rating:
-        """Single-number rating of the levels by the modes of floor and room."""
-        return rating(self.modal_level, BANDS)
-
-    @property
-    def has_edges(self) -> bool:
-        """Whether levels by modes are known for simply supported and for clamped edges."""
-        return self.n_modal > 0 and hasattr(self.floor, "support")
-
-    @property
-    def rated_text(self) -> str:
-        """Mean rating of both predictions with its interval, such as ``"57 dB (55 to 60)"``."""
-        return self._text_of("thirds")
+    def rating(self) -> PredictedRating:
+        """The rating that the room asks for by its key `rating`."""
+        return self.ratings[self.room.rating]
 
     @property
     def is_ball(self) -> bool:
         """Whether the source is the rubber ball, for which the standards define L_iA,Fmax."""
         return self.source.limits_source in {None, SOURCES[0]}
 
-    @property
-    def rated_name(self) -> str:
-        """Name of the rating: ``"L_iA,Fmax"``; of the tyre ``"A-weighted level"``."""
-        return "L_iA,Fmax" if self.is_ball else "A-weighted level"
-
-    @property
-    def standards(self) -> tuple[str, str, str]:
-        """Standards of `rated`, `octave_rating` and `standardized_rating`; empty for the tyre."""
-        names = " (ISO 717-2)", " (KS F 2863-2)", " (ISO 16283-2)"
-        return names if self.is_ball else ("", "", "")
+    def title_of(self, name: RoomRating) -> str:
+        """Return the title of a rating, with its standard if the source is the ball."""
+        return RATINGS[name] if self.is_ball else f"A-weighted level ({name})"
 
     @property
     def source_note(self) -> str:
@@ -116,29 +94,11 @@ class RoomPrediction(RoomLevel, Displayed):
         return "the source does not conform" if self.source_warnings else ""
 
     @property
-    def octave_text(self) -> str:
-        """Mean rating of octaves with its interval, such as ``"59 dB (56 to 61)"``."""
-        return self._text_of("octaves")
-
-    @property
-    def standardized_text(self) -> str:
-        """Mean rating of standardized bands with its interval."""
-        return self._text_of("standardized")
-
-    def _text_of(self, name: RoomRequiredRating) -> str:
-        return range_text(self.rated_of(name), self.interval_of(name))
-
-    @property
     def class_text(self) -> str:
-        """Class of the mean rating of octaves, and the classes of its interval.
-
-        Instead the reason if the source does not conform; empty for the tyre.
-        """
-        if not self.is_ball:
+        """Class of the rating of octaves (KS F 2863-2); empty unless for a ball that conforms."""
+        if not self.is_ball or self.source_warnings:
             return ""
-        if self.source_note:
-            return f"class not stated: {self.source_note}"
-        return class_range(self.rated_of("octaves"), self.interval_of("octaves"))
+        return class_text(class_of(self.ratings["octaves"].level))
 
     @property
     def radiated_share(self) -> Array:
@@ -151,52 +111,27 @@ class RoomPrediction(RoomLevel, Displayed):
         return radiated / np.maximum(self.loss_factor, internal + 2 * radiated)
 
     @property
-    def rated_shares(self) -> Array:
+    def weighted_shares(self) -> Array:
         """Fractions of the A-weighted energy from the floor and from each wall, (1 + n_wall,).
 
-        The energy from the floor is that which it radiates directly or through the ceiling. The
-        levels are the statistical ones.
+        The energy from the floor is that which it radiates directly or through the ceiling.
         """
         # A path without energy is silent, 300 dB below the others.
         paths = 10 * np.log10(np.maximum(self.path_shares, 1e-30)).T
-        ratings = np.array([rating(self.level + path, BANDS).a_weighted for path in paths])
-        return np.asarray(10 ** ((ratings - self.rating.a_weighted) / 10))
-
-    @property
-    def octave_rating(self) -> Rating:
-        """Single-number rating of the statistical octave levels, with the Korean class."""
-        return rating(self.octave_level, BANDWIDTHS[0])
-
-    @property
-    def ratings(self) -> dict[RoomRequiredRating, Rating]:
-        """Statistical ratings by name, one for each standard."""
-        return {
-            "octaves": self.octave_rating,
-            "thirds": self.rating,
-            "standardized": self.standardized_rating,
-        }
-
-    @property
-    def modal_ratings(self) -> dict[RoomRequiredRating, Rating]:
-        """Ratings by the modes of floor and room, by name."""
-        standardized = standardized_level(self.modal_level, self.reverberation_time, self.volume)
-        return {
-            "octaves": rating(self.modal_octave_level, BANDWIDTHS[0]),
-            "thirds": self.modal_rating,
-            "standardized": rating(standardized, BANDS),
-        }
+        levels = np.array([rating(self.level + path, BANDS).a_weighted for path in paths])
+        return np.asarray(10 ** ((levels - self.ratings["thirds"].level) / 10))
 
     @property
     def requirement(self) -> Requirement | None:
         """Verdict on the requirement of the room (its key `required`); None without one."""
-        room = self.room
-        if not room.required:
+        if not self.room.required:
             return None
-        name = room.required_rating
-        return Requirement(
-            name, room.required, self.rated_of(name), self.interval_of(name),
-            self.source.limits_source or SOURCES[0], not self.source_warnings,
-        )  # fmt: skip
+        return Requirement(self.room.required, self.rating, not self.source_warnings)
+
+    @property
+    def sentence(self) -> str:
+        """The rating with its uncertainty and, with a requirement, the probability to meet it."""
+        return str(self.requirement or self.rating)
 
     @property
     def standardized(self) -> Array:
@@ -204,43 +139,10 @@ class RoomPrediction(RoomLevel, Displayed):
         return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
-    def standardized_rating(self) -> Rating:
-        """Single-number rating of the standardized levels."""
-        return rating(self.standardized, BANDS)
-
-    @property
-    def model_difference(self) -> Array:
-        """Level by modes − statistical level, dB, shape (12,): uncertainty of the model.
-
-        NaN above the modal bands.
-        """
-        modal = np.arange(len(self.level)) < self.n_modal
-        return np.where(modal, self.modal_level - self.level, np.nan)
-
-    @property
-    def has_few_modes(self) -> NDArray[np.bool_]:
-        """Whether a band has fewer than `few_modes` of floor or room, shape (12,)."""
-        return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
-
-    @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on the validity of the prediction."""
-        few = self.has_few_modes
         result = [*self.floor_warnings]
-        if few.any():
-            bands = ", ".join(f"{f:g}" for f in self.frequency[few])
-            result.append(
-                f"fewer than {self.few_modes:g} modes of floor or room at {bands} Hz: levels there "
-                "are means over many floors and rooms; levels at single positions are expected to "
-                f"have a standard deviation of {self.spread[few].max():.1f} to "
-                f"{self.spread[few].min():.1f} dB"
-            )
-        if not self.n_modal:
-            result.append(
-                "there is no prediction by modes: the rating is that of the statistical one, and "
-                "its interval contains neither the edges nor the model"
-            )
-        if self.rated < MIN_PLAUSIBLE:
+        if self.ratings["thirds"].level < MIN_PLAUSIBLE:
             result.append(
                 f"the rating is below {MIN_PLAUSIBLE:g} dB: in a building, flanking paths, gaps "
                 "and bridges that are not in the prediction are expected to be louder"
@@ -271,21 +173,17 @@ class RoomPrediction(RoomLevel, Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each band."""
         header = (
-            "band, Hz", "statistical, dB", "modal, dB", "simply supported, dB", "clamped, dB",
-            "standardized, dB", "spread, dB", "energy, mJ", "floor modes",
+            "band, Hz", "level, dB", "standard uncertainty, dB", "simply supported, dB",
+            "clamped, dB", "standardized, dB", "energy, mJ",
         )  # fmt: skip
         columns = (
-            self.level, self.modal_level, self.simple_level, self.clamped_level, self.standardized,
-            self.spread, 1e3 * self.energy, self.floor_modes,
+            self.level, self.uncertainty, self.simple_level, self.clamped_level, self.standardized,
+            1e3 * self.energy,
         )  # fmt: skip
-        forms = (".1f", ".1f", ".1f", ".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
-            for column, form in zip(columns, forms, strict=True)
+            for column, form in zip(columns, (*[".1f"] * 5, ".3g"), strict=True)
         ]
-        # Columns by modes, where the sound is modal.
-        for i, count in ((1, self.n_modal), *((i, self.n_modal * self.has_edges) for i in (2, 3))):
-            cells[i][count:] = ["–"] * (len(self.frequency) - count)
         return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
@@ -295,35 +193,27 @@ class RoomPrediction(RoomLevel, Displayed):
         return draw_prediction(self, measured)
 
     def __repr__(self) -> str:
-        """Return the single-number ratings."""
-        required = self.requirement
-        iso_717, korean, iso_16283 = self.standards
-        note, classes = (
-            f", {text}" if text else "" for text in (self.source_note, self.class_text)
-        )
-        modal = f"modal {self.modal_rating.rounded} dB" if self.n_modal else "no modal prediction"
-        return (
-            f"<RoomPrediction: {self.rated_name}{iso_717} {self.rated_text}{note}; "
-            f"statistical {self.rating.rounded} dB, {modal}; "
-            f"of octaves{korean} {self.octave_text}{classes}; "
-            f"standardized{iso_16283} {self.standardized_text}"
-            f"{f'; {required}' if required else ''}>"
-        )
+        """Return rating, requirement and what is wrong with the source."""
+        title = self.title_of(self.room.rating)
+        text = ", ".join(filter(None, (self.sentence, self.source_note)))
+        return f"<RoomPrediction: {title} {text}>"
 
 
 @check_arguments
 def predict_level(
     source: ImpactResult | None = None,
-    floor: FloorOptions | Construction | None = None,
+    floor: FloorOptions | Construction | str | None = None,
     room: Room | None = None,
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
-    Transient statistical energy analysis: the floor absorbs the energy that an infinite plate would
-    absorb, and loses and radiates it according to ISO 12354-1. The energy in the room decays with
-    the reverberation time. The level is the maximum of the Fast detector. The force is that on the
-    floor, or that on a rigid floor if the model has no other; it is computed again if `floor` is
-    not the floor of the impact.
+    Up to the crossover, where three modes of the room overlap, floor and room move in their modes;
+    if the support of the floor is unknown, the level is the energy mean of those with simply
+    supported and clamped edges. Above it transient statistical energy analysis is used: the floor
+    loses and radiates the energy of the impact according to ISO 12354-1, and that in the room
+    decays with the reverberation time. The level is the maximum of the Fast detector. The force is
+    that on the floor, or that on a rigid floor if the model has no other; it is computed again if
+    `floor` is not the floor of the impact.
 
     Parameters
     ----------
@@ -332,7 +222,7 @@ def predict_level(
         standard ball.
     floor, room
         Floor and room; by default those of the impact's case, else `Room()`, as large as the floor
-        and 2.5 m high. A construction also describes the ceiling of the room.
+        and 2.5 m high. A construction, or its name, also describes the ceiling of the room.
 
     Raises
     ------
@@ -342,12 +232,10 @@ def predict_level(
     require_kind("source", source, ImpactResult | None)
     case = Case() if source is None else source.case
     room = room or case.room or Room()
-    if isinstance(floor, Construction):
-        case = floor.case(replace(case, room=room))
-        floor, room = case.floor, case.room
-    floor = floor or case.floor
+    case = with_floor(replace(case, room=room), floor or case.floor)
+    floor, room = case.floor, case.room
     if floor is None or room is None:
-        refuse("floor is missing", "a floor, such as Plate")
+        refuse("floor is missing", "a floor, such as Plate, or the name of a construction")
     if source is None:
         source = compute(Case(floor=floor, room=room))
     case = source.case

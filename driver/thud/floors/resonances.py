@@ -1,14 +1,43 @@
-"""Mass–spring–mass resonances of the plates of a floor on its layers and cavities."""
+"""Natural frequencies of floor and room, and resonances of plates on their layers and cavities."""
 
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import TYPE_CHECKING
 
 from thud.base._schema import JoistFloor, RectangularFloor
+from thud.base.bridge import ask
+from thud.case.case import Case, case_text
 
 if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
+
+# Number of natural frequencies, the lowest of the floor and of the room.
+COUNT = 8
+
+
+def floor_frequencies(prediction: RoomPrediction) -> list[float]:
+    """Return the lowest natural frequencies of the floor, Hz; see `get_modal_room`."""
+    case = case_text(Case(floor=prediction.floor))
+    modes = ask("floor_modes", case=case, highest=prediction.frequency[-1])
+    return [float(value) for value in modes["frequency"][:COUNT]]
+
+
+def room_frequencies(prediction: RoomPrediction) -> dict[tuple[int, int, int], float]:
+    """Return the lowest natural frequencies of a room with rigid walls, Hz, by half wavelengths.
+
+    c/2 |(l/L, m/W, n/H)|, with l, m and n half wavelengths along length, width and height.
+    """
+    half = prediction.room.sound_speed / 2
+    entries = [
+        (
+            half * math.hypot(*(n / side for n, side in zip(order, prediction.size, strict=True))),
+            order,
+        )
+        for order in product(range(COUNT + 1), repeat=3)
+    ]
+    return {(i, j, k): frequency for frequency, (i, j, k) in sorted(entries)[1 : COUNT + 1]}
 
 
 def resonances(prediction: RoomPrediction) -> dict[str, float]:

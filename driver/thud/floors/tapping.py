@@ -9,9 +9,10 @@ import numpy as np
 
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
-from thud.base.checks import refuse, require_kind
+from thud.base.checks import refuse, refuse_value, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text
+from thud.case.constructions import Construction, with_floor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,7 +83,7 @@ class TappingLevel(Displayed):
         return f"<TappingLevel: L_n,w {self.weighted} dB, C_I {self.adaptation} dB>"
 
 
-def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
+def tapping_level(floor: Plate | Construction | str, room: Room | None = None) -> TappingLevel:
     """Return the level of the tapping machine below a homogeneous concrete floor.
 
     L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz) with T_s = 2.2/(f eta)
@@ -93,7 +94,7 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     Parameters
     ----------
     floor
-        The plate.
+        The plate, or a construction or the name of one.
     room
         Room without a ceiling, of which only the properties of air are used; by default `Room()`.
 
@@ -108,27 +109,30 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     >>> thud.tapping_level(thud.Plate(thickness=0.2))
     <TappingLevel: L_n,w 73 dB, C_I -11 dB>
     """
-    require_kind("floor", floor, Plate)
-    if not _is_like_concrete(floor):
+    require_kind("room", room, Room | None)
+    require_kind("floor", floor, Plate | Construction | str)
+    case = with_floor(Case(room=room or Room()), floor)
+    plate = case.floor
+    if not isinstance(plate, Plate):
+        refuse_value("floor", floor, "a bare plate of concrete")
+    if not _is_like_concrete(plate):
         refuse(
-            f"floor: wave_speed/density = {floor.wave_speed / floor.density:.3g} differs from "
+            f"floor: wave_speed/density = {plate.wave_speed / plate.density:.3g} differs from "
             "concrete, for which the formula of ISO 12354-2 is valid",
             f"{CONCRETE / MAX_RATIO:.2f} to {CONCRETE * MAX_RATIO:.2f} m4/(kg s)",
         )
-    if not _is_isotropic(floor):
+    if not _is_isotropic(plate):
         refuse(
-            f"floor: stiffness_ratio = {floor.stiffness_ratio:g} and torsion_ratio = "
-            f"{floor.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
+            f"floor: stiffness_ratio = {plate.stiffness_ratio:g} and torsion_ratio = "
+            f"{plate.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
             "1 and 1",
         )
-    require_kind("room", room, Room | None)
-    if layers := _layers(floor, room or Room()):
+    if layers := _layers(plate, case.room or Room()):
         refuse(
             "the formula of ISO 12354-2 is for bare plates, but this one has "
             f"{' and '.join(layers)}",
             "plates without floating floor, covering, subceiling and ceiling",
         )
-    case = Case(floor=floor, room=room or Room())
     result = ask("radiator", case=case_text(case), frequency=FREQUENCY)
     time = 2.2 / (FREQUENCY * result["loss_factor"])
     radiated = time * result["radiation_factor"] * FREQUENCY / 1000

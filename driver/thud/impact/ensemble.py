@@ -24,7 +24,7 @@ from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key, key_owners
 from thud.impact.outcomes import Ensemble
-from thud.impact.quantities import RATING, ROOM_LEVEL
+from thud.impact.quantities import ROOM_LEVEL, ROOM_RATING
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 
 # Not empty if this process is a fork of another.
@@ -205,9 +205,7 @@ def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
         "floor_work": others[:, 0],
     }
     if case.room:
-        room = others[:, 1:]
-        results |= {ROOM_LEVEL: room[:, :-2]}
-        results |= {"room_rating": room[:, -2], RATING: room[:, -1]}
+        results |= {ROOM_LEVEL: others[:, 1:-1], ROOM_RATING: others[:, -1]}
     return results
 
 

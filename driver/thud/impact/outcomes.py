@@ -11,7 +11,7 @@ from thud.base._schema import SampleQuantities
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL, SAMPLE_RESULTS, SCALAR_QUANTITIES
-from thud.impact.sample_messages import NO_ERRORS, STATISTICAL, sample_warnings
+from thud.impact.sample_messages import NO_ERRORS, sample_warnings
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -60,9 +60,8 @@ class Ensemble(SampleQuantities, Displayed):
     room_level : ndarray, shape (n_sample, 12), or None
         Maximum Fast levels in the room, dB re 20 uPa, in the one-third-octave bands 50 to 630 Hz;
         None without a room.
-    room_rating, standardized_rating : ndarray, shape (n_sample,), or None
-        A-weighted sums L_iA,Fmax of the levels in the room and of the standardized levels, dB; see
-        `rating`.
+    room_rating : ndarray, shape (n_sample,), or None
+        The rating that the room asks for by its key `rating`, dB, not rounded; None without a room.
     """
 
     case: Case
@@ -81,7 +80,6 @@ class Ensemble(SampleQuantities, Displayed):
     floor_work: NDArray[np.float64] | None = None
     room_level: NDArray[np.float64] | None = None
     room_rating: NDArray[np.float64] | None = None
-    standardized_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -105,8 +103,8 @@ class Ensemble(SampleQuantities, Displayed):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """That samples state no numerical errors, and the kind of ratings."""
-        return (NO_ERRORS,) if self.room_rating is None else (NO_ERRORS, STATISTICAL)
+        """That samples state no numerical errors."""
+        return (NO_ERRORS,)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from thud.impact.outcomes import Ensemble
 
 ROOM_LEVEL = "room_level"
-RATING = "standardized_rating"
+ROOM_RATING = "room_rating"
 # Dimensions of bands: octaves and one-third-octave bands of forces, and rated bands in a room.
 BANDS = (*BANDWIDTHS, ROOM_BAND := "room_third")
 # Force and bands of the levels of a sample, by name.
@@ -59,8 +59,7 @@ FLOOR_QUANTITIES = {
         ROOM_LEVEL, "level in the room", "L_{i,Fmax}", "dB", "dB", 1.0, 1,
         "maximum Fast level in the room, re 20 uPa",
     ),
-    "room_rating": QUANTITIES["room_rating"],
-    RATING: QUANTITIES[RATING],
+    ROOM_RATING: QUANTITIES[ROOM_RATING],
 }  # fmt: skip
 # All results of samples, including those of surrogates and of their training.
 ALL_QUANTITIES = {

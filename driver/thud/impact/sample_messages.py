@@ -10,10 +10,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 NO_ERRORS = "The samples state no numerical errors; a run of a single case states its own."
-STATISTICAL = (
-    "the ratings of samples are statistical predictions; thud-driver predict also states that by "
-    "modes, and the interval of the rating"
-)
 
 
 def sample_warnings(

@@ -20,6 +20,7 @@ from thud.base._schema import (
     Room,
 )
 from thud.case.case import Case
+from thud.case.constructions import Construction
 from thud.impact.impact import Impact
 
 class SamplingOptions(TypedDict, total=False):
@@ -27,7 +28,7 @@ class SamplingOptions(TypedDict, total=False):
     duration: float
     substeps: int
     verify: bool
-    floor: FloorOptions | None
+    floor: FloorOptions | Construction | str | None
     room: Room | None
 
 class ModalBallOptions(SamplingOptions, total=False):

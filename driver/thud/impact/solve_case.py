@@ -10,10 +10,12 @@ from thud.base._schema import Ball, Drop, Sampling
 from thud.base.checks import refuse
 from thud.base.errors import PlausibilityWarning
 from thud.case.case import Case, new_model
+from thud.case.constructions import with_floor
 from thud.impact.compute import compute
 
 if TYPE_CHECKING:
     from thud.base._schema import FloorOptions, ModelName, ModelOptions, Room
+    from thud.case.constructions import Construction
     from thud.impact.impact import Impact
 
 
@@ -25,7 +27,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     sample_rate: float | None = None,
     duration: float | None = None,
     substeps: int | None = None,
-    floor: FloorOptions | None = None,
+    floor: FloorOptions | Construction | str | None = None,
     room: Room | None = None,
     verify: bool = False,
     **options: object,
@@ -50,7 +52,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     floor
         Floor on which the ball is dropped in addition to a rigid floor, on which the standards
         assess the force. An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate`,
-        `LaminateFloor`, `JoistFloor`, `MeasuredMobility` or `ModalFloor`.
+        `LaminateFloor`, `JoistFloor`, `MeasuredMobility` or `ModalFloor`; or a construction or the
+        name of one, which has a room.
     room
         Room below the floor, for `Impact.room_level`.
     verify
@@ -90,9 +93,9 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
             drop=Drop() if drop is None else drop,
             model=new_model(model, options),
             sampling=Sampling(**settings, verify=verify),  # type: ignore[arg-type]
-            floor=floor,
             room=room,
         )
+        case = with_floor(case, floor)
     impact = compute(case)
     for warning in impact.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=2)

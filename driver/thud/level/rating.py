@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from thud.base._schema import CLASS_LIMITS, RATED_BANDS, RATINGS
+from thud.base._schema import CLASS_LIMITS, RATED_BANDS
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
-from thud.level.levels import BANDWIDTHS, SOURCES
+from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LimitsSource, RoomRequiredRating
+    from thud.base._schema import BandSet, RoomRating
 
+# Probability from which a requirement is met.
+MET = 0.84
 # Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
 # Names of the Korean classes; the index is the class, 0 for none.
@@ -73,72 +78,86 @@ class Rating(Displayed):
         return rows
 
 
-@dataclass(frozen=True)
-class Requirement:
-    """Requirement on the level in the room below, and the verdict on it.
+@dataclass(frozen=True, repr=False)
+class PredictedRating:
+    """Single-number rating of predicted levels in the room below.
 
     Attributes
     ----------
-    rating : str
-        Rating that it refers to: ``"octaves"``, ``"thirds"`` or ``"standardized"``.
-    required, level : float
-        Maximum rating, and the mean rating of both predictions, dB.
-    interval : tuple of float
-        Ends of the interval of that rating, dB.
-    source : str
-        Source of the levels; for another than the rubber ball the requirement is a limit of one's
-        own, as the standards of the ratings are for the ball.
-    conforms : bool
-        Whether the source conforms to the standards.
-    verdict : str
-        ``"met"``, ``"not met"``, or ``"undecided"`` if the interval, rounded, holds both, or if the
-        source does not conform.
+    name : str
+        ``"octaves"``, ``"thirds"`` or ``"standardized"``.
+    level, uncertainty : float
+        A-weighted level, not rounded, and its standard uncertainty, dB.
+    contributions : mapping
+        Contributions to the standard uncertainty by name, dB, the largest first: support of the
+        edges, data of floor and room, source, and model.
     """
 
-    rating: RoomRequiredRating
-    required: float
+    name: RoomRating
     level: float
-    interval: tuple[float, float]
-    source: LimitsSource = SOURCES[0]
+    uncertainty: float
+    contributions: Mapping[str, float]
+
+    @property
+    def rounded(self) -> int:
+        """Level as it is stated and compared with limits, dB."""
+        return rounded(self.level)
+
+    def probability(self, limit: float) -> float:
+        """Return the probability that the level, rounded, is at most a limit, dB.
+
+        >>> rating = PredictedRating("thirds", 51.2, 3.0, {})
+        >>> rating, round(rating.probability(49), 2)
+        (51 dB, standard uncertainty 3.0 dB, 0.31)
+        """
+        return NormalDist(self.rounded, self.uncertainty).cdf(excess_level(limit))
+
+    def __repr__(self) -> str:
+        """Return level and standard uncertainty."""
+        return f"{self.rounded} dB, standard uncertainty {self.uncertainty:.1f} dB"
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """Requirement on a predicted rating, and the verdict on it.
+
+    Attributes
+    ----------
+    limit : float
+        Maximum rating, rounded, dB.
+    rating : PredictedRating
+        The rating.
+    conforms : bool
+        Whether the source conforms to the standards.
+    """
+
+    limit: float
+    rating: PredictedRating
     conforms: bool = True
 
     @property
+    def probability(self) -> float:
+        """Probability that the requirement is met."""
+        return self.rating.probability(self.limit)
+
+    @property
     def verdict(self) -> Literal["met", "not met", "undecided"]:
-        """Whether all levels of the interval, rounded, are at most the required one."""
-        low, high = meets(self.interval, self.required)
-        if high and self.conforms:
+        """``"met"`` from 84 % on, ``"not met"`` up to 16 %, else ``"undecided"``.
+
+        That of a source that does not conform is undecided, too.
+        """
+        if self.conforms and self.probability >= MET:
             return "met"
-        return "undecided" if low or not self.conforms else "not met"
+        return "not met" if self.conforms and self.probability <= 1 - MET else "undecided"
 
     @property
-    def shown_verdict(self) -> str:
-        """Verdict, with the reason if the source does not conform."""
-        return self.verdict if self.conforms else f"{self.verdict}: the source does not conform"
-
-    @property
-    def shown(self) -> str:
-        """Rating with its interval, such as ``"49 dB (46 to 51)"``."""
-        return range_text(self.level, self.interval)
+    def chance(self) -> str:
+        """Limit and probability, such as ``"meets 49 dB with 31 %"``."""
+        return f"meets {self.limit:g} dB with {100 * self.probability:.0f} %"
 
     def __str__(self) -> str:
-        """Return rating, requirement and verdict in words."""
-        is_ball = self.source == SOURCES[0]
-        title = RATINGS[self.rating] if is_ball else f"A-weighted level ({self.rating})"
-        return (
-            f"{title}: {self.shown}, "
-            f"{'required' if is_ball else 'own limit'} {self.required:g} dB, {self.shown_verdict}"
-        )
-
-
-def range_text(level: float, interval: tuple[float, float]) -> str:
-    """Return a level with its interval, rounded, such as ``"49 dB (46 to 51)"``."""
-    return " ".join(level_texts(level, interval))
-
-
-def level_texts(level: float, interval: tuple[float, float]) -> tuple[str, str]:
-    """Return a level and its interval, rounded, such as ``"49 dB"`` and ``"(46 to 51)"``."""
-    low, high = map(rounded, interval)
-    return f"{rounded(level)} dB", f"({low} to {high})"
+        """Return rating, limit and probability."""
+        return f"{self.rating}; {self.chance}"
 
 
 def rounded(level: float) -> int:
@@ -169,20 +188,13 @@ def class_name(korean_class: int) -> str:
     return f"class {CLASSES[korean_class]}" if korean_class else "no class"
 
 
-def class_range(level: float, interval: tuple[float, float]) -> str:
-    """Return the class of a level by KS F 2863-2, and those of its interval if they differ.
+def class_of(level: float) -> int:
+    """Return the class of a level by KS F 2863-2; 0 is no class.
 
-    >>> class_range(47.0, (46.0, 48.0)), class_range(52.6, (47.2, 58.0))
-    ('class 4 (at most 49 dB)', 'no class; interval: class 4 to no class')
+    >>> class_of(49.49), class_of(49.5)
+    (4, 0)
     """
-    korean_class, *ends = (
-        next((i for i, limit in enumerate(CLASS_LIMITS, 1) if meets(value, limit)), 0)
-        for value in (level, *interval)
-    )
-    if {*ends} == {korean_class}:
-        return class_text(korean_class)
-    names = " to ".join(dict.fromkeys(map(class_name, ends)))
-    return f"{class_name(korean_class)}; interval: {names}"
+    return next((i for i, limit in enumerate(CLASS_LIMITS, 1) if meets(level, limit)), 0)
 
 
 def class_text(korean_class: int) -> str:

@@ -49,7 +49,6 @@ from thud.plot.recording_figures import (
     recording_levels as recording_levels,
 )
 from thud.plot.room_figures import (
-    draw_decay as draw_decay,
     draw_positions as draw_positions,
     draw_prediction as draw_prediction,
     room_levels as room_levels,
@@ -124,7 +123,6 @@ def case_figures(
         with warn_if_not_drawn("the level in the room"):
             prediction = predict_level(impact)
             draws["room"] = partial(draw_prediction, prediction)
-            draws["room_decay"] = partial(draw_decay, prediction)
             draws["room_positions"] = partial(draw_positions, prediction)
     if impact and impact.on_floor:
         draws["floor"] = partial(draw_floor, impact.on_floor)

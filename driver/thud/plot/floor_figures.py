@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.floors.constructions import Construction, Layer
+    from thud.case.constructions import Construction, Layer
     from thud.floors.impedance import BallImpedance
     from thud.floors.mobility_fit import MobilityFit
     from thud.impact.floor_impact import FloorImpact

@@ -276,10 +276,7 @@ _SAME = 0.05
 
 @own_style()
 def draw_floors(comparison: FloorComparison) -> Figure:
-    """Draw ratings with intervals, levels in the room, and the steps that lead to them.
-
-    Levels have two predictions; that by modes is thin.
-    """
+    """Draw ratings with uncertainties, levels in the room, and the steps that lead to them."""
     predictions = comparison.predictions.values()
     rows = 0.3 + 0.35 * len(predictions)
     figure = new_figure(5.2 + rows)
@@ -299,10 +296,6 @@ def draw_floors(comparison: FloorComparison) -> Figure:
             continue
         for i, (name, values) in enumerate(zip(comparison.predictions, curves, strict=True)):
             axes.plot(values, label=escape_label(name), **line_style(i), **marker_style(i, 3.5))
-    for i, prediction in enumerate(predictions):
-        panels[0].plot(
-            prediction.modal_level[: prediction.n_modal], **line_style(i) | {"linewidth": 0.7}
-        )
     for axes in panels[:-1]:
         axes.tick_params(axis="x", labelbottom=False)
         axes.set_xlabel("")
@@ -323,12 +316,6 @@ def floors_html(comparison: FloorComparison) -> str:
             step.append(
                 {**style, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
             )
-        modal = curve_points(
-            names[: prediction.n_modal], prediction.modal_level[: prediction.n_modal]
-        )
-        thin = curve_style(i, f"{name}, by modes")
-        thin["line"]["width"] = 1
-        traces[-1].append({**thin, "mode": "lines", **modal, "showlegend": False})
     plots = [
         {
             "data": data,
@@ -338,11 +325,7 @@ def floors_html(comparison: FloorComparison) -> str:
         }
         for data, (label, logarithmic) in zip(traces, _STEPS.items(), strict=True)
     ]
-    text = (
-        "Levels in the room below, and the chain that leads to them: force, energy, floor, room. "
-        "Lines with marks are statistical means over positions, floors and rooms; thin lines are "
-        "levels by the modes of floor and room."
-    )
+    text = "Levels in the room below, and the chain that leads to them: force, energy, floor, room."
     # The first plot has the full width: the level in the room.
     plots = [plots[-1], *plots[:-1]]
     return html_page("Comparison of floors", text, comparison.rows(), plots, comparison.warnings)
@@ -355,26 +338,16 @@ def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
 
 
 def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:
-    """Draw the rating of each floor with its interval, and the ratings of both predictions."""
+    """Draw the asked rating of each floor with its standard uncertainty."""
     predictions = list(comparison.predictions.values())
     y = np.arange(len(predictions))
-    rated = np.array([prediction.rated for prediction in predictions])
-    ends = np.array([prediction.interval for prediction in predictions]).T
+    ratings = [prediction.rating for prediction in predictions]
     axes.errorbar(
-        rated, y, xerr=abs(ends - rated), fmt="o", color="black", capsize=3, markersize=4,
-        label="mean, with interval",
+        [rating.level for rating in ratings], y, xerr=[rating.uncertainty for rating in ratings],
+        fmt="o", color="black", capsize=3, markersize=4, label="with standard uncertainty",
     )  # fmt: skip
-    titles = {
-        "statistical (lines with markers)": [p.rating for p in predictions],
-        "by modes (thin lines)": [p.modal_rating for p in predictions if p.n_modal],
-    }
-    for i, (title, ratings) in enumerate(titles.items()):
-        known = y if i == 0 else [n for n, p in enumerate(predictions) if p.n_modal]
-        axes.plot(
-            [rating.a_weighted for rating in ratings], np.add(known, 0.3 * (2 * i - 1)), "s^"[i],
-            markersize=4, markerfacecolor="white", color="black", label=title,
-        )  # fmt: skip
     axes.set_yticks(y, [escape_label(fill(name, _NAME)) for name in comparison.predictions])
     axes.set_ylim(len(y) - 0.4, -0.6)
-    balls = all(prediction.is_ball for prediction in predictions)
-    axes.set_xlabel(f"{RATING_SYMBOL} (ISO 717-2), dB" if balls else "A-weighted level, dB")
+    titles = {p.title_of(p.room.rating).replace("L_iA,Fmax", RATING_SYMBOL) for p in predictions}
+    title = titles.pop() if len(titles) == 1 else "Ratings that the rooms ask for"
+    axes.set_xlabel("\n(".join(title.split(" (")) + ", dB")

@@ -139,7 +139,7 @@ def draw_sweep(result: Sweep) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
     Levels are those of the assessed force relative to the nominal ones, dB; for a case with a room
-    the ratings of the levels in it are drawn instead. The first text
+    the rating of the levels in it is drawn instead. The first text
     parameter with up to six values has a panel for each. Lines are medians over the other
     parameters; shades extend from the minimum to the maximum.
     """
@@ -217,10 +217,9 @@ def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _Curves:
 
 
 def _get_ratings(dataset: xr.Dataset) -> _Curves:
-    """Return the ratings of the levels in the room, as predicted and standardized."""
-    names = {"in the room": "room_rating", "standardized (ISO 16283-2)": "standardized_rating"}
-    level = np.column_stack([dataset[rating].values.ravel() for rating in names.values()])
-    return _Curves(level, list(names), f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa")
+    """Return the rating of the levels in the room."""
+    level = dataset["room_rating"].values.reshape(-1, 1)
+    return _Curves(level, ["in the room"], f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa")
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
@@ -305,7 +304,7 @@ def draw_design(result: Design) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive if all octave levels lie within their limits. For a case with a room the
-    figure shows the statistical rating of the room instead, with the required one and, if it is
+    figure shows the rating of the room instead, with the required one and, if it is
     that of octaves, the limits of the classes of KS F 2863-2. One parameter is drawn as a curve.
     """
     if len(result.axes) == 1:
@@ -378,7 +377,7 @@ def _draw_rating(
     filled = axes.contourf(*position, rating, levels=fine, cmap="cividis_r")
     inside = steps[(steps > rating.min()) & (steps < rating.max())]
     bar = figure.colorbar(
-        filled, ax=axes, ticks=steps, label=f"{_with_symbol(title)},\nstatistical, dB re 20 µPa"
+        filled, ax=axes, ticks=steps, label=f"{_with_symbol(title)},\ndB re 20 µPa"
     )
     if inside.size:
         lines = axes.contour(*position, rating, inside, colors="black", linewidths=0.5)
@@ -436,7 +435,7 @@ def _draw_design_curve(result: Design) -> Figure:
             for title, limit in _rating_limits(result)
             if float(rating.min()) - 1 < limit < float(rating.max()) + 1
         ]
-        axes.set_ylabel(f"{_with_symbol(RATINGS[result.rating_name])},\nstatistical, dB re 20 µPa")
+        axes.set_ylabel(f"{_with_symbol(RATINGS[result.rating_name])},\ndB re 20 µPa")
     axes.plot(x, values.values, **line_style(0), **marker_style(0, 3))
     for i, (title, limit) in enumerate(limits):
         axes.axhline(limit, color=COLORS[1], linewidth=1.4, linestyle=LINES[i], label=title)

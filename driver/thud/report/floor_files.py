@@ -11,13 +11,8 @@ from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text
 from thud.base.workbooks import workbook
-from thud.report.predicted_floor import (
-    contribution_title,
-    deviation_text,
-    octave_texts,
-    sheets,
-    tables,
-)
+from thud.level.rating import rated_bands
+from thud.report.predicted_floor import CAVEAT, sheets, tables, verdict_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -27,7 +22,7 @@ if TYPE_CHECKING:
 
 WORKBOOK = "predictions.xlsx"
 # Names of the tables; the last is part of the report.
-_TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "changes")
+_TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "modes", "changes")
 # Maximum number of characters in a line on the screen.
 _WIDTH = 80
 
@@ -35,24 +30,18 @@ _WIDTH = 80
 def screen_text(floor: PredictedFloor) -> str:
     """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
     prediction = floor.prediction
-    required = prediction.requirement
-    octave_ends = prediction.all_contributions["octaves"]
-    (_, standard, _, _), *others, (_, korean, _, octaves) = floor.ratings
-    notes = [*filter(None, (standard, prediction.source_note))]
+    (title, _, _, text), *others = floor.ratings
+    octaves = zip(rated_bands("octave"), prediction.octave_level, strict=True)
     lines = [
         floor.name,
-        f"  {', '.join([f'{prediction.rated_name} {prediction.rated_text}', *notes])}",
-        *(f"    {text:>6}  {title}" for title, _, _, text in others),
-        f"  Of octaves{korean and f', {korean}'}: {octaves}",
-        *(f"    {text}" for text in octave_texts(prediction)),
-        *([f"  {required}"] if required else []),
+        f"  {title}: {', '.join(filter(None, (text, prediction.source_note)))}",
+        *([f"  {verdict}"] if (verdict := verdict_text(prediction)) else []),
+        f"  {CAVEAT.capitalize()}",
+        *(f"    {title}: {text}" for title, _, _, text in others),
+        f"    Octaves: {', '.join(f'{level:.1f} dB at {f:g} Hz' for f, level in octaves)}",
         *([f"  A-weighted energy by path: {floor.path_shares}"] if len(floor.paths) > 1 else []),
-        "  Contributions to the intervals of one-third octaves and octaves, dB:",
-        *(
-            f"    {deviation_text(ends):<13} {deviation_text(octave_ends[name]):<13} "
-            f"{contribution_title(name, prediction)}"
-            for name, ends in floor.contributions.items()
-        ),
+        "  Contributions to the standard uncertainty, dB:",
+        *(f"    {value:.1f}  {name}" for name, value in floor.contributions.items()),
     ]
     return "\n".join(
         fill(line, _WIDTH, subsequent_indent="    ") if len(line) > _WIDTH else line
@@ -88,7 +77,7 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
     """Return the page of a floor as HTML and, if possible, PDF, by file name."""
     # Matplotlib is slow to import.
     from thud.plot.floor_figures import draw_section
-    from thud.plot.room_figures import draw_ranges
+    from thud.plot.room_figures import draw_levels
     from thud.plot.save_figures import figure_files
     from thud.report.floor_page import floor_page, page_texts
     from thud.report.pdf import pdf_file
@@ -96,7 +85,7 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
     figures = figure_files(
         draw_all({
             "section": partial(draw_section, floor.layers),
-            "levels": partial(draw_ranges, floor.prediction),
+            "levels": partial(draw_levels, floor.prediction),
         })
     )  # fmt: skip
     section, levels = (figures.get(f"{name}.svg", b"").decode() for name in ("section", "levels"))

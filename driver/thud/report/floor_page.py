@@ -9,16 +9,17 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.case.keys import humanize
+from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.report.fonts import FAMILY
 from thud.report.markup import css_string, escaped, inline_svg, labeled, notes, pair_rows, symbols
 from thud.report.predicted_floor import (
+    CAVEAT,
     band_rows,
-    contribution_title,
-    deviation_text,
     difference_text,
     number_text,
-    octave_levels,
     octave_titles,
+    remedy,
+    verdict_text,
 )
 from thud.report.template import PAGE
 
@@ -38,7 +39,7 @@ BODY = Template("""<header>
 <td><h2>Construction, to scale</h2>$section</td>
 <td><h2>Room and source</h2><table class="pairs">$about</table></td>
 </tr></table>
-<h2>Ratings, $quantity</h2>
+<h2>Ratings</h2>
 $ratings
 <h2>Assumptions and their sources</h2>
 $assumptions
@@ -49,16 +50,18 @@ $assumptions
 <td>$figure</td>
 <td><h2>What makes the rating uncertain</h2>
 $contributions
-<p class="rule">$interval</p>
+<p class="rule">$about_contributions</p>
 <h2>What would change it</h2>
 $changes
-<p class="rule">Changes of the mean rating of one-third octaves, each predicted again, all else
-unchanged.</p></td>
+<p class="rule">Changes of the rating, each predicted again, all else unchanged.</p></td>
 </tr></table>
 $bands
 <p class="rule">$columns</p>
 $octaves
 </div>
+<h2>Lowest natural frequencies, Hz</h2>
+$modes
+<p class="rule">$resonances</p>
 <h2>How certain the computation is</h2>
 <p class="rule">$computation</p>
 <h2>How certain the model is</h2>
@@ -68,7 +71,7 @@ $warnings
 """)
 
 # Widths of the columns of bands in print, mm: as their titles need them.
-WIDTHS = (8.5, 13.6, 17.5, 14, 10, 9, 16, 11.6, 10.6, 17, 14, 16, 21.4)
+WIDTHS = (8.5, 14, 19, 16, 12, 10, 14, 22, 19, 17, 22)
 STYLE = """
 .verdict b { text-transform: none; }
 .whole { white-space: nowrap; }
@@ -91,7 +94,7 @@ STYLE = """
   .values th:nth-child(2) { width: 28mm; }
   .narrow td:nth-last-child(2):not(:first-child), .narrow th:nth-last-child(2):not(:first-child) {
     width: 22mm; }
-  .octaves th:first-child { width: 64mm; }
+  .octaves th:first-child, .modes th:first-child { width: 64mm; }
 """
 STYLE += "".join(
     f"  .bands th:nth-child({i}) {{ width: {width}mm; }}\n" for i, width in enumerate(WIDTHS, 1)
@@ -111,49 +114,41 @@ STYLE += """  .bands td, .bands th { padding-left: 0.5mm; }
 """
 ABOUT_COLUMNS = (
     "The force level is the force exposure level of the force on the floor; the energy is what "
-    "this force transfers to the bearing floor, below a floating plate if there is one. Spread: "
-    "expected standard deviation of the statistical level at one position of source and "
-    "microphone. Above {last} Hz, where modes of the room overlap, there is no prediction by "
-    "modes, and its rating uses the statistical levels."
+    "this force transfers to the bearing floor, below a floating plate if there is one."
 )
-ABOUT_INTERVAL = (
-    "Deviations from {thirds[0]:.1f} dB by one-third octaves and {octaves[0]:.1f} dB by octaves. "
-    "They count as independent: the root sums of squares of both sides give the intervals, "
-    "{thirds[1]:.1f} to {thirds[2]:.1f} dB and {octaves[1]:.1f} to {octaves[2]:.1f} dB."
+ABOUT_CROSSOVER = (
+    " Up to {last} Hz the level is that of the modes of floor and room, above, where modes of the "
+    "room overlap, it is statistical."
+)
+ABOUT_EDGES = (
+    " The support of the floor is not known: the level is the energy mean of those with simply "
+    "supported and with clamped edges."
+)
+ABOUT_CONTRIBUTIONS = (
+    "Standard uncertainties; their root sum of squares is that of the rating. The largest becomes "
+    "smaller by {remedy}."
 )
 ABOUT_MODEL = (
-    "The interval, {interval}, is an estimate of what the model leaves open. The largest "
-    "contribution: {largest}. {predictions} The interval has no stated probability: no measured "
-    "floor has been compared with these predictions. It excludes mistakes in the assumed values "
+    "The levels are those of rigid boxes, with no measurement behind them: no measured floor has "
+    "been compared with these predictions. The uncertainty excludes mistakes in the assumed values "
     "above, workmanship, paths that are not described, and furniture."
-)
-ABOUT_BOTH = (
-    "The statistical prediction is a mean over many floors and rooms of this kind, that by modes "
-    "describes one ideal rectangular floor and room; they give {statistical} and {modal} dB."
-)
-ABOUT_ONE = (
-    "The only prediction is the statistical one, a mean over many floors and rooms of this kind: "
-    "the modes of the floor are not known, or those of the room overlap in all bands. The interval "
-    "contains neither the edges of the floor nor the model."
 )
 
 
 def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
     """Return the page as self-contained HTML, with the section and the levels as SVG."""
     prediction = floor.prediction
-    octaves = prediction.all_contributions["octaves"]
     body = BODY.substitute(
-        rating=escaped(prediction.rated_text),
+        rating=escaped(str(prediction.rating)),
         box="<br>".join(map(symbols, _box(floor))),
         name=escaped(floor.name),
         details="<br>".join(escaped(f"{name}: {text}") for name, text in floor.details),
         section=_figure(section, "s"),
         about=pair_rows(_about(floor)),
-        quantity=symbols(prediction.rated_name),
         ratings=_table(
             [
-                ("Rating", "Standard", "Value"),
-                *((title, standard, text) for title, standard, _, text in floor.ratings),
+                ("Rating", "Value"),
+                *((title, text) for title, _, _, text in floor.ratings),
             ],
             "named values texts",
         ),
@@ -162,23 +157,12 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         figure=_figure(figure, "l"),
         contributions=_table(
             [
-                ("Contribution, dB", "1/3 octaves", "octaves"),
-                *(
-                    (
-                        contribution_title(name, prediction),
-                        deviation_text(ends),
-                        deviation_text(octaves[name]),
-                    )
-                    for name, ends in floor.contributions.items()
-                ),
+                ("Contribution", "dB"),
+                *((name, f"{value:.1f}") for name, value in floor.contributions.items()),
             ],
             "narrow",
         ),
-        interval=escaped(
-            ABOUT_INTERVAL.format(
-                thirds=prediction.rated_ends["thirds"], octaves=prediction.rated_ends["octaves"]
-            )
-        ),
+        about_contributions=escaped(ABOUT_CONTRIBUTIONS.format(remedy=remedy(prediction))),
         changes=_table(
             [
                 ("Change", "dB"),
@@ -191,15 +175,14 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         octaves=_table(
             [
                 ("Maximum Fast levels, octaves", *octave_titles()),
-                *(
-                    (title, *(number_text(level, ".1f") for level in levels))
-                    for title, levels in octave_levels(prediction).items()
-                ),
+                ("", *(number_text(level, ".1f") for level in prediction.octave_level)),
             ],
             "octaves",
         ),
+        modes=_table(_mode_rows(prediction), "modes"),
+        resonances=escaped(_about_resonances(prediction)),
         computation=escaped(_about_computation(floor)),
-        model=escaped(_about_model(floor)),
+        model=escaped(ABOUT_MODEL),
         warnings=notes("Warnings", prediction.warnings or ["none"]),
         footer=escaped(f"thud {version()} · predicted, not measured · end of report"),
     )
@@ -222,16 +205,41 @@ def page_texts(floor: PredictedFloor) -> str:
 def _box(floor: PredictedFloor) -> list[str]:
     """Return the lines below the rating."""
     prediction = floor.prediction
-    (_, standard, _, _), *_, (_, korean, _, _) = floor.ratings
-    octaves = ", ".join(filter(None, (prediction.octave_text, prediction.class_text)))
+    name = prediction.room.rating
     lines = [
-        f"{prediction.rated_name} in the room below, 50 to 630 Hz{standard and f' ({standard})'}",
-        f"of octaves{korean and f' ({korean})'}: {octaves}",
+        verdict_text(prediction),
+        f"{prediction.title_of(name)} in the room below, 50 to 630 Hz",
+        prediction.class_text * (name == "octaves"),
+        prediction.source_note.capitalize(),
+        CAVEAT.capitalize(),
     ]
-    required = prediction.requirement
-    if prediction.source_note:
-        lines.insert(0, prediction.source_note.capitalize())
-    return [*lines, f"{required}"] if required else lines
+    return [*filter(None, lines)]
+
+
+def _mode_rows(prediction: RoomPrediction) -> list[tuple[str, ...]]:
+    """Return the lowest natural frequencies of floor and room, Hz."""
+    floor, room = floor_frequencies(prediction), room_frequencies(prediction)
+    numbers = range(1, max(len(floor), len(room)) + 1)
+    rows = {
+        "Floor": [f"{frequency:.1f}" for frequency in floor],
+        "Room": [f"{frequency:.1f}" for frequency in room.values()],
+        "Half wavelengths along length, width, height": [
+            ", ".join(map(str, order)) for order in room
+        ],
+    }
+    padded = (
+        (title, *cells, *["–"] * (len(numbers) - len(cells))) for title, cells in rows.items()
+    )
+    return [("", *map(str, numbers)), *padded]
+
+
+def _about_resonances(prediction: RoomPrediction) -> str:
+    """Return the resonances of the plates of a floor, and how they are computed."""
+    values = (f"{name} {number_text(f)} Hz" for name, f in resonances(prediction).items())
+    text = "The floor is simply supported unless its support is stated; the room has rigid walls."
+    if resonant := "; ".join(values):
+        text += f" Resonances of both masses on the stiffness between them: {resonant}."
+    return text
 
 
 def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
@@ -291,10 +299,12 @@ def _assumed(floor: PredictedFloor) -> str:
 
 
 def _about_columns(floor: PredictedFloor) -> str:
-    modal = floor.prediction.n_modal
-    if not modal:
-        return ABOUT_COLUMNS.partition(" Above")[0]
-    return ABOUT_COLUMNS.format(last=f"{floor.prediction.frequency[modal - 1]:g}")
+    """Return what the columns of bands mean."""
+    prediction = floor.prediction
+    text = ABOUT_COLUMNS
+    if prediction.n_modal:
+        text += ABOUT_CROSSOVER.format(last=f"{prediction.frequency[prediction.n_modal - 1]:g}")
+    return text + ABOUT_EDGES * prediction.has_edges
 
 
 def _about_computation(floor: PredictedFloor) -> str:
@@ -310,19 +320,6 @@ def _about_computation(floor: PredictedFloor) -> str:
         f"{solved} The numerical error of the force, estimated from a coarser computation, is at "
         f"most {errors.level.max():.2g} dB in its octaves. This says nothing on whether the "
         "equations describe the building."
-    )
-
-
-def _about_model(floor: PredictedFloor) -> str:
-    """Return what the interval contains, and what it does not."""
-    prediction = floor.prediction
-    both = ABOUT_BOTH.format(
-        statistical=prediction.rating.rounded, modal=prediction.modal_rating.rounded
-    )
-    return ABOUT_MODEL.format(
-        interval=prediction.rated_text,
-        largest=floor.largest,
-        predictions=both if prediction.n_modal else ABOUT_ONE,
     )
 
 

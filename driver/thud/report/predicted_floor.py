@@ -22,30 +22,42 @@ from thud.base._schema import (
 )
 from thud.base.errors import ThudError
 from thud.base.units import display_unit
+from thud.case.constructions import Layer
 from thud.case.keys import humanize
-from thud.floors.constructions import Layer
 from thud.floors.prediction import BANDS, predict_level
-from thud.floors.resonances import resonances
+from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.levels import get_bands
-from thud.level.rating import rated_bands, rating
+from thud.level.rating import rated_bands
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
-    from thud.base._schema import FloorOptions, RoomRequiredRating
+    from thud.base._schema import FloorOptions
     from thud.base.key import Key
-    from thud.floors.constructions import Construction
+    from thud.case.constructions import Construction
     from thud.floors.prediction import RoomPrediction
 
     Cells = tuple[str | float, ...]
 
-# Contributions to the interval of the rating, in words.
+
+class Contribution(NamedTuple):
+    """A contribution to the uncertainty of a rating in words, and what would make it smaller."""
+
+    title: str
+    remedy: str
+
+
+# What no data of the floor can tell, beside each rating.
+CAVEAT = "rigid boxes, no measurement behind it"
+# Contributions to the uncertainty of a rating.
 CONTRIBUTIONS = {
-    "source": "another source that conforms",
-    "edges": "support of the edges",
-    "reverberation_time": "reverberation time, ±20 %",
-    "positions": "positions of ball and microphone",
-    "model": "difference of both predictions",
+    "edges": Contribution("support of the edges", "a stated support, or the modes of the floor"),
+    "floor_and_room": Contribution(
+        "data of floor and room",
+        "measured data of the materials and the reverberation time",
+    ),
+    "source": Contribution("another source that conforms", "a measured force of the source"),
+    "model": Contribution("the model: rigid boxes", "a measurement in the building"),
 }
 # Beginnings of the names of keys without effect if another key has a value.
 _WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
@@ -62,8 +74,6 @@ _MAIN = (
     "length", "width", "thickness", "sheathing_thickness", "joist_height", "density",
     "screed_thickness", "layer_stiffness", "loss_factor", "support", "reverberation_time",
 )  # fmt: skip
-# Deviation that is not listed by its value, dB.
-_NEGLIGIBLE = 0.05
 # Added to a thickness, m.
 _ADDED = 0.01
 _THICKNESSES = {
@@ -81,8 +91,8 @@ _LAMELLAS = (0.04, 0.02, 0.04, 0.02, 0.04)
 _ASSUMED = "(thickness assumed)"
 # Maximum number of values of a key that are listed.
 _MAX_SHOWN = 12
-# Key that is the requirement, not an assumption.
-_REQUIRED = "required"
+# Keys that are the requirement, no assumptions.
+_REQUIRED = ("required", "rating")
 
 
 class Change(NamedTuple):
@@ -122,59 +132,24 @@ class PredictedFloor:
         return tuple(_case_layers(self.prediction))
 
     @property
-    def contributions(self) -> dict[str, tuple[float, float]]:
-        """Lower and upper deviation from the rating, dB, the largest contribution first.
-
-        Without a prediction by modes those of edges and model are not known; that of the edges is
-        not known either if the floor is given by its own modes.
-        """
-        entries = [
-            (name, ends)
-            for name, ends in self.prediction.contributions.items()
-            if (self.prediction.n_modal or name != "model")
-            and (self.prediction.has_edges or name != "edges")
-        ]
-        return dict(sorted(entries, key=lambda entry: -max(map(abs, entry[1]))))
+    def contributions(self) -> dict[str, float]:
+        """Contributions to the standard uncertainty of the rating, dB; the largest first."""
+        contributions = self.prediction.rating.contributions
+        return {CONTRIBUTIONS[name].title: value for name, value in contributions.items() if value}
 
     @property
-    def largest(self) -> str:
-        """Name of the largest contribution, in words."""
-        return contribution_title(next(iter(self.contributions)), self.prediction)
-
-    @property
-    def ratings(self) -> list[tuple[str, str, float, str]]:
-        """Title, standard, value, dB, and text of each rating; no standard for the tyre."""
+    def ratings(self) -> list[tuple[str, float, float, str]]:
+        """Title, value, standard uncertainty, dB, and text of each rating, the asked one first."""
         prediction = self.prediction
-        note = f"; {prediction.source_note}" if prediction.source_note else ""
-        octaves = ", ".join(filter(None, (prediction.octave_text, prediction.class_text)))
-        if prediction.n_modal:
-            statistical, modal = (
-                known["octaves"].rounded for known in (prediction.ratings, prediction.modal_ratings)
-            )
-            octaves += f"; statistical {statistical} dB, by modes {modal} dB"
-        predictions = "mean of both predictions" if prediction.n_modal else "prediction"
-        mean = f"{predictions}, with interval"
-        result = [
-            (mean, "ISO 717-2", prediction.rated, f"{prediction.rated_text}{note}"),
-            _rating_entry("statistical prediction", "ISO 717-2", prediction.level),
-        ]
-        if prediction.n_modal:
-            result += [_rating_entry("prediction by modes", "ISO 717-2", prediction.modal_level)]
-        if prediction.has_edges:
-            result += [
-                _rating_entry("by modes, simply supported", "ISO 717-2", prediction.simple_level),
-                _rating_entry("by modes, clamped", "ISO 717-2", prediction.clamped_level),
-            ]
-        result += [
+        classes = prediction.class_text and f"; KS F 2863-2: {prediction.class_text}"
+        ratings = sorted(prediction.ratings.values(), key=lambda entry: entry != prediction.rating)
+        return [
             (
-                "standardized", "ISO 16283-2", prediction.rated_of("standardized"),
-                prediction.standardized_text,
-            ),
-            ("of octaves", "KS F 2863-2", prediction.rated_of("octaves"), octaves),
+                prediction.title_of(entry.name), entry.level, entry.uncertainty,
+                f"{entry}{classes if entry.name == 'octaves' else ''}",
+            )
+            for entry in ratings
         ]  # fmt: skip
-        if prediction.is_ball:
-            return result
-        return [(title, "", value, text) for title, _, value, text in result]
 
     @property
     def paths(self) -> list[str]:
@@ -185,21 +160,14 @@ class PredictedFloor:
     @property
     def path_shares(self) -> str:
         """Fractions of the A-weighted energy by path, in percent."""
-        shares = zip(self.paths, self.prediction.rated_shares, strict=True)
-        return ", ".join(f"{path} {100 * share:.2g} %" for path, share in shares)
+        shares = zip(self.paths, self.prediction.weighted_shares, strict=True)
+        return ", ".join(f"{path} {100 * share:.0f} %" for path, share in shares)
 
     @property
     def assumptions(self) -> list[tuple[str, str, str]]:
-        """Quantity, value with unit, and source of the main and the stated values.
-
-        The resonances that follow from them are the last.
-        """
+        """Quantity, value with unit, and source of the main and the stated values."""
         rows = [(meaning, value, source) for _, meaning, value, source in self._values() if source]
-        computed = [
-            (f"resonance: {name}", f"{number_text(value)} Hz", "from both masses and the stiffness")
-            for name, value in resonances(self.prediction).items()
-        ]
-        return [("Quantity", "Value", "Source"), *rows, *computed]
+        return [("Quantity", "Value", "Source"), *rows]
 
     @property
     def defaults(self) -> list[str]:
@@ -230,14 +198,25 @@ class PredictedFloor:
                 yield humanize(key.name), meaning, _value_text(key, value), source
 
     @cached_property
+    def modes(self) -> list[tuple[str, float]]:
+        """Name and natural frequency, Hz, of the lowest modes of floor and room, and resonances."""
+        own = enumerate(floor_frequencies(self.prediction), start=1)
+        rooms = room_frequencies(self.prediction).items()
+        return [
+            *((f"floor {number}", frequency) for number, frequency in own),
+            *(("room {}, {}, {}".format(*order), frequency) for order, frequency in rooms),
+            *resonances(self.prediction).items(),
+        ]
+
+    @cached_property
     def changes(self) -> tuple[Change, ...]:
         """Changes of the rating by changes of floor and room, each predicted again."""
         source, floor = self.prediction.source, self.prediction.floor
         result = []
         for text, changed_floor, changed_room in _variants(floor, self.prediction.room):
             try:
-                difference = predict_level(source, changed_floor, changed_room).rated
-                difference -= self.prediction.rated
+                changed = predict_level(source, changed_floor, changed_room)
+                difference = changed.rating.level - self.prediction.rating.level
             except ThudError:
                 difference = np.nan
             result.append(Change(text, difference))
@@ -259,39 +238,31 @@ COLUMNS: dict[str, tuple[str, Callable[[PredictedFloor], Iterable[float]]]] = {
     "radiation factor": ("#.3g", lambda floor: floor.prediction.radiation_factor),
     "loss factor": (".3f", lambda floor: floor.prediction.loss_factor),
     "T, s": (".2f", lambda floor: floor.prediction.reverberation_time),
-    "statistical, dB": (".1f", lambda floor: floor.prediction.level),
-    "spread, dB": (".1f", lambda floor: floor.prediction.spread),
-    "modal, dB": (".1f", lambda floor: floor.prediction.modal_level),
+    "level, dB": (".1f", lambda floor: floor.prediction.level),
+    "standard uncertainty, dB": (".1f", lambda floor: floor.prediction.uncertainty),
     "simply supported, dB": (".1f", lambda floor: floor.prediction.simple_level),
     "clamped, dB": (".1f", lambda floor: floor.prediction.clamped_level),
-    "modal − statistical, dB": (".1f", lambda floor: floor.prediction.model_difference),
     "standardized, dB": (".1f", lambda floor: floor.prediction.standardized),
 }
 
-# Columns of modal bands only, and whether they need a choice of edges.
-_MODAL = {
-    "modal, dB": False, "simply supported, dB": True, "clamped, dB": True,
-    "modal − statistical, dB": False,
-}  # fmt: skip
+# Columns of bands in which the support of the edges matters.
+_OF_EDGES = ("simply supported, dB", "clamped, dB")
 
 
-def contribution_title(name: str, prediction: RoomPrediction) -> str:
-    """Return a contribution in words; that of other sources, if this one does not conform."""
-    if name == "source" and prediction.source_note:
-        return "sources that conform, unlike this one"
-    return CONTRIBUTIONS.get(name, name.replace("_", " "))
+def remedy(prediction: RoomPrediction) -> str:
+    """Return what would reduce the largest contribution to the uncertainty of the rating."""
+    return CONTRIBUTIONS[next(iter(prediction.rating.contributions))].remedy
 
 
-def deviation_text(ends: tuple[float, float]) -> str:
-    """Return lower and upper deviation, dB.
-
-    >>> deviation_text((-1.5, 1.5)), deviation_text((-1.26, 0.0)), deviation_text((-0.04, 0.0))
-    ('±1.5', '−1.3 to 0.0', 'less than 0.1')
-    """
-    if max(map(abs, ends)) < _NEGLIGIBLE:
-        return "less than 0.1"
-    low, high = (f"{end:z.1f}".replace("-", "−") for end in ends)
-    return f"±{high}" if low == f"−{high}" else f"{low} to {high}"
+def verdict_text(prediction: RoomPrediction) -> str:
+    """Return probability and verdict on a requirement, and what would decide it; else nothing."""
+    required = prediction.requirement
+    if required is None:
+        return ""
+    text = f"{required.chance}: {required.verdict}"
+    if required.verdict != "undecided":
+        return text
+    return f"{text}; {prediction.source_note or f'to decide it: {remedy(prediction)}'}"
 
 
 def difference_text(change: Change) -> str:
@@ -311,7 +282,7 @@ def number_text(value: float, form: str = ".3g") -> str:
 
 
 def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
-    """Return the bands as rows of text, the header first; modal levels only of modal bands."""
+    """Return the bands as rows of text, the header first."""
     cells = [
         ["–" if isinstance(value, str) else number_text(value, form) for value in column]
         for (form, _), column in zip(COLUMNS.values(), _columns(floor), strict=True)
@@ -321,56 +292,50 @@ def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
 
 
 def _columns(floor: PredictedFloor) -> list[list[float | str]]:
-    """Return the columns of bands; where a modal column has no own value, an empty text."""
+    """Return the columns of bands; an empty text where the support of the edges does not matter."""
     prediction = floor.prediction
-    result: list[list[float | str]] = []
-    for title, (_, values) in COLUMNS.items():
-        column: list[float | str] = [*map(float, values(floor))]
-        if title in _MODAL:
-            count = prediction.n_modal if prediction.has_edges or not _MODAL[title] else 0
-            column[count:] = [""] * (len(column) - count)
-        result.append(column)
-    return result
+    matters = prediction.simple_level != prediction.clamped_level
+    return [
+        [
+            "" if title in _OF_EDGES and not known else float(value)
+            for value, known in zip(values(floor), matters, strict=True)
+        ]
+        for title, (_, values) in COLUMNS.items()
+    ]
 
 
 def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list[Cells]]:
     """Return every number of floors in tables by name, each with a header."""
-    bands: list[Cells] = [("floor", "band, Hz", *COLUMNS, "floor modes", "room modes", "modal")]
-    ratings: list[Cells] = [("floor", "rating", "standard", "value, dB", "text")]
-    head = ("floor", "rating", "contribution", "lower, dB", "upper, dB")
-    contributions: list[Cells] = [head]
-    octaves: list[Cells] = [("floor", "prediction", *octave_titles())]
+    bands: list[Cells] = [("floor", "band, Hz", *COLUMNS, "by modes")]
+    ratings: list[Cells] = [("floor", "rating", "value, dB", "standard uncertainty, dB", "text")]
+    contributions: list[Cells] = [("floor", "contribution", "standard uncertainty, dB")]
+    octaves: list[Cells] = [("floor", *octave_titles())]
+    modes: list[Cells] = [("floor", "mode", "natural frequency, Hz")]
     paths: list[Cells] = [("floor", "band, Hz", "path", "fraction of the energy")]
     changed: list[Cells] = [("floor", "change", "difference, dB")]
     for floor in floors:
         prediction = floor.prediction
         count = len(prediction.frequency)
         columns = [
-            map(float, prediction.frequency), *_columns(floor), map(float, prediction.floor_modes),
-            map(float, prediction.room_modes), map(float, np.arange(count) < prediction.n_modal),
+            map(float, prediction.frequency), *_columns(floor),
+            map(float, np.arange(count) < prediction.n_modal),
         ]  # fmt: skip
         bands += [(floor.name, *row) for row in zip(*columns, strict=True)]
-        octaves += [
-            (floor.name, title, *values) for title, values in octave_levels(prediction).items()
-        ]
+        octaves.append((floor.name, *map(float, prediction.octave_level)))
         ratings += [(floor.name, *entry) for entry in floor.ratings]
-        ratings += [(floor.name, *entry) for entry in _rating_details(floor)]
-        required = prediction.requirement
-        if required:
-            ratings.append((floor.name, "required", "", required.required, str(required)))
-        contributions += [
-            (floor.name, rated, name, *deviations[name])
-            for rated, deviations in prediction.all_contributions.items()
-            for name in floor.contributions
-        ]
-        shares = [*prediction.path_shares, prediction.rated_shares]
+        if prediction.requirement:
+            limit = prediction.requirement.limit
+            ratings.append((floor.name, "required", limit, "", verdict_text(prediction)))
+        contributions += [(floor.name, *entry) for entry in floor.contributions.items()]
+        modes += [(floor.name, *entry) for entry in floor.modes]
+        shares = [*prediction.path_shares, prediction.weighted_shares]
         for band, row in zip([*prediction.frequency, "A"], shares, strict=True):
             paths += [(floor.name, band, *path) for path in zip(floor.paths, row, strict=True)]
         if changes:
             changed += [(floor.name, *change) for change in floor.changes]
     result = {
         "bands": bands, "octaves": octaves, "ratings": ratings, "contributions": contributions,
-        "paths": paths,
+        "paths": paths, "modes": modes,
     }  # fmt: skip
     return {**result, "changes": changed} if changes else result
 
@@ -385,55 +350,9 @@ def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
     return {"assumptions": assumptions, "warnings": warnings}
 
 
-def octave_levels(prediction: RoomPrediction) -> dict[str, list[float]]:
-    """Return levels of octaves and their rating, dB, by the prediction that they belong to."""
-    both = {"statistical": (prediction.octave_level, prediction.ratings)}
-    if prediction.n_modal:
-        both["by modes"] = (prediction.modal_octave_level, prediction.modal_ratings)
-    return {
-        title: [*map(float, levels), ratings["octaves"].a_weighted]
-        for title, (levels, ratings) in both.items()
-    }
-
-
-def octave_texts(prediction: RoomPrediction) -> list[str]:
-    """Return the levels of octaves, in a text for each prediction."""
-    octaves = ", ".join(f"{frequency:g}" for frequency in rated_bands("octave"))
-    return [
-        f"{title}: {', '.join(number_text(level, '.1f') for level in levels)} dB at {octaves} Hz"
-        for title, (*levels, _) in octave_levels(prediction).items()
-    ]
-
-
 def octave_titles() -> list[str]:
-    """Return the titles of the columns of `octave_levels`."""
-    return [*(f"{frequency:g} Hz, dB" for frequency in rated_bands("octave")), "A-weighted, dB"]
-
-
-def _rating_details(floor: PredictedFloor) -> Iterator[tuple[str, str, float, str]]:
-    """Yield the ends of the intervals, and the ratings by both predictions of what is not rated."""
-    prediction = floor.prediction
-    names: dict[RoomRequiredRating, str] = {
-        "thirds": "", "standardized": "standardized, ", "octaves": "of octaves, ",
-    }  # fmt: skip
-    standards = {title: standard for title, standard, _, _ in floor.ratings}
-    for name, beginning in names.items():
-        standard = standards[beginning.removesuffix(", ") or "statistical prediction"]
-        if beginning:
-            value = prediction.ratings[name]
-            yield f"{beginning}statistical", standard, value.a_weighted, f"{value.rounded} dB"
-        if beginning and prediction.n_modal:
-            value = prediction.modal_ratings[name]
-            yield f"{beginning}by modes", standard, value.a_weighted, f"{value.rounded} dB"
-        for end, level in zip(("lower", "upper"), prediction.interval_of(name), strict=True):
-            yield f"{beginning}{end} end of the interval", standard, level, ""
-
-
-def _rating_entry(
-    title: str, standard: str, levels: np.ndarray[tuple[int], np.dtype[np.float64]]
-) -> tuple[str, str, float, str]:
-    value = rating(levels, BANDS)
-    return title, standard, value.a_weighted, f"{value.rounded} dB"
+    """Return the titles of the columns of octave levels."""
+    return [f"{frequency:g} Hz, dB" for frequency in rated_bands("octave")]
 
 
 def _effective_values(group: FloorOptions | Room, owner: str) -> Iterator[tuple[Key, object, bool]]:
@@ -449,7 +368,7 @@ def _effective_values(group: FloorOptions | Room, owner: str) -> Iterator[tuple[
             continue
         value = getattr(group, key.name)
         is_default = value == getattr(type(group)(), key.name)
-        if key.name.startswith(("point_", _REQUIRED, *off)) or (is_default and value in (0.0, ())):
+        if key.name.startswith(("point_", *_REQUIRED, *off)) or (is_default and value in (0.0, ())):
             continue
         yield key, value, is_default
 
@@ -461,7 +380,7 @@ def _value_text(key: Key, value: object) -> str:
         return f"{len(numbers)} values"
     if key.kind == "text":
         return str(value)
-    if not all(isinstance(number, float) for number in numbers):
+    if not all(isinstance(number, int | float) for number in numbers):
         return ", ".join(humanize(str(entry)) for entry in numbers)
     # A reverberation time of 500 ms would be unusual.
     largest = max(map(abs, numbers), default=0.0)

@@ -6,15 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
-import numpy as np
-import xarray as xr
-
 from thud.base._schema import CLASS_LIMITS, RATINGS, Room
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import DENSITY, value_in
-from thud.impact.quantities import RATING, ROOM_BAND, ROOM_LEVEL
-from thud.level.rating import meets, rated_bands, rating
+from thud.impact.quantities import ROOM_RATING
+from thud.level.rating import meets
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study import wall_volume
 from thud.studies.study_result import SampleResult
@@ -24,9 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    import xarray as xr
     from matplotlib.figure import Figure
 
-    from thud.base._schema import RoomRequiredRating
+    from thud.base._schema import RoomRating
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.samples import SampleStudy
@@ -63,7 +61,7 @@ class Design(SampleResult):
     axes: tuple[str, ...]
     mark: tuple[float, ...] | None
     mark_name: str
-    rating_name: RoomRequiredRating = "octaves"
+    rating_name: RoomRating = "thirds"
     required: float = 0.0
 
     def __repr__(self) -> str:
@@ -73,32 +71,9 @@ class Design(SampleResult):
         return f"<Design, {' and '.join(self.axes)}: {count}>"
 
     @property
-    def octave_rating(self) -> xr.DataArray | None:
-        """A-weighted level of the octaves in the room, dB; None without a room.
-
-        It has the classes of KS F 2863-2. The levels of octaves are energy sums of the maxima of
-        their bands, upper bounds that are reached if the bands have their maxima at the same time.
-        They are up to 0.02 dB too high with one reverberation time, and up to about 0.3 dB if those
-        of the bands differ much.
-        """
-        if ROOM_LEVEL not in self.dataset:
-            return None
-        level = self.dataset[ROOM_LEVEL].transpose(..., ROOM_BAND)
-        octaves = level.values.reshape(*level.shape[:-1], len(rated_bands("octave")), -1)
-        values = 10 * np.log10((10 ** (octaves / 10)).sum(axis=-1))
-        result = np.full(values.shape[:-1], np.nan)
-        for index in np.ndindex(result.shape):
-            if np.isfinite(values[index]).all():
-                result[index] = rating(values[index]).a_weighted
-        dims = level.dims[:-1]
-        return xr.DataArray(result, {name: self.dataset[name] for name in dims}, dims)
-
-    @property
     def room_rating(self) -> xr.DataArray | None:
-        """Statistical rating `rating_name` of the levels in the room, dB; None without a room."""
-        if self.rating_name == "octaves" or ROOM_LEVEL not in self.dataset:
-            return self.octave_rating
-        return self.dataset[RATING if self.rating_name == "standardized" else "room_rating"]
+        """The rating `rating_name` of the levels in the room, dB; None without a room."""
+        return self.dataset.get(ROOM_RATING)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: how many samples conform, and the best sample."""
@@ -120,22 +95,20 @@ class Design(SampleResult):
     def _room_rows(self, room_rating: xr.DataArray) -> list[tuple[str, ...]]:
         """Return rows on the rating of the room: classes, requirement, and the best samples."""
         size = room_rating.size
-        title = RATINGS[self.rating_name]
         rows: list[tuple[str, ...]] = [
             ("samples whose source conforms", f"{int(self.dataset['conforms'].sum())}"),
-            ("rating, statistical", title),
+            ("rating", RATINGS[self.rating_name]),
         ]
-        octave_rating = self.octave_rating
-        if octave_rating is not None and self.rating_name == "octaves":
-            count = int(meets(octave_rating, CLASS_LIMITS[-1]).sum())
+        if self.rating_name == "octaves":
+            count = int(meets(room_rating, CLASS_LIMITS[-1]).sum())
             rows.append((f"class {len(CLASS_LIMITS)} or better (KS F 2863-2)", str(count)))
         met = room_rating.copy(data=meets(room_rating, self.required))
         if self.required:
-            rows.append((f"meets {self.required:g} dB", f"{int(met.sum())} of {size}"))
+            rows.append((f"rating at most {self.required:g} dB", f"{int(met.sum())} of {size}"))
             if met.any():
                 best = room_rating.where(met).stack(sample=self.axes).dropna("sample")
                 smallest = best.isel(sample=best[self.axes[0]].argmin("sample"))
-                rows.append((f"smallest {self.axes[0]} that meets it", ""))
+                rows.append((f"smallest {self.axes[0]} with it", ""))
                 rows += self._coordinates(smallest)
         if room_rating.notnull().any():
             rows += self._place("lowest rating, dB", room_rating, room_rating.argmin(...))
@@ -184,7 +157,7 @@ class DesignKind(SampleKind[Design]):
         room = study.case.room or Room()
         return Design(
             dataset.load().sortby(list(axes)), axes, *_mark(study),
-            rating_name=room.required_rating, required=room.required,
+            rating_name=room.rating, required=room.required,
         )  # fmt: skip
 
 

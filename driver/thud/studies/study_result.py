@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.display import Displayed
 from thud.base.tables import format_rows
-from thud.impact.sample_messages import NO_ERRORS, STATISTICAL, sample_warnings
+from thud.impact.sample_messages import NO_ERRORS, sample_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,13 +68,12 @@ class SampleResult(StudyResult):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Accuracy of the surrogate with its undecided verdicts, and the kind of ratings."""
-        result = [STATISTICAL] if "room_rating" in self.dataset else []
-        if "surrogate" in self.dataset.attrs:
-            undecided = self.dataset["undecided"]
-            share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
-            result.append(f"{self.dataset.attrs['surrogate']}; it leaves {share}")
-        return tuple(result)
+        """Accuracy of the surrogate with its undecided verdicts."""
+        if "surrogate" not in self.dataset.attrs:
+            return ()
+        undecided = self.dataset["undecided"]
+        share = f"{int(undecided.sum())} of {undecided.size} verdicts undecided"
+        return (f"{self.dataset.attrs['surrogate']}; it leaves {share}",)
 
     def table(self) -> str:
         """Return the result as text; it says that the samples of a model state no errors."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.impact.quantities import RATING
+from thud.impact.quantities import ROOM_RATING
 from thud.level.assessment import octave_limits, wilson_interval
 from thud.level.levels import get_bands
 from thud.studies.sample_kind import SampleKind
@@ -96,11 +96,11 @@ class Uncertainty(SampleResult):
             share = np.mean((level >= lower[i]) & (level <= upper[i]))
             spread = f"{level.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
             rows.append((f"{band:g}", f"{level.mean():.2f}", *spread, f"{100 * share:.1f} %"))
-        if RATING in self.dataset:
-            rating = self.dataset[RATING].values[self.dataset["status"].values == 0]
+        if ROOM_RATING in self.dataset:
+            rating = self.dataset[ROOM_RATING].values[self.dataset["status"].values == 0]
             low, high = np.quantile(rating, [0.025, 0.975])
             spread = f"{rating.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
-            rows.append(("rating, standardized", f"{rating.mean():.2f}", *spread, ""))
+            rows.append(("rating of the room", f"{rating.mean():.2f}", *spread, ""))
         low, high = self.interval
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
         interval = f"{100 * low:.1f} to {100 * high:.1f} %"

@@ -10,8 +10,8 @@ module thud_result_bundle
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_rating, only: rating_names
-   use thud_room, only: few_modes, get_octave_levels, get_rated, room_level_type
-   use thud_room_prediction, only: contribution_names
+   use thud_room, only: get_band_records, room_level_type
+   use thud_room_uncertainty, only: contribution_names
    use thud_text, only: to_text
    use thud_warnings, only: add_floor_warning, add_height_warning, add_modes_warning, warning_length
    implicit none (type, external)
@@ -111,39 +111,26 @@ contains
       n = size(room%bands)
       call bundle%add_number('room.surface_mass', room%surface_mass)
       call bundle%add_number('room.volume', room%volume)
-      call bundle%add_number('room.few_modes', few_modes)
-      call bundle%add_array('room_bands.conductance', n, room%conductance)
-      call bundle%add_array('room_bands.frequency', n, room%bands%nominal)
-      call bundle%add_array('room_bands.energy', n, room%energy)
-      call bundle%add_array('room_bands.radiation_factor', n, room%radiation_factor)
-      call bundle%add_array('room_bands.loss_factor', n, room%loss_factor)
-      call bundle%add_array('room_bands.reverberation_time', n, room%reverberation_time)
-      call bundle%add_array('room_bands.floor_modes', n, room%floor_modes)
-      call bundle%add_array('room_bands.room_modes', n, room%room_modes)
-      call bundle%add_array('room_bands.level', n, room%level)
-      call bundle%add_array('room_bands.time', n, room%time)
-      call bundle%add_array('room_bands.spread', n, room%spread)
-      call bundle%add_array('room_size.sides', [3], room%sides)
       call bundle%add_number('room.n_modal', real(room%n_modal, wp))
-      call bundle%add_array('room_bands.modal_level', n, room%modal_level)
-      call bundle%add_array('room_bands.modal_spread', n, room%modal_spread)
-      call bundle%add_array('room_bands.simple_level', n, room%edge_level(:, 1))
-      call bundle%add_array('room_bands.clamped_level', n, room%edge_level(:, 2))
+      call bundle%add_number('room.crossover', room%crossover)
+      call bundle%add_array('room_bands.frequency', n, room%bands%nominal)
+      associate (records => get_band_records(room))
+         do i = 1, size(records)
+            call bundle%add_array('room_bands.'//trim(records(i)%name), n, records(i)%values)
+         end do
+      end associate
+      call bundle%add_array('room_size.sides', [3], room%sides)
       do i = 1, size(contribution_names)
-         call bundle%add_array('room_contributions.'//trim(contribution_names(i)), [2, size(rating_names)], &
-            room%contribution(:, i, :))
+         call bundle%add_number('room_contributions.'//trim(contribution_names(i)), room%contribution(i))
       end do
       do i = 1, size(rating_names)
-         call bundle%add_array('room_rated.'//trim(rating_names(i)), [3], get_rated(room, rating_names(i)))
+         call bundle%add_number('room_ratings.'//trim(rating_names(i)), room%rating(i))
       end do
+      call bundle%add_number('room.uncertainty', room%rating_uncertainty)
       call bundle%add_array('room_paths.share', shape(room%path_share), room%path_share)
       n = size(room%octaves)
       call bundle%add_array('room_octaves.frequency', n, room%octaves%nominal)
       call bundle%add_array('room_octaves.level', n, room%octave_level)
-      call bundle%add_array('room_octaves.time', n, room%octave_time)
-      call bundle%add_array('room_octaves.modal_level', n, get_octave_levels(room, room%modal_level))
-      call bundle%add_array('room_history.time', shape(room%history_time), room%history_time)
-      call bundle%add_array('room_history.level', shape(room%history), room%history)
       allocate (warnings(0))
       call add_floor_warning(case, state, warnings)
       call add_height_warning(case, state, warnings)

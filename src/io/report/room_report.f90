@@ -5,10 +5,10 @@ module thud_room_report
    use thud_csv, only: get_table_csv
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_rating, only: class_limits, get_a_weighted_level, get_class, get_rounded, rating_names, rating_titles
+   use thud_rating, only: class_limits, get_class, get_rounded, rating_names, rating_titles
    use thud_report, only: line
-   use thud_room, only: few_modes, get_octave_levels, get_rated, get_ratings, judge_requirement, room_level_type
-   use thud_room_prediction, only: contribution_names
+   use thud_room, only: get_band_records, get_rating_index, room_level_type
+   use thud_room_uncertainty, only: contribution_names, judge_requirement
    use thud_text, only: fixed, join, join_quoted, newline, quoted, replaced, significant, to_text
    implicit none (type, external)
    private
@@ -16,11 +16,7 @@ module thud_room_report
    public :: get_room_files, get_room_summary, get_room_table, room_file_names
 
    !> Files of a prediction.
-   character(len=*), parameter :: room_file_names(*) = [character(len=16) :: 'room_levels.csv', 'room_octaves.csv', &
-      'room_history.csv']
-
-   !> Position of the rating of one-third octaves.
-   integer, parameter :: thirds = findloc(rating_names == 'thirds', .true., dim=1)
+   character(len=*), parameter :: room_file_names(*) = [character(len=16) :: 'room_levels.csv', 'room_octaves.csv']
 
    !> Width of a column of the table.
    integer, parameter :: column = 13
@@ -31,38 +27,38 @@ module thud_room_report
 
 contains
 
-   !> The files: levels and their factors in one-third-octave bands, octave levels, detector levels against time.
+   !> The files: levels and their factors in one-third-octave bands, and octave levels.
    subroutine get_room_files(prediction, files)
       type(room_level_type), intent(in) :: prediction
       !> The files: [size(room_file_names)].
       type(text_file_type), intent(out) :: files(:)
-      character(len=:), allocatable :: header, wall_titles
+      character(len=:), allocatable :: header
+      real(wp), allocatable :: columns(:)
       integer :: i
 
       files%name = room_file_names
-      wall_titles = ''
+      header = 'nominal_Hz'
+      columns = prediction%bands%nominal
+      associate (records => get_band_records(prediction))
+         do i = 1, size(records)
+            header = header//','//trim(records(i)%name)
+            if (records(i)%unit /= '') header = header//'_'//replaced(trim(records(i)%unit), '/', '_per_')
+            columns = [columns, records(i)%values]
+         end do
+      end associate
+      header = header//',direct_share'
       do i = 1, size(prediction%path_share, 2) - 1
-         wall_titles = wall_titles//',wall_'//to_text(i)//'_share'
+         header = header//',wall_'//to_text(i)//'_share'
       end do
-      files(1)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,' &
-         //'loss_factor,reverberation_time_s,floor_modes,room_modes,modal_level_dB,modal_spread_dB,' &
-         //'simply_supported_level_dB,clamped_level_dB,direct_share'//wall_titles, &
-         reshape([prediction%bands%nominal, prediction%level, prediction%time, prediction%spread, prediction%energy, &
-         prediction%radiation_factor, prediction%loss_factor, prediction%reverberation_time, prediction%floor_modes, &
-         prediction%room_modes, prediction%modal_level, prediction%modal_spread, prediction%edge_level, &
-         prediction%path_share], [size(prediction%level), 14 + size(prediction%path_share, 2)]))
-      files(2)%content = get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,modal_level_dB', &
-         reshape([prediction%octaves%nominal, prediction%octave_level, prediction%octave_time, &
-         get_octave_levels(prediction, prediction%modal_level)], [size(prediction%octave_level), 4]))
-      header = 'time_s'
-      do i = 1, size(prediction%bands)
-         header = header//',level_'//trim(get_band_name(prediction%bands(i)))//'_Hz_dB'
-      end do
-      files(3)%content = get_table_csv(header, reshape([prediction%history_time, prediction%history], &
-         [size(prediction%history_time), size(prediction%bands) + 1]))
+      columns = [columns, prediction%path_share]
+      associate (n_band => size(prediction%bands))
+         files(1)%content = get_table_csv(header, reshape(columns, [n_band, size(columns)/n_band]))
+      end associate
+      files(2)%content = get_table_csv('nominal_Hz,level_dB', &
+         reshape([prediction%octaves%nominal, prediction%octave_level], [size(prediction%octave_level), 2]))
    end subroutine get_room_files
 
-   !> Table of the levels for the screen; bands with few modes are marked.
+   !> Table of the levels for the screen.
    subroutine get_room_table(case, prediction, contact_time, coupled, text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
@@ -72,124 +68,88 @@ contains
       logical, intent(in) :: coupled
       !> The table.
       character(len=:), allocatable, intent(out) :: text
-      character(len=1) :: mark
-      logical :: has_edges
       real(wp) :: resistance
       integer :: i
 
-      has_edges = case%floors(get_floor_number(case))%model%get_support() /= ''
-      text = '  '//padded('room below')//padded('statistical')//padded('modal')//padded('simple edges')//padded('clamped') &
-         //'spread'//newline
+      text = get_headline(case, prediction)//'  '//padded('room below')//padded('level')//'standard uncertainty'//newline
       do i = 1, size(prediction%bands)
-         mark = merge('*', ' ', min(prediction%floor_modes(i), prediction%room_modes(i)) < few_modes)
          text = text//'  '//padded(get_band_name(prediction%bands(i))//' Hz') &
-            //padded(fixed(prediction%level(i), 1)//' dB '//mark)
-         if (i <= prediction%n_modal) then
-            text = text//padded(fixed(prediction%modal_level(i), 1)//' dB')
-         else
-            text = text//padded('-')
-         end if
-         if (i <= prediction%n_modal .and. has_edges) then
-            text = text//padded(fixed(prediction%edge_level(i, 1), 1)//' dB')//padded(fixed(prediction%edge_level(i, 2), 1) &
-               //' dB')
-         else
-            text = text//padded('-')//padded('-')
-         end if
-         text = text//fixed(prediction%spread(i), 1)//' dB'//newline
+            //padded(fixed(prediction%level(i), 1)//' dB')//fixed(prediction%uncertainty(i), 1)//' dB'//newline
       end do
-      text = text//newline//get_octave_line('Octaves, statistical:', prediction, prediction%octave_level)
-      if (prediction%n_modal > 0) text = text//get_octave_line('Octaves, modal:', prediction, &
-         get_octave_levels(prediction, prediction%modal_level))
-      call add_ratings(case, prediction, coupled, text)
+      text = text//newline//'  Octaves:'
+      do i = 1, size(prediction%octaves)
+         text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(prediction%octave_level(i), 1)//' dB'
+      end do
+      text = text//newline
+      do i = 1, size(rating_names)
+         text = text//'  '//get_title(case, i)//to_text(get_rounded(prediction%rating(i)))//' dB'//newline
+         if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, prediction%rating(i))
+      end do
       resistance = 1/maxval(prediction%conductance)
+      text = text//'  Energy means over positions, by the '//trim(merge('contact force', 'blocked force', coupled)) &
+         //'; '//get_method(prediction)//'.'//newline
+      if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
+         //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
+         //' %, from the walls the rest.'//newline
       text = text//'  Room of '//fixed(prediction%volume, 1)//' m3, reverberation time ' &
          //fixed(minval(prediction%reverberation_time), 2)
       if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
-      text = text//' s.'//newline
-      text = text//'  Resistance of the floor '//significant(resistance/1.0e3_wp, 3)//' kN s/m.'//newline
-      if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//'  *: fewer than ' &
-         //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'//newline
-      text = text//'  Spread: expected standard deviation of one position of source and microphone.'//newline
+      text = text//' s. Resistance of the floor '//significant(resistance/1.0e3_wp, 3)//' kN s/m.'//newline
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 
-   !> Levels of octaves as a line.
-   function get_octave_line(title, prediction, level) result(text)
-      character(len=*), intent(in) :: title
-      type(room_level_type), intent(in) :: prediction
-      !> The levels, dB: [n_octave].
-      real(wp), intent(in) :: level(:)
-      character(len=:), allocatable :: text
-      character(len=21) :: cell
-      integer :: i
-
-      cell = title
-      text = '  '//cell
-      do i = 1, size(level)
-         text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(level(i), 1)//' dB'
-      end do
-      text = text//newline
-   end function get_octave_line
-
-   !> Adds the ratings, and whether they meet a requirement.
-   subroutine add_ratings(case, prediction, coupled, text)
+   !> The rating that is asked for, whether it meets the requirement, and what its uncertainty follows from.
+   function get_headline(case, prediction) result(text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
-      !> The prediction uses the force on the mobile floor.
-      logical, intent(in) :: coupled
-      !> The table so far.
-      character(len=:), allocatable, intent(inout) :: text
-      character(len=1) :: separator
-      integer :: i
+      character(len=:), allocatable :: text
+      integer :: i, shown
 
-      text = text//'  Means of both predictions, with their intervals:'//newline
-      do i = 1, size(rating_names)
-         associate (rated => get_rated(prediction, rating_names(i)))
-            text = text//'  '//rating_titles(i)//to_text(get_rounded(rated(1)))//' dB (' &
-               //get_range_text(rated(2:))//')'//newline
-            if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, rated(1))
-         end associate
-      end do
-      text = text//'  Of one-third octaves: statistical ' &
-         //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%level), 1)//' dB, '
-      if (prediction%n_modal > 0) then
-         text = text//'modal ' &
-            //fixed(get_a_weighted_level(prediction%bands(1)%set, prediction%modal_level), 1)//' dB'//newline
-      else
-         text = text//'no modal prediction: the interval contains neither edges nor model'//newline
-      end if
-      text = text//'  Contributions, one-third octaves:'
-      separator = ' '
+      shown = get_rating_index(case%room)
+      text = '  '//trim(get_title(case, shown))//': '//to_text(get_rounded(prediction%rating(shown))) &
+         //' dB, standard uncertainty '//fixed(prediction%rating_uncertainty, 1)//' dB'
+      if (case%room%required > 0.0_wp) text = text//'; meets '//get_limit(case%room%required)//' dB with ' &
+         //fixed(100*prediction%probability, 0)//' %: '//trim(judge_requirement(prediction))
+      if (case%room%required > 0.0_wp .and. .not. prediction%source_conforms) text = text//', the source does not conform'
+      text = text//newline//'  Standard uncertainties:'
       do i = 1, size(contribution_names)
-         if (prediction%n_modal == 0 .and. any(contribution_names(i) == ['edges', 'model'])) cycle
-         ! As far as the decimals show it.
-         if (all(abs(prediction%contribution(:, i, thirds)) < 0.05_wp)) cycle
-         text = text//trim(separator)//' '//trim(replaced(trim(contribution_names(i)), '_', ' '))//' ' &
-            //fixed(prediction%contribution(1, i, thirds), 1)//' to '//fixed(prediction%contribution(2, i, thirds), 1)
-         separator = ','
+         if (prediction%contribution(i) < 0.05_wp) cycle
+         text = text//' '//replaced(trim(contribution_names(i)), '_', ' ')//' ' &
+            //fixed(prediction%contribution(i), 1)//' dB,'
       end do
-      text = text//' dB'//newline
-      if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
-         //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
-         //' %, from the walls the rest.'//newline
-      associate (room => case%room, required => get_rated(prediction, case%room%required_rating))
-         if (room%required > 0.0_wp) text = text//'  Required of '//trim(room%required_rating)//': at most ' &
-            //to_text(room%required)//' dB: '//trim(judge_requirement(room, prediction))//' (' &
-            //get_range_text(required(2:))//').'//newline
-      end associate
-      text = text//'  Statistical means over positions, by the ' &
-         //trim(merge('contact force', 'blocked force', coupled))//'.'//newline
-   end subroutine add_ratings
+      text = text(:len(text) - 1)//'. Rigid boxes, no measurement behind it.'//newline//newline
+   end function get_headline
 
-   !> Ends of an interval of ratings, rounded as ratings are.
-   function get_range_text(ends) result(text)
-      !> The ends, dB: [2].
-      real(wp), intent(in) :: ends(2)
+   !> A limit, without a decimal if it is whole.
+   function get_limit(required) result(text)
+      !> The limit, dB.
+      real(wp), intent(in) :: required
       character(len=:), allocatable :: text
 
-      text = to_text(get_rounded(ends(1)))//' to '//to_text(get_rounded(ends(2)))
-   end function get_range_text
+      text = fixed(required, merge(0, 1, abs(required - nint(required)) < tiny(required)))
+   end function get_limit
+
+   !> Title of a rating; the standards are for the ball.
+   pure function get_title(case, rating) result(title)
+      type(case_type), intent(in) :: case
+      !> Index of the rating.
+      integer, intent(in) :: rating
+      character(len=len(rating_titles)) :: title
+
+      title = rating_titles(rating)
+      if (case%source /= 'rubber_ball') title = 'A-weighted level ('//trim(rating_names(rating))//')'
+   end function get_title
+
+   !> By what the levels are computed.
+   function get_method(prediction) result(text)
+      type(room_level_type), intent(in) :: prediction
+      character(len=:), allocatable :: text
+
+      text = 'statistical in all bands'
+      if (prediction%n_modal > 0) text = 'by modes up to ' &
+         //trim(get_band_name(prediction%bands(prediction%n_modal)))//' Hz, statistical above'
+   end function get_method
 
    !> Whether the class of KS F 2863-2 is stated: that of a rubber ball that conforms.
    pure function has_class(case, prediction) result(yes)
@@ -227,27 +187,21 @@ contains
       type(room_level_type), intent(in) :: prediction
       !> The group.
       character(len=:), allocatable :: text
-      real(wp) :: rated(3)
+      integer :: i
 
       text = newline//'&room_summary'//newline//line('rating', join_quoted(rating_names), '') &
-         //line('meaning', join_quoted(rating_titles), '')//line('level', join(prediction%rating), 'dB, statistical') &
+         //line('meaning', join_quoted([(get_title(case, i), i=1, size(rating_names))]), '') &
+         //line('level', join(prediction%rating), 'dB') &
+         //line('uncertainty', to_text(prediction%rating_uncertainty), 'dB, standard') &
          //line('rounded', join(real(get_rounded(prediction%rating), wp)), 'dB')
-      rated = get_rated(prediction, rating_names(1))
       if (has_class(case, prediction)) text = text &
-         //line('class', to_text(get_class(rated(1))), 'of octaves, KS F 2863-2; 0: none')
-      text = text//line('rated', join(prediction%rated), 'dB, means of both predictions') &
-         //line('rated_lower', join(prediction%interval(1, :)), 'dB') &
-         //line('rated_upper', join(prediction%interval(2, :)), 'dB')
-      if (prediction%n_modal > 0) text = text//line('modal', join(get_ratings(prediction, prediction%modal_level)), &
-         'dB, by the modes')
+         //line('class', to_text(get_class(prediction%rating(1))), 'of octaves, KS F 2863-2; 0: none')
       text = text//line('contribution', join_quoted(contribution_names), '') &
-         //line('lower', join(prediction%contribution(1, :, thirds)), 'dB, of one-third octaves') &
-         //line('upper', join(prediction%contribution(2, :, thirds)), 'dB, of one-third octaves')
-      rated = get_rated(prediction, case%room%required_rating)
+         //line('contributed', join(prediction%contribution), 'dB')
       if (case%room%required > 0.0_wp) text = text//line('required', to_text(case%room%required), 'dB') &
-         //line('required_rating', quoted(case%room%required_rating), '') &
-         //line('required_interval', join(rated(2:)), 'dB') &
-         //line('verdict', quoted(judge_requirement(case%room, prediction)), '')
+         //line('required_rating', quoted(case%room%rating), '') &
+         //line('probability', to_text(prediction%probability), 'that it is met') &
+         //line('verdict', quoted(trim(judge_requirement(prediction))), '')
       text = text//'/'//newline
    end function get_room_summary
 

@@ -231,7 +231,7 @@ function floorInputs(handlers) {
   const options = [["", "None of the library"], ...kinds.map((kind) => [kind, about.constructions.filter((entry) => entry.kind === kind).map(({ name }) => [name, name])])];
   const sources = construction?.sources ?? {};
   const rooms = groupsOf("room");
-  const isRequirement = ({ name }) => name.startsWith("required");
+  const isRequirement = ({ name }) => ["required", "rating"].includes(name);
   const withFields = (group, isOwn) => ({ ...group, fields: group.fields.filter(isOwn) });
   const balls = about.presets.filter((preset) => preset.door === "ball");
   const source = balls.find((preset) => isSame(sorted(preset.values), sorted(caseValues("ball"))));

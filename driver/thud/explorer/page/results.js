@@ -85,7 +85,7 @@ function showForces(variants, { thirds, differences }) {
 
 const minusLevel = (level, reference) => (level === null || reference === null ? null : level - reference);
 
-/** Show the levels in the room below, what makes their range, and the ratings. */
+/** Show the levels in the room below, what makes them uncertain, and the ratings. */
 function showRooms(variants, { differences }) {
   const rooms = variants.filter((variant) => variant.answer.room);
   const hasRoom = Boolean(variants[0].answer.room);
@@ -93,26 +93,23 @@ function showRooms(variants, { differences }) {
   if (!hasRoom) return;
   const [first] = rooms;
   const isDifference = differences && rooms.length > 1;
-  const difference = (levels, reference) => (isDifference ? levels.map((level, k) => minusLevel(level, reference[k] ?? null)) : levels);
-  byId("room_key").hidden = isDifference || !first.answer.room.modal_level.length;
+  byId("room_key").hidden = isDifference;
   plot(byId("room"), {
     title: "Level in the room below",
-    curves: (isDifference ? rooms.slice(1) : rooms).flatMap(({ label, style, answer: { room } }) => {
-      const { room: reference } = first.answer;
-      const modal = { name: `${label}, by modes`, style, x: room.modal_level.map((_, k) => k), y: difference(room.modal_level, reference.modal_level), thin: true };
-      return [{ name: `${label}, statistical`, style, x: room.level.map((_, k) => k), y: difference(room.level, reference.level), marks: true }, ...(room.modal_level.length && !isDifference ? [modal] : [])];
-    }),
+    curves: (isDifference ? rooms.slice(1) : rooms).map(({ label, style, answer: { room } }) => ({
+      name: label, style, x: room.level.map((_, k) => k), marks: true,
+      y: isDifference ? room.level.map((level, k) => minusLevel(level, first.answer.room.level[k])) : room.level,
+      ends: isDifference ? undefined : room.level.map((level, k) => [level - room.uncertainty[k], level + room.uncertainty[k]]),
+    })),
     x: { title: "One-third-octave band", unit: "Hz", bands: first.answer.room.frequency.map(String) },
     y: { title: isDifference ? `Difference to ${first.label}` : "Maximum Fast level", unit: "dB", reference: isDifference ? "" : " re 20 µPa", zero: isDifference },
   });
   plot(byId("contributions"), {
-    title: "Contributions to the range of the level", x: { title: "Change of the level", unit: "dB" },
-    rows: first.answer.room.contributions.filter((row) => sizeOf(row) >= 0.05).sort((one, other) => sizeOf(other) - sizeOf(one)),
+    title: "Contributions to the standard uncertainty", x: { title: "Standard uncertainty", unit: "dB" },
+    rows: first.answer.room.contributions.filter(([, , value]) => value >= 0.05),
   });
   byId("ratings").replaceChildren(...rooms.map((variant) => element("li", {}, ...nameOf(variants, variant), ...withSymbols(variant.answer.room.ratings))));
 }
-
-const sizeOf = ([, low, high]) => Math.max(Math.abs(low), Math.abs(high));
 
 /** Return the swatch and the name of a variant; empty if there is only one variant. */
 function nameOf(variants, variant) {

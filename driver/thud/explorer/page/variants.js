@@ -142,7 +142,7 @@ export function showVariants(variants, { remove, rename }) {
       element("td", {}, i ? button("×", () => remove(variant), { class: "remove", "aria-label": `Remove ${variant.label}` }) : ""));
   });
   byId("variants").replaceChildren(
-    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), ...(hasVerdict ? [element("th", { scope: "col" }, hasLevel ? "Source" : "Verdict")] : []), ...(hasLevel ? [element("th", { scope: "col" }, "Level (range)")] : []),
+    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), ...(hasVerdict ? [element("th", { scope: "col" }, hasLevel ? "Source" : "Verdict")] : []), ...(hasLevel ? [element("th", { scope: "col" }, "Level")] : []),
       ...columns.map(([title, , unit]) => element("th", { scope: "col" }, title, element("small", {}, ` ${unit}`))), element("td", {}))),
     element("tbody", {}, ...rows));
   byId("differences").disabled = variants.length < 2;
