@@ -184,7 +184,8 @@ export async function solve() {
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
-    if (job === thisJob && !thisJob.repeat) {
+    // What is wrong with a text that is typed stays until it is a value.
+    if (job === thisJob && !thisJob.repeat && !isTyping()) {
       showError(error);
       hasError = true;
       const isMissing = door === "recording" && !state.recording[error.field] && about.recording.some((field) => field.name === error.field);
