@@ -559,26 +559,22 @@ contains
       !> Positions of the microphones, m: [3, n_microphone].
       real(wp), intent(in) :: microphone(:, :)
       type(answers_type), intent(out) :: answers
-      real(wp), allocatable :: shape(:, :), height(:, :), part(:, :, :)
-      complex(wp) :: amplitude(size(frequency))
+      real(wp), allocatable :: shape(:, :), height(:)
+      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(microphone, 2))
       real(wp) :: natural, decay
-      integer :: i, j, k, n, n_height, n_line
+      integer :: i, j, k, n
 
       n = size(microphone, 2)
-      n_line = size(frequency)
-      allocate (answers%pressure(2*n, size(lx), n_line))
-      allocate (answers%input(size(lx), n_line), answers%loss(size(lx), n_line), source=0.0_wp)
+      allocate (answers%pressure(2*n, size(lx), size(frequency)))
+      allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
       shape = get_cosines(lx, microphone(1, :)/box%sides(1))*get_cosines(ly, microphone(2, :)/box%sides(2))
-      ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
-      n_height = int(2*highest*box%sides(3)/box%air%sound_speed)
-      height = get_cosines([(k, k=0, n_height)], microphone(3, :)/box%sides(3)) &
-         *spread([((-1)**k, k=0, n_height)], 2, n)
-      allocate (part(0:n_height, n_line, 2))
+      height = microphone(3, :)/box%sides(3)
       do i = 1, size(lx)
          k = 0
+         pressure = 0.0_wp
          do
             natural = get_mode_frequency(box, lx(i), ly(i), k)
-            if (natural > highest .or. k > n_height) exit
+            if (natural > highest) exit
             answers%n_mode = answers%n_mode + 1
             decay = 6*log(10.0_wp)/get_reverberation_time(box, natural)
             associate (w => 2*pi*frequency, stiffness => get_modal_stiffness(box, lx(i), ly(i), k))
@@ -586,14 +582,14 @@ contains
                answers%input(i, :) = answers%input(i, :) + amplitude%re
                answers%loss(i, :) = answers%loss(i, :) + (amplitude%re**2 + amplitude%im**2)*decay/stiffness
             end associate
-            part(k, :, 1) = amplitude%re
-            part(k, :, 2) = amplitude%im
+            ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
+            do j = 1, n
+               pressure(:, j) = pressure(:, j) + (-1)**k*cos(k*pi*height(j))*shape(i, j)*amplitude
+            end do
             k = k + 1
          end do
-         do j = 1, 2
-            answers%pressure((j - 1)*n + 1:j*n, i, :) = spread(shape(i, :), 2, n_line) &
-               *get_transposed_product(height(:k, :), part(:k - 1, :, j))
-         end do
+         answers%pressure(:n, i, :) = transpose(pressure%re)
+         answers%pressure(n + 1:, i, :) = transpose(pressure%im)
       end do
    end subroutine get_answers
 
