@@ -18,8 +18,8 @@ module thud
    use thud_kinds, only: wp
    use thud_measured_modes, only: measured_modes_type
    use thud_modal_ball, only: modal_ball_type
+   use thud_refined_drop, only: solve_drop
    use thud_registry, only: model_names
-   use thud_resolved_drop, only: solve_drop
    use thud_run, only: load_case
    use thud_sampling, only: sampling_type
    use thud_source_limits, only: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, &

@@ -13,7 +13,6 @@ module thud_case_answers
    use thud_request, only: request_type
    use thud_result_bundle, only: add_compression, add_results
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
-   use thud_sampling, only: get_sample_count
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
    use thud_text, only: newline, split, to_text
    use thud_text_buffer, only: text_buffer_type
@@ -138,7 +137,7 @@ contains
 
    !> Computes samples of a case that differ in the `key_count` comma-separated `keys`, with `threads` threads. `values`
    !> holds the values of the keys, for a choice its index from 1: [n_key, n_sample]. Numbers `levels` and `forces` other
-   !> than 0 ask for those. Without `values` the answer is only the cost of a sample, s, and the length of its forces.
+   !> than 0 ask for those.
    subroutine answer_samples(case, request, bundle, error)
       type(case_type), intent(in), target :: case
       type(request_type), intent(in) :: request
@@ -155,15 +154,11 @@ contains
       if (allocated(error)) return
       call acquire_sweep(sweep)
       call new_sweep(case, columns, request%get_number('levels') > 0.0_wp, sweep)
-      call bundle%add_number('cost', sweep%cost)
-      call bundle%add_number('force_length', real(get_sample_count(case%sampling), wp))
-      if (request%has('values')) then
-         allocate (values, source=request%get_array('values'))
-         call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
-            nint(request%get_number('threads')), request%get_number('forces') > 0.0_wp, sweep, error)
-         if (allocated(error)) return
-         call add_samples(bundle, sweep)
-      end if
+      allocate (values, source=request%get_array('values'))
+      call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
+         nint(request%get_number('threads')), request%get_number('forces') > 0.0_wp, sweep, error)
+      if (allocated(error)) return
+      call add_samples(bundle, sweep)
       call release_sweep(sweep)
    end subroutine answer_samples
 

@@ -4,7 +4,7 @@ module thud_compute
    use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    !$ use omp_lib, only: omp_get_max_threads
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_case, only: case_type, check_case, get_floor_number, get_model_number, get_modes_ball
+   use thud_case, only: case_type, get_floor_number, get_model_number, get_modes_ball
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
    use thud_floor_model, only: floor_state_type
@@ -17,7 +17,7 @@ module thud_compute
    use thud_plate, only: plate_type
    use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid
-   use thud_resolved_drop, only: get_drop_cost, solve_drop
+   use thud_refined_drop, only: solve_drop
    use thud_room, only: room_level_type
    use thud_room_prediction, only: predict_room
    use thud_sampling, only: get_sample_count
@@ -29,13 +29,10 @@ module thud_compute
    private
 
    public :: assess_floor, assessment_type, compress_case, compute, compute_impact, drop_on_floor, get_assessed_force
-   public :: get_cost, impact_type, is_conforming, prepare_floor, results_type, scope_type
+   public :: impact_type, is_conforming, prepare_floor, results_type, scope_type
 
    !> Memory per sample of a record, including transforms and text, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
-
-   !> Computing time of a drop from which on a second thread is worth its start, s.
-   real(wp), parameter :: min_thread_cost = 0.01_wp
 
    !> Which of the results that a case asks for are computed.
    type :: scope_type
@@ -128,7 +125,7 @@ contains
       if (scope%levels .and. .not. allocated(error)) call assess(case, impact%history, impact%assessment, error)
    end subroutine compute_impact
 
-   !> The drops of a case on a rigid floor and on its own, at the same time if two threads are allowed and worthwhile.
+   !> The drops of a case on a rigid floor and on its own, at the same time if two threads are allowed.
    subroutine compute_drops(case, scope, state, impact, on_floor, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
@@ -143,11 +140,7 @@ contains
       integer :: i, n_thread
 
       n_thread = 1
-      associate (model => case%models(get_model_number(case))%model)
-         !$ if (case%has_floor .and. .not. is_forked()) n_thread = min(2, omp_get_max_threads())
-         if (n_thread > 1) n_thread = merge(2, 1, &
-            get_drop_cost(model, case%ball, case%drop, case%sampling) > min_thread_cost)
-      end associate
+      !$ if (case%has_floor .and. .not. is_forked()) n_thread = min(2, omp_get_max_threads())
       if (n_thread == 1) then
          call compute_impact(case, scope, impact, error)
          if (.not. allocated(error)) call prepare_floor(case, state, error)
@@ -217,26 +210,6 @@ contains
       ! A model that ignores the receiver has computed the drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
-
-   !> Approximate computing time of a case's drop, with its verification, and levels on one core.
-   function get_cost(case) result(cost)
-      type(case_type), intent(in) :: case
-      !> The time, s; for an invalid case the time of its check.
-      real(wp) :: cost
-      type(error_type), allocatable :: error
-      type(floor_state_type) :: state
-
-      cost = 1.0e-3_wp
-      call check_case(case, error)
-      if (allocated(error)) return
-      associate (model => case%models(get_model_number(case))%model)
-         cost = cost + get_drop_cost(model, case%ball, case%drop, case%sampling)
-         if (.not. case%has_floor) return
-         call prepare_floor(case, state, error)
-         if (allocated(error) .or. is_rigid(state%receiver)) return
-         cost = cost + 1.0e-3_wp + get_drop_cost(model, case%ball, case%drop, case%sampling, state%receiver)
-      end associate
-   end function get_cost
 
    !> Quasi-static compression of a case's ball, computed by its model.
    subroutine compress_case(case, compression, error)

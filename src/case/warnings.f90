@@ -10,8 +10,8 @@ module thud_warnings
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_numerical_error, only: finer_quantities, get_resolution_keys
    use thud_plate, only: plate_type
+   use thud_refined_drop, only: finer_quantities, get_resolution_keys
    use thud_registry, only: floor_names, model_names
    use thud_room, only: get_completed_room, room_level_type, room_type
    use thud_sampling, only: get_rate_limit

@@ -11,7 +11,8 @@ module thud_force_history
    private
 
    public :: add_model_quantity, add_to_means, check_samples, clear_flight, continue_to_zero, force_count, force_history_type
-   public :: force_names, holds_impulse, max_residual, new_force_history, numerical_error_type
+   public :: force_names, get_model_quantity, has_quantity, holds_impulse, max_residual, new_force_history
+   public :: numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
    !> is below 1e-9 at the default step.
@@ -98,6 +99,8 @@ module thud_force_history
       real(wp) :: impulse_residual = 0.0_wp
       !> |energy at release + loss - energy at first touch|, divided by the energy at first touch.
       real(wp) :: energy_residual = 0.0_wp
+      !> Estimated error divided by the difference from a coarser resolution, if the model converges more slowly than others.
+      real(wp) :: error_ratio = 0.0_wp
       !> Errors due to the resolution.
       type(numerical_error_type) :: numerical_error
    end type force_history_type
@@ -181,6 +184,24 @@ contains
       history%model_quantity_unit = [character(len=len(history%model_quantity_unit)) :: history%model_quantity_unit, unit]
       history%model_quantity = [history%model_quantity, value]
    end subroutine add_model_quantity
+
+   !> Whether the model has stated a quantity.
+   pure function has_quantity(history, name) result(yes)
+      type(force_history_type), intent(in) :: history
+      character(len=*), intent(in) :: name
+      logical :: yes
+
+      yes = any(history%model_quantity_name == name)
+   end function has_quantity
+
+   !> A quantity that the model has stated.
+   pure function get_model_quantity(history, name) result(value)
+      type(force_history_type), intent(in) :: history
+      character(len=*), intent(in) :: name
+      real(wp) :: value
+
+      value = history%model_quantity(findloc(history%model_quantity_name == name, .true., dim=1))
+   end function get_model_quantity
 
    !> A history of zero force, all arrays allocated and zero.
    pure function new_force_history(sample_rate, n_sample, component_name, model_history_name) result(history)

@@ -9,7 +9,7 @@ module thud_sampling
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields, get_step_count
+   public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields
    public :: min_contact_samples, sampling_type
 
    !> Maximum number of samples of a record; more would fill the memory, and no drop needs them.
@@ -114,18 +114,5 @@ contains
 
       n_sample = aint(sampling%duration*sampling%sample_rate*(1 + rounding))
    end function count_samples
-
-   !> Number of integration steps of a record, or of its beginning, for cost estimates; the sampling may be unchecked.
-   pure function get_step_count(sampling, time) result(n_step)
-      type(sampling_type), intent(in) :: sampling
-      !> Length of the beginning, s (default: the whole record).
-      real(wp), intent(in), optional :: time
-      !> The number, not rounded; it may be more than an integer holds.
-      real(wp) :: n_step
-
-      n_step = sampling%duration
-      if (present(time)) n_step = min(n_step, time)
-      n_step = n_step*sampling%sample_rate*real(sampling%substeps, wp)
-   end function get_step_count
 
 end module thud_sampling

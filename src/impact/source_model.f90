@@ -11,28 +11,27 @@ module thud_source_model
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_receiver, only: get_pole_count, receiver_type
-   use thud_sampling, only: get_step_count, sampling_type
+   use thud_receiver, only: receiver_type
+   use thud_sampling, only: sampling_type
    use thud_validity_limit, only: get_gravity_limit, get_size_limit, validity_limit_type
    implicit none (type, external)
    private
 
-   public :: convergence_type, source_model_type
+   public :: refine_sampling, resolution_type, source_model_type
 
-   !> Typical simulated duration of a drop on a rigid floor, s, for estimates of the computing time.
-   real(wp), parameter, public :: typical_contact = 0.025_wp
-
-   !> How the error of a result follows from its difference from a coarser level of resolution. By default the ratio is
-   !> somewhat more than the 1/3 of an error that is proportional to the square of the step, as that of a force that begins
-   !> with a jump.
-   type :: convergence_type
+   !> A level of resolution, and how the error of a drop at this level follows from its difference from a coarser one. By
+   !> default the ratio is somewhat more than the 1/3 of an error that is proportional to the square of the step, as that of
+   !> a force that begins with a jump.
+   type :: resolution_type
+      !> Whether the level may be computed to lower the error, or else only to show it.
+      logical :: lowers_error = .true.
       !> The coarser level.
       integer :: reference = 0
       !> Estimated error divided by the difference.
       real(wp) :: ratio = 0.4_wp
       !> Minimum errors of the octave levels, which differences do not show, dB: [octave_count].
       real(wp) :: min_error(octave_count) = 0.0_wp
-   end type convergence_type
+   end type resolution_type
 
    !> A source model with its options as components.
    type, abstract :: source_model_type
@@ -40,18 +39,12 @@ module thud_source_model
       procedure(get_fields), deferred :: get_fields
       procedure(solve), deferred :: solve
       procedure :: check
+      procedure :: refine
+      procedure :: compress
       procedure :: get_snapshot_shape
-      procedure :: get_cost
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: get_loss_factors
-      procedure :: compress
-      procedure :: share_setup
-      procedure :: set_level
-      procedure :: get_highest_level
-      procedure :: chooses_resolution
-      procedure :: get_expected_level
-      procedure :: get_convergence
    end type source_model_type
 
    abstract interface
@@ -107,31 +100,6 @@ contains
       extents = 0
    end function get_snapshot_shape
 
-   !> Approximate computing time of a drop at one resolution, that of the options, on one core, s; by default that of a model
-   !> with one or two degrees of freedom.
-   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
-      !> The options, checked.
-      class(source_model_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      !> The structure under the source (default: a rigid floor).
-      type(receiver_type), intent(in), optional :: receiver
-      !> Expected contact time, s (default: `typical_contact`).
-      real(wp), intent(in), optional :: contact_time
-      !> The time, s.
-      real(wp) :: cost
-      real(wp) :: time
-
-      time = typical_contact
-      if (present(contact_time)) time = contact_time
-      cost = 1.5e-4_wp
-      if (present(receiver)) then
-         cost = cost + get_step_count(sampling)*(9.3e-7_wp + 2.9e-9_wp*get_pole_count(receiver))
-      else
-         cost = cost + get_step_count(sampling, time)*1.5e-7_wp
-      end if
-   end function get_cost
-
    !> Modulus of elasticity of the standard ball in this model, Pa; by default 0, for models that do not use the wall.
    function get_standard_modulus(self) result(modulus)
       class(source_model_type), intent(in) :: self
@@ -171,72 +139,37 @@ contains
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
 
-   !> Computes what the levels of resolution share; by default nothing.
-   subroutine share_setup(self, ball, sampling)
+   !> The model and the sampling at a level of resolution; by default `refine_sampling`.
+   subroutine refine(self, ball, level, coarse, sampling, refined, resolution)
+      !> The options of the input, and what the levels share, which level 0 computes.
       class(source_model_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
-      !> Sampling of the input.
-      type(sampling_type), intent(in) :: sampling
-
-   end subroutine share_setup
-
-   !> Sets the resolution. By default level 0 has half the sampling rate of the input, for the error of samples and steps,
-   !> level 1 that of the input, and level 2 twice that.
-   subroutine set_level(self, ball, level, sampling, coarse)
-      class(source_model_type), intent(inout) :: self
-      type(ball_type), intent(in) :: ball
-      !> The level, from 0 up.
+      !> The level: 0 is coarse, 1 the resolution of the input, higher ones are finer.
       integer, intent(in) :: level
-      !> Sampling of the input, to be changed as the level needs it.
-      type(sampling_type), intent(inout) :: sampling
       !> The drop at the next coarser level; without samples if there is none.
       type(force_history_type), intent(in) :: coarse
+      !> Sampling of the input, to be changed as the level needs it.
+      type(sampling_type), intent(inout) :: sampling
+      !> The model at this level.
+      class(source_model_type), allocatable, intent(out) :: refined
+      type(resolution_type), intent(out) :: resolution
+
+      call refine_sampling(level, sampling, resolution)
+      allocate (refined, source=self)
+   end subroutine refine
+
+   !> Sampling of models whose resolution is that of the input: level 0 has half its rate, for the error of samples and
+   !> steps, and level 2 twice its rate.
+   subroutine refine_sampling(level, sampling, resolution)
+      !> The level, from 0 to 2.
+      integer, intent(in) :: level
+      type(sampling_type), intent(inout) :: sampling
+      type(resolution_type), intent(out) :: resolution
 
       sampling%sample_rate = sampling%sample_rate*2.0_wp**(level - 1)
-   end subroutine set_level
-
-   !> Highest level of resolution; by default 1: the resolution is that of the input.
-   function get_highest_level(self, ball, sampling) result(level)
-      class(source_model_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      integer :: level
-
-      level = 1
-   end function get_highest_level
-
-   !> Whether the model chooses its resolution; by default it is that of the input.
-   function chooses_resolution(self) result(yes)
-      class(source_model_type), intent(in) :: self
-      logical :: yes
-
-      yes = .false.
-   end function chooses_resolution
-
-   !> Level at which the resolution is probably fine enough, for estimates of the computing time; by default 1.
-   function get_expected_level(self, ball, contact) result(level)
-      class(source_model_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      !> Expected contact time, deflection and contact radius, for models that use the wall.
-      type(force_history_type), intent(in) :: contact
-      integer :: level
-
-      level = 1
-   end function get_expected_level
-
-   !> Convergence of a result; by default that of `convergence_type`, with the next coarser level.
-   function get_convergence(self, ball, level, history) result(convergence)
-      !> The options at the level of the result.
-      class(source_model_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      !> Level of the result, from 1 up.
-      integer, intent(in) :: level
-      !> The result.
-      type(force_history_type), intent(in) :: history
-      type(convergence_type) :: convergence
-
-      convergence%reference = level - 1
-   end function get_convergence
+      resolution%lowers_error = level <= 1
+      resolution%reference = level - 1
+   end subroutine refine_sampling
 
    !> Force on each of two plates in a quasi-static compression; models without one return an error.
    subroutine compress(self, ball, deflection, force, error)

@@ -27,6 +27,9 @@ module thud_samples_run
    !> Files of results and of the full input.
    character(len=*), parameter :: result_file = 'samples.csv', input_file = 'samples.nml'
 
+   !> Number of samples in a chunk for each thread; progress is reported after each chunk.
+   integer, parameter :: chunk_size = 128
+
    !> Summary of many samples.
    type :: tally_type
       !> Numbers of samples, of computed samples, and of conforming samples.
@@ -108,7 +111,7 @@ contains
       integer :: n, i
 
       call new_sweep(case, table%columns, .true., sweep)
-      allocate (values(size(table%columns), get_chunk_size(sweep%cost, threads)))
+      allocate (values(size(table%columns), chunk_size*threads))
       call begin_file(results, result_file, error)
       call get_sample_header(table, sweep, text)
       call add_text(results, text, error)
@@ -135,16 +138,6 @@ contains
       if (.not. allocated(error) .and. tally%computed == 0) error = input_error(trim(table%path)//': none of ' &
          //to_text(tally%samples)//' samples has results, such as: '//trim(tally%failure))
    end subroutine write_samples
-
-   !> Number of samples in a chunk: about half a second of work for each thread.
-   pure function get_chunk_size(cost, threads) result(chunk_size)
-      !> Computing time of one sample, s.
-      real(wp), intent(in) :: cost
-      integer, intent(in) :: threads
-      integer :: chunk_size
-
-      chunk_size = threads*max(1, min(16384/threads, nint(0.5_wp/cost)))
-   end function get_chunk_size
 
    !> Adds samples to a tally.
    pure subroutine add(tally, sweep, force)

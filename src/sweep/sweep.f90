@@ -7,7 +7,7 @@ module thud_sweep
    use thud_batch_samples, only: fill_samples, suits_batch
    use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
    use thud_column, only: column_type
-   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, get_assessed_force, get_cost, impact_type, &
+   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, get_assessed_force, impact_type, &
       prepare_floor, scope_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
@@ -22,18 +22,14 @@ module thud_sweep
    use thud_quantities, only: get_quantities, sample_quantity_count
    use thud_registry, only: floor_names
    use thud_room, only: room_level_type
-   use thud_sampling, only: check_sampling, get_sample_count, get_step_count
+   use thud_sampling, only: check_sampling, get_sample_count
    use thud_shell_samples, only: sample_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
-   use thud_source_model, only: typical_contact
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
-
-   !> Approximate computing time of one step of a sample in a batch, s.
-   real(wp), parameter :: batch_cost = 1.5e-8_wp
 
    !> The reason why a sample has no results.
    type :: reason_type
@@ -47,8 +43,6 @@ module thud_sweep
       type(band_type), allocatable :: bands(:)
       !> Index of the first band that the case asks for.
       integer :: first_band = 1
-      !> Approximate computing time of one sample on one core, s.
-      real(wp) :: cost = 0.0_wp
       !> Levels and verdicts are wanted.
       logical :: levels = .true.
       !> Matrices of the levels, reused by later calls.
@@ -102,15 +96,9 @@ contains
       !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
       type(projections_type) :: wanted
-      type(case_type) :: sample
 
       call get_level_bands(case%bands, sweep%bands, sweep%first_band)
       sweep%levels = levels
-      sample = case
-      if (size(columns) > 0) sample%sampling%verify = .false.
-      sweep%cost = get_cost(sample)
-      if (size(columns) > 0 .and. suits_batch(case, columns)) sweep%cost = batch_cost*get_step_count(case%sampling, &
-         typical_contact)
       sweep%floor_column = get_floor_columns(case, sweep%bands(sweep%first_band:))
       wanted = new_projections(case%sampling%sample_rate, sweep%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted

@@ -443,6 +443,7 @@ def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
         return compute(*arguments, **options)
 
     monkeypatch.setattr(ensemble, "_compute", count)
+    monkeypatch.setattr(ensemble, "_FIRST_BLOCK", 50)
     for most, expected in ((16, [16, 16, 16, 2]), (50, [50]), (25, [25, 25])):
         sizes.clear()
         monkeypatch.setattr(ensemble, "_MAX_SAMPLES", most)
@@ -451,6 +452,7 @@ def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
         np.testing.assert_array_equal(parts.floor_force, whole.floor_force)
         assert sizes == expected
     # A call takes about a second: one set at least.
+    monkeypatch.setattr(ensemble, "_FIRST_BLOCK", 1)
     monkeypatch.setattr(ensemble, "_CALL_TIME", 0.0)
     sizes.clear()
     thud.solve_many({"height": [1.0, 1.1]}, model="hollow_sphere")

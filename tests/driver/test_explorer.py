@@ -235,21 +235,6 @@ def test_slow_case_reports_and_answers(client: TestClient) -> None:
     assert np.shape(answer["motion"]["outer"])[1:] == (33, 2)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        SHELL | {"sampling": {"substeps": 1000}},
-        {"model": {"name": "modal_ball"}, "sampling": {"substeps": 200}},
-        SHELL | {"floor": {"name": "plate"}, "sampling": {"substeps": 100}},
-        SHELL | {"floor": {"name": "plate"}, "plate": {"length": 40, "width": 40}},
-    ],
-    ids=["steps", "modal steps", "steps of a floor", "modes of a floor"],
-)
-@pytest.mark.slow
-def test_many_steps_and_modes_are_slow(client: TestClient, values: dict[str, Any]) -> None:
-    assert client.post("/solve", json=values).text.startswith('{"done": 0.0}\n')
-
-
 def test_too_many_samples_are_refused(client: TestClient) -> None:
     response = client.post("/solve", json=SHELL | {"sampling": {"sample_rate": 1e7}})
     assert response.status_code == 400

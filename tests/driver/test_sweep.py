@@ -23,7 +23,6 @@ from thud.base import tables, units
 from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, with_values
-from thud.impact.ensemble import get_cost
 from thud.impact.quantities import SCALAR_QUANTITIES
 from thud.studies import directory, fit, samples, sampling, sweep
 
@@ -367,17 +366,12 @@ def test_each_worker_computes_blocks_on_one_thread(monkeypatch: pytest.MonkeyPat
     assert asked == [1, 1, 1]
 
 
-def test_blocks_take_about_a_quarter_of_a_second() -> None:
-    def seconds(**fixed: object) -> float:
-        study = thud.read_study({**HEIGHTS, "fixed": fixed})
-        assert study.block_size >= 1
-        return study.block_size * get_cost(study.case, ["height"])
+def test_blocks_of_slow_models_are_small() -> None:
+    def size(**fixed: object) -> int:
+        return thud.read_study({**HEIGHTS, "fixed": fixed}).block_size
 
-    # Of elements a whole number of drops that take some tenths of a second each.
-    viscous = {"model": "finite_element", "viscosity": "kelvin_voigt"}
-    for fixed in ({}, {"model": "modal_ball"}, viscous):
-        assert seconds(**fixed) == pytest.approx(0.25, rel=0.35)
-    assert seconds(model="finite_element", polar_elements=256) > 0.25
+    assert size() > 100 * size(method="fft")
+    assert size(method="fft") == size(model="modal_ball") > size(model="finite_element") >= 1
 
 
 def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:

@@ -36,8 +36,8 @@ INSERTIONS = [
     "&model name = 'two_mass' /", "mass = 2", "&" * 50, "&x" * 40, "&ball mass = 2 /", ";", "\\",
     "\x1b", "\x7f", "\u2028", "\u00a0",
 ]  # fmt: skip
-# Time that an accepted case may take on average, s, and that of reading and writing one.
-MEAN_TIME, FILE_TIME = 0.006, 0.01
+# Fractions of the cases that are computed, by the time of their models.
+FRACTIONS, SIMPLE = {"finite_element": 0.005, "modal_ball": 0.2}, 0.5
 # Fraction of the cases without a model, and of those over a radiator, that are computed.
 WITHOUT_MODEL, OVER_RADIATOR = 0.05, 0.2
 # Floors over which a room may be.
@@ -83,8 +83,7 @@ def _tried(path: Path, effective: bytes, chance: random.Random) -> tuple[str, st
             return "mixed", "the case of Python is another one"
     fraction = WITHOUT_MODEL
     if name:
-        cost = ask("samples", case=effective, keys="", key_count=0)["cost"]
-        fraction = MEAN_TIME / (cost + FILE_TIME)
+        fraction = FRACTIONS.get(name, SIMPLE)
     if any(b"'%s'" % floor.encode() in effective for floor in RADIATORS):
         fraction *= OVER_RADIATOR
     sampling = dict(re.findall(rb"^ +(sample_rate|duration) += (\S+)", effective, re.MULTILINE))

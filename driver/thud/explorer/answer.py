@@ -24,7 +24,6 @@ from thud.explorer.motion import motion_of
 from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
-from thud.impact.ensemble import get_cost
 from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
@@ -51,8 +50,6 @@ if TYPE_CHECKING:
 SNAPSHOT_INTERVAL = 1e-3
 # Maximum number of samples of a record.
 MAX_SAMPLES = 200_000
-# Maximum estimated duration of a computation while a slider moves, s.
-MAX_QUICK_TIME = 0.1
 # Peaks of the force on the floor and of the elastic force.
 PEAKS = "peak_force", "peak_elastic_force"
 # Maximum density of a wall, kg/m3: that of the densest metal, osmium.
@@ -94,11 +91,11 @@ def _require_density(case: Case) -> None:
 
 
 def answer_quickly(case: Case) -> Answer | None:
-    """Return the answer of a case, or None if it takes too long while a slider moves.
+    """Return the answer of a case, or None for elements: they take too long while a slider moves.
 
     Raise InputError if the case is invalid.
     """
-    return answer_case(case) if get_cost(case, ()) <= MAX_QUICK_TIME else None
+    return None if isinstance(case.model, FiniteElement) else answer_case(case)
 
 
 def answer_case(case: Case) -> Answer:

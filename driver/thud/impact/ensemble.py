@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -38,12 +40,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
-    from thud.base.bridge import Bundle
     from thud.base.key import Key
 
 MAX_THREADS = 1024
-# Approximate duration of one call of the library, s; interrupts are handled between calls.
+# Duration of one call of the library, s, and samples of a thread in the first call; interrupts are
+# handled between calls.
 _CALL_TIME = 1.0
+_FIRST_BLOCK = 4
 # Limits of one call, for its memory: number of samples, and number of values of their forces.
 _MAX_SAMPLES = 2**17
 _MAX_VALUES = 2**26
@@ -143,25 +146,25 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     for name in columns:
         if name in keywords or (name == "source" and source is not None):
             refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
-    cost = _cost(content, columns)
     n_thread = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", n_thread, 1, MAX_THREADS)
     n_thread = 1 if _FORKED else n_thread
-    length = int(cost["force_length"]) if forces else 0
+    length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
     max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
-    block_size = int(
-        np.clip(np.nan_to_num(_CALL_TIME * n_thread / cost["cost"]), 1, max(1, max_count))
-    )
-    blocks = []
+    size = min(_FIRST_BLOCK * n_thread, max(1, max_count))
+    blocks: list[dict[str, NDArray[Any]]] = []
     try:
         # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
-            for start in range(0, max(len(numbers), 1), block_size):
-                block = numbers[start : start + block_size]
+            while bar.n < len(numbers) or not blocks:
+                block = numbers[bar.n : bar.n + size]
+                began = time.perf_counter()
                 blocks.append(
                     _compute(content, columns, block, n_thread, levels=levels, forces=forces)
                 )
+                rate = len(block) / (time.perf_counter() - began)
+                size = int(np.clip(_CALL_TIME * rate, 1, max(1, max_count)))
                 bar.update(len(block))
         results = (
             blocks[0]
@@ -234,9 +237,10 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
     """Return the results of a block of samples; the first axis is the sample."""
+    names = list(keys)
     answer = ask(
-        "samples", case=content, **_key_arguments(keys), values=numbers.T, threads=threads,
-        levels=levels, forces=forces,
+        "samples", case=content, keys=",".join(names).encode("ascii", "replace"),
+        key_count=len(names), values=numbers.T, threads=threads, levels=levels, forces=forces,
     )  # fmt: skip
     status = answer["status"].astype(np.int32)
     reason = np.full(len(numbers), "", dtype=object)
@@ -252,22 +256,6 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
         "floor_value": answer["floor_value"].T,
         "force": answer["force"].T,
     }
-
-
-def _cost(content: bytes, keys: Iterable[str]) -> Bundle:
-    """Return the cost of a sample, s on one core, and the length of its forces."""
-    return ask("samples", case=content, **_key_arguments(keys))
-
-
-def _key_arguments(keys: Iterable[str]) -> dict[str, Any]:
-    """Return the names of keys as arguments of `ask`."""
-    names = list(keys)
-    return {"keys": ",".join(names).encode("ascii", "replace"), "key_count": len(names)}
-
-
-def get_cost(case: Case, keys: Iterable[str]) -> float:
-    """Return the estimated time per sample, s, on one core, if samples differ in these keys."""
-    return float(_cost(case_text(case), keys)["cost"])
 
 
 def _columns(

@@ -11,7 +11,7 @@ import numpy as np
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.keys import DENSITY
-from thud.impact.ensemble import get_cost, solve_many
+from thud.impact.ensemble import solve_many
 from thud.impact.quantities import sample_results
 from thud.level.levels import peak_count
 from thud.studies.sampling import sampler_versions, unit_samples
@@ -27,10 +27,9 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
 
 
-# A block of samples should take about this time, s.
-_BLOCK_TIME = 0.25
-# Number of samples that a surrogate predicts in about this time.
-_SURROGATE_BLOCK_SIZE = 2**16
+# Numbers of samples in a block, which takes some tenths of a second, of elements more: predicted by a
+# surrogate, by the batch of shells, by other models, and by elements.
+_SURROGATE_BLOCK_SIZE, _BATCH_BLOCK_SIZE, _BLOCK_SIZE, _ELEMENT_BLOCK_SIZE = 2**16, 2**14, 32, 1
 
 
 @dataclass(frozen=True)
@@ -95,13 +94,11 @@ class SampleStudy(Study):
         """Number of samples that are computed together, the same for all executors."""
         if self.plan or self.surrogate:
             return _SURROGATE_BLOCK_SIZE
-        if self.design in {"grid", "list"}:
-            # One sample is enough here; the full grid may exceed the memory.
-            first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}
-        else:
-            first = self.parameter_columns(0, 1)
-        keys = self.key_columns(first)
-        return max(1, round(_BLOCK_TIME / get_cost(self.case, keys)))
+        model = self.case.model.name if self.case.model else ""
+        if model == "finite_element":
+            return _ELEMENT_BLOCK_SIZE
+        is_batch = not self.case.floor and self.case.levels.method == "exact"
+        return _BATCH_BLOCK_SIZE if model == "hollow_sphere" and is_batch else _BLOCK_SIZE
 
     def parameter_columns(self, start: int, stop: int) -> Columns:
         """Return values of samples `start` to `stop` - 1 by parameter, shape (n_sample,)."""

@@ -7,13 +7,12 @@ module thud_table
    use thud_error, only: error_type
    use thud_field, only: field_type
    use thud_force_exposure, only: get_force_exposure_levels
-   use thud_force_history, only: force_count, force_history_type, force_names
+   use thud_force_history, only: force_count, force_history_type, force_names, get_model_quantity, has_quantity
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_numerical_error, only: finer_prefix, finer_quantities, get_model_quantity, has_quantity, &
-      resolution_quantities
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count, show
+   use thud_refined_drop, only: finer_prefix, finer_quantities, resolution_quantities
    use thud_report, only: get_verdict, get_verdict_word
    use thud_source_limits, only: conforms, criterion_type, is_undecided
    use thud_text, only: fixed, flush_right, newline, padded, replaced, screen_width, significant, to_text
@@ -71,7 +70,6 @@ contains
          if (verbose) then
             text = text//model_quantity_rows(history)
             resolution = get_resolution(history, '')
-            if (case%models(get_model_number(case))%model%chooses_resolution()) resolution = resolution//', automatic'
             if (resolution /= '') text = text//'  resolution: '//resolution//newline
          end if
          do i = 1, octave_count

@@ -7,7 +7,7 @@ module thud_finite_element
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error, numerical_failure
-   use thud_finite_element_options, only: count_work, finite_element_options_type, get_frame_count, get_stride
+   use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: get_energy, get_mean_height, get_mean_velocity, impact_run_type, new_impact_run, &
@@ -72,7 +72,6 @@ module thud_finite_element
    type, extends(finite_element_options_type) :: finite_element_type
    contains
       procedure :: solve
-      procedure :: get_cost
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: get_loss_factors
@@ -80,29 +79,6 @@ module thud_finite_element
    end type finite_element_type
 
 contains
-
-   !> Approximate time of a drop at one resolution on one core, s.
-   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
-      class(finite_element_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      type(receiver_type), intent(in), optional :: receiver
-      real(wp), intent(in), optional :: contact_time
-      real(wp) :: cost
-      real(wp) :: n_step, n_padded, element_cost
-
-      call count_work(self, ball, sampling, n_step, n_padded, contact_time)
-      select case (self%material%viscosity)
-      case ('none')
-         element_cost = 2.5e-8_wp
-      case ('kelvin_voigt')
-         element_cost = 3.8e-8_wp
-      case default
-         element_cost = 7.0e-8_wp
-      end select
-      cost = 2.5e-3_wp + n_step*n_padded*element_cost
-      if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
-   end function get_cost
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
    function get_standard_modulus(self) result(modulus)

@@ -13,14 +13,14 @@ module thud_finite_element_options
       new_material
    use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type, mesh_type, new_mesh
    use thud_new_field, only: in_group, integer_field, real_field
-   use thud_sampling, only: get_sample_count, get_step_count, sampling_type
-   use thud_source_model, only: convergence_type, source_model_type, typical_contact
+   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_source_model, only: resolution_type, source_model_type
    use thud_stable_step, only: get_stable_interval
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: count_work, finite_element_options_type, get_frame_count, get_stride
+   public :: finite_element_options_type, get_frame_count, get_stride
 
    !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
@@ -44,6 +44,9 @@ module thud_finite_element_options
    integer, parameter :: highest_level = 3
    real(wp), parameter :: max_work = 5.05e7_wp
 
+   !> Typical simulated duration of a drop, s, for the number of steps.
+   real(wp), parameter :: typical_contact = 0.025_wp
+
    !> Coefficients of friction between which a mesh may be too coarse for the stick and slip of the surface, which then
    !> changes the levels of a finer one only (docs/finite_elements.md): smaller friction is too weak, larger friction sticks.
    !> The viscosity of Kelvin and Voigt prevents it.
@@ -53,9 +56,6 @@ module thud_finite_element_options
    !> of shear waves per radius makes those of `slip_ball`; the change is taken as proportional to the element size.
    real(wp), parameter :: slip_error(octave_count) = [0.05_wp, 0.2_wp, 0.4_wp, 2.0_wp, 2.0_wp]
    type(ball_type), parameter :: slip_ball = ball_type(youngs_modulus=2.08e6_wp)
-
-   !> Wall thickness relative to the radius below which, and coefficient of friction above which higher levels are expected.
-   real(wp), parameter :: thin_wall = 0.25_wp, high_friction = 0.3_wp
 
    !> Options of the model.
    type, abstract, extends(source_model_type) :: finite_element_options_type
@@ -76,11 +76,7 @@ module thud_finite_element_options
       procedure :: get_fields
       procedure :: check
       procedure :: get_snapshot_shape
-      procedure :: set_level
-      procedure :: get_highest_level
-      procedure :: chooses_resolution
-      procedure :: get_expected_level
-      procedure :: get_convergence
+      procedure :: refine
    end type finite_element_options_type
 
 contains
@@ -134,109 +130,75 @@ contains
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
    end subroutine check
 
-   !> Sets the resolution: at level 0 elements of twice the size, without snapshots; above level 1 smaller ones. Automatic
-   !> elements are short enough for the contact radius of the coarser drop.
-   subroutine set_level(self, ball, level, sampling, coarse)
+   !> The model at a level of resolution: at level 0 elements of twice the size, without snapshots; above level 1 smaller
+   !> ones. Automatic elements are short enough for the contact radius of the coarser drop. The error follows from the level
+   !> with elements of twice the size, if there is one, for errors proportional to the square of the element size; with
+   !> elements of twice the size more, since these are often outside of that order.
+   subroutine refine(self, ball, level, coarse, sampling, refined, resolution)
       class(finite_element_options_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
       integer, intent(in) :: level
-      type(sampling_type), intent(inout) :: sampling
       type(force_history_type), intent(in) :: coarse
+      type(sampling_type), intent(inout) :: sampling
+      class(source_model_type), allocatable, intent(out) :: refined
+      type(resolution_type), intent(out) :: resolution
+      class(finite_element_options_type), allocatable :: finer
       real(wp) :: refinement
       logical :: resolves_contact
 
       refinement = merge(0.5_wp, refinement_ratio**(level - 1), level == 0)
-      resolves_contact = self%chooses_resolution() .and. allocated(coarse%model_history)
-      associate (mesh => self%mesh)
+      resolves_contact = chooses_resolution(self) .and. allocated(coarse%model_history)
+      allocate (finer, source=self)
+      associate (mesh => finer%mesh)
          mesh = get_element_counts(ball, mesh)
          if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(max_contact_ratio, &
             contact_elements*pi*ball%outer_radius/mesh%polar_elements/maxval(coarse%model_history(:, 1)))))
          mesh%radial_elements = max(min_radial, nint(mesh%radial_elements*refinement))
          mesh%polar_elements = nint(mesh%polar_elements*refinement)
       end associate
-      if (level == 0) self%snapshot_interval = 0.0_wp
-   end subroutine set_level
+      if (level == 0) finer%snapshot_interval = 0.0_wp
+      resolution = resolution_type(reference=merge(level - 2, level - 1, level > 2), &
+         ratio=merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2), min_error=get_min_error(finer, ball))
+      ! Nodes that stick and slip converge more slowly.
+      if (self%contact%friction > 0.0_wp) resolution%ratio = 2*resolution%ratio
+      if (level > 1) resolution%lowers_error = chooses_resolution(self) .and. level <= highest_level
+      if (level > 1 .and. resolution%lowers_error) resolution%lowers_error = &
+         count_work(self, ball, sampling)*refinement_ratio**(3*(level - 1)) < max_work
+      call move_alloc(finer, refined)
+   end subroutine refine
 
-   !> Highest level of resolution, such that its drop has not too many steps and elements.
-   function get_highest_level(self, ball, sampling) result(level)
+   !> Number of steps times elements of a drop at level 1, without the finer elements of the contact.
+   function count_work(self, ball, sampling) result(work)
       class(finite_element_options_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
-      integer :: level
-      real(wp) :: n_step, n_padded
-
-      level = 1
-      if (.not. self%chooses_resolution()) return
-      call count_work(self, ball, sampling, n_step, n_padded)
-      do while (level < highest_level .and. n_step*n_padded*refinement_ratio**(3*level) < max_work)
-         level = level + 1
-      end do
-   end function get_highest_level
-
-   !> Numbers of steps and of elements of a drop at one resolution.
-   subroutine count_work(self, ball, sampling, n_step, n_padded, contact_time)
-      class(finite_element_options_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      !> Number of steps; number of elements with the lanes that are left empty.
-      real(wp), intent(out) :: n_step, n_padded
-      !> Expected contact time, s (default: `typical_contact`).
-      real(wp), intent(in), optional :: contact_time
+      real(wp) :: work
       type(mesh_type) :: mesh
       type(material_type) :: material
       type(error_type), allocatable :: error
       real(wp) :: interval, time
 
       mesh = new_mesh(ball, self%mesh)
-      n_padded = mesh%n_radial*n_element*ceiling(mesh%n_polar/real(n_element, wp))
       ! The run reports a material that cannot be.
       call new_material(self%material, ball, material, error)
       interval = 1/sampling%sample_rate
       if (.not. allocated(error)) interval = self%step_safety*get_stable_interval(mesh%r, mesh%z, material, &
          new_floor_contact(self%contact, ball, mesh))
-      time = typical_contact
-      ! A contact is over when shear waves have crossed the ball.
-      if (present(contact_time)) time = contact_time + 2*ball%outer_radius/sqrt(ball%youngs_modulus/3/get_density(ball))
-      time = time + self%flight_before + self%flight_after
+      time = typical_contact + self%flight_before + self%flight_after
       if (self%bounces > 1) time = sampling%duration
-      n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
-   end subroutine count_work
-
-   !> Nodes that stick and slip, a layer on the floor, and thin walls need higher levels.
-   function get_expected_level(self, ball, contact) result(level)
-      class(finite_element_options_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(force_history_type), intent(in) :: contact
-      integer :: level
-
-      level = 1
-      if (self%contact%friction > 0.0_wp .or. ball%wall_thickness < thin_wall*ball%outer_radius) level = 2
-      if (self%contact%friction > high_friction .or. self%contact%layer_stiffness > 0.0_wp) level = highest_level
-   end function get_expected_level
+      time = min(time, sampling%duration)
+      ! Elements with the lanes that are left empty.
+      work = max(time*sampling%sample_rate*sampling%substeps, time/interval) &
+         *(mesh%n_radial*n_element*ceiling(mesh%n_polar/real(n_element, wp)))
+   end function count_work
 
    !> Whether the resolution may be chosen: the user's keys do not grow.
-   function chooses_resolution(self) result(yes)
+   pure function chooses_resolution(self) result(yes)
       class(finite_element_options_type), intent(in) :: self
       logical :: yes
 
       yes = self%mesh%radial_elements == 0 .and. self%mesh%polar_elements == 0
    end function chooses_resolution
-
-   !> Convergence of a result: its difference from the level with elements of twice the size, if there is one, for errors
-   !> proportional to the square of the element size; with elements of twice the size more, since these are often outside of
-   !> that order.
-   function get_convergence(self, ball, level, history) result(convergence)
-      class(finite_element_options_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      integer, intent(in) :: level
-      type(force_history_type), intent(in) :: history
-      type(convergence_type) :: convergence
-
-      convergence = convergence_type(reference=merge(level - 2, level - 1, level > 2), &
-         ratio=merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2), min_error=get_min_error(self, ball))
-      ! Nodes that stick and slip converge more slowly.
-      if (self%contact%friction > 0.0_wp) convergence%ratio = 2*convergence%ratio
-   end function get_convergence
 
    !> Minimum error with friction at which a sliding surface may begin to stick and slip on its own (`slip_friction`).
    function get_min_error(self, ball) result(error)
@@ -289,7 +251,7 @@ contains
       integer :: factor(2)
 
       factor = 1
-      if (self%chooses_resolution()) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
+      if (chooses_resolution(self)) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
       associate (counts => get_element_counts(ball, self%mesh))
          extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(self, sampling)]
       end associate

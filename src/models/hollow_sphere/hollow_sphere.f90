@@ -13,7 +13,7 @@ module thud_hollow_sphere
    use thud_new_field, only: choice_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
-   use thud_source_model, only: convergence_type, source_model_type
+   use thud_source_model, only: source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
@@ -28,7 +28,6 @@ module thud_hollow_sphere
       !> Treatment of the momentum of wall that enters or leaves the flat cap, one of `flux_choices`.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
    contains
-      procedure :: get_convergence
       procedure :: get_fields
       procedure :: solve => solve_hollow_sphere
       procedure :: get_standard_modulus
@@ -278,19 +277,6 @@ contains
          //' mm; allowed: less than its height, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
    end function get_failure
 
-   !> Convergence of a result. Only with the balance of momentum does the force end without a jump: another force has an
-   !> error that is proportional to the sampling interval.
-   function get_convergence(self, ball, level, history) result(convergence)
-      class(hollow_sphere_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      integer, intent(in) :: level
-      type(force_history_type), intent(in) :: history
-      type(convergence_type) :: convergence
-
-      convergence%reference = level - 1
-      if (self%momentum_flux /= 'momentum_balance') convergence%ratio = 1.0_wp
-   end function get_convergence
-
    !> Force history of one drop.
    subroutine solve_hollow_sphere(self, ball, drop, sampling, history, error, receiver)
       class(hollow_sphere_type), intent(in) :: self
@@ -312,6 +298,9 @@ contains
       shell = new_shell(ball, compression_weights(choice), restitution_weights(choice))
       call solve_lumped(shell, drop, sampling, [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'], &
          history, error, receiver)
+      ! Only with the balance of momentum does the force end without a jump: another force has an error that is proportional
+      ! to the sampling interval.
+      if (self%momentum_flux /= 'momentum_balance') history%error_ratio = 1.0_wp
    end subroutine solve_hollow_sphere
 
 end module thud_hollow_sphere

@@ -10,14 +10,13 @@ module thud_shell_samples
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_history, only: force_history_type, holds_impulse, max_residual
+   use thud_force_history, only: force_history_type, holds_impulse, max_residual, has_quantity
    use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, &
       restitution_weights, solve_hollow_sphere
    use thud_impact_batch, only: impact_batch_type
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_new_field, only: in_group
-   use thud_numerical_error, only: has_quantity
    use thud_power, only: not_a_number
    use thud_sampling, only: get_sample_count, min_contact_samples, sampling_type
    use thud_shell_batch, only: batch_size

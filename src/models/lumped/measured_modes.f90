@@ -13,7 +13,7 @@ module thud_measured_modes
    use thud_new_field, only: list_field, logical_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_source_model, only: source_model_type, typical_contact
+   use thud_source_model, only: source_model_type
    use thud_text, only: fixed, to_text
    use thud_zero_search, only: bisection_type
    implicit none (type, external)
@@ -40,7 +40,6 @@ module thud_measured_modes
       procedure :: get_fields
       procedure :: check
       procedure :: solve
-      procedure :: get_cost
    end type measured_modes_type
 
    !> Motion and force of one mode in closed form.
@@ -159,20 +158,6 @@ contains
          call check_contact_samples(sampling, history%contact_time, error)
       end if
    end subroutine check_history
-
-   !> Approximate time of a drop at one resolution on one core, s.
-   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
-      class(measured_modes_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      type(receiver_type), intent(in), optional :: receiver
-      real(wp), intent(in), optional :: contact_time
-      real(wp) :: cost
-      real(wp) :: rate
-
-      rate = max(sampling%sample_rate, checks_per_period*maxval(self%frequency%values(:self%frequency%count)))
-      cost = 5.0e-4_wp + min(sampling%duration, typical_contact)*rate*self%frequency%count*1.5e-8_wp
-   end function get_cost
 
    !> One mode from its measured values.
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)

@@ -14,14 +14,13 @@ module thud_modal_ball
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm
-   use thud_modal_ball_options, only: estimate_mode_count, get_shear_velocity, max_phase, modal_ball_options_type
+   use thud_modal_ball_options, only: get_error_ratio, max_phase, modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, set_factors
    use thud_receiver, only: can_strike, get_pole_count, new_receiver_step, receiver_step_type, receiver_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type
-   use thud_sampling, only: check_contact_samples, get_sample_count, get_step_count, sampling_type
-   use thud_source_model, only: typical_contact
+   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_sphere_modes, only: basis_type, family_type, get_families, get_static_family, limit_family, new_basis
    use thud_static_step, only: new_static_step, static_step_type
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
@@ -40,48 +39,11 @@ module thud_modal_ball
    contains
       procedure :: solve
       procedure :: compress
-      procedure :: get_cost
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
    end type modal_ball_type
 
 contains
-
-   !> Approximate time of a drop at one resolution on one core, s.
-   function get_cost(self, ball, sampling, receiver, contact_time) result(cost)
-      class(modal_ball_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      type(receiver_type), intent(in), optional :: receiver
-      real(wp), intent(in), optional :: contact_time
-      real(wp) :: cost
-      real(wp) :: n_mode, n_family, n_gap, n_ring_harmonic, n_polynomial, step_cost, time, omega
-
-      time = typical_contact
-      ! The ball rises a little before the end is certain.
-      if (present(contact_time)) time = 1.15_wp*contact_time
-      n_gap = self%get_ring_count()*merge(2.0_wp, 1.0_wp, self%floor_friction == 'stick')
-      n_ring_harmonic = 2*pi*self%get_ring_count()/self%outermost_angle
-      omega = min(2*pi*self%get_highest_frequency(), max_phase*sampling%sample_rate*sampling%substeps)
-      n_mode = estimate_mode_count(ball, omega)
-      n_family = 3 + omega/get_shear_velocity(ball)*ball%outer_radius
-      cost = 7.3e-5_wp + n_gap*n_ring_harmonic*(3.5e-8_wp + 3.2e-11_wp*n_gap)
-      if (self%level > 0) then
-         ! An eigenproblem for each harmonic; level 0 shares those of level 1. See `get_degree` of `thud_sphere_modes`.
-         n_polynomial = 5 + max(6.0_wp, omega/get_shear_velocity(ball)*ball%wall_thickness/2) &
-            + 2.4_wp*sqrt(n_family/2*abs(log(1 - ball%wall_thickness/ball%outer_radius)))
-         cost = cost + n_family*(1.4e-5_wp + 5.5e-8_wp*n_polynomial**2 + 2.1e-11_wp*n_polynomial**3)
-      end if
-      ! The amplitudes and rates of the modes, and Maxwell branches.
-      step_cost = 5.6e-7_wp + 2.1e-9_wp*n_mode*merge(7, 2, self%damping_law == 'fractional') &
-         + 1.0e-10_wp*n_gap*(2*n_family + n_gap)
-      if (present(receiver)) step_cost = step_cost + 2.6e-9_wp*get_pole_count(receiver)
-      if (present(receiver)) then
-         cost = cost + get_step_count(sampling)*step_cost
-      else
-         cost = cost + get_step_count(sampling, time)*step_cost
-      end if
-   end function get_cost
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
    !> modulus.
@@ -157,6 +119,7 @@ contains
             allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
          end if
          call march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
+         history%error_ratio = get_error_ratio(ball, history)
          call add_model_quantity(history, 'rings', '', real(size(rings%radius), wp))
          call add_model_quantity(history, 'highest_frequency', 'Hz', &
             min(self%get_highest_frequency(), max_phase/(2*pi*interval)))

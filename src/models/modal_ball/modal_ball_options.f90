@@ -9,14 +9,14 @@ module thud_modal_ball_options
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
    use thud_prony, only: check_fractional_loss
    use thud_sampling, only: sampling_type
-   use thud_source_model, only: convergence_type, source_model_type
+   use thud_source_model, only: resolution_type, source_model_type
    use thud_sphere_modes, only: family_type, get_families
    use thud_surface_rings, only: greatest_angle
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: estimate_mode_count, get_shear_velocity, modal_ball_options_type
+   public :: get_error_ratio, modal_ball_options_type
 
    !> Rings of levels 0 and 1.
    real(wp), parameter :: coarse_rings = 36.0_wp, default_rings = 40.0_wp
@@ -45,18 +45,10 @@ module thud_modal_ball_options
    !> Deflection relative to the radius above which, and Poisson's ratio below which it is larger.
    real(wp), parameter :: wide_contact = 0.36_wp, compressible = 0.4_wp
 
-   !> Numbers of modes of level 1 above which level 2 or 3 is expected, and contact radius relative to the radius of the ball
-   !> below which level 2 is.
-   real(wp), parameter :: many_modes(2) = [180.0_wp, 240.0_wp]
-   real(wp), parameter :: small_contact = 0.2_wp
-
-   !> Wall thickness relative to the radius below which sticking needs level 3.
-   real(wp), parameter :: thin_wall = 0.2_wp
-
    !> Number of steps in a contact from level 1 on, as far as at most twice the steps of a level reach it.
    real(wp), parameter :: min_steps = 500.0_wp
 
-   !> Maximum number of steps of level 1 in a step of the input, see `set_level`.
+   !> Maximum number of steps of level 1 in a step of the input, see `refine`.
    integer, parameter :: max_refinement = 4
 
    !> Maximum phase angle of a mode in a step; faster modes respond statically.
@@ -98,12 +90,7 @@ module thud_modal_ball_options
       procedure :: check
       procedure :: get_highest_frequency
       procedure :: get_ring_count
-      procedure :: share_setup
-      procedure :: set_level
-      procedure :: get_highest_level
-      procedure :: chooses_resolution
-      procedure :: get_expected_level
-      procedure :: get_convergence
+      procedure :: refine
    end type modal_ball_options_type
 
 contains
@@ -155,36 +142,25 @@ contains
       end if
    end subroutine check
 
-   !> Computes the modes of levels 0 and 1.
-   subroutine share_setup(self, ball, sampling)
-      class(modal_ball_options_type), intent(inout) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      type(error_type), allocatable :: error
-      real(wp) :: highest_omega
-
-      self%level = 1
-      self%coarse_frequency = get_coarse_frequency(ball)
-      highest_omega = min(2*pi*max(get_level_frequency(self, 0), get_level_frequency(self, 1)), &
-         max_phase*sampling%sample_rate*sampling%substeps*max_refinement)
-      ! After an error there are no families; the drop repeats it, and returns the error.
-      call get_families(ball, self%cavity_gas, highest_omega, self%families, error)
-   end subroutine share_setup
-
-   !> Sets the resolution: modes, rings around the contact of the coarser drop, and time steps.
-   subroutine set_level(self, ball, level, sampling, coarse)
+   !> The model at a level of resolution: modes, rings around the contact of the coarser drop, and time steps. Levels 0 and 1
+   !> share their modes. If the user sets the resolution, it does not grow.
+   subroutine refine(self, ball, level, coarse, sampling, refined, resolution)
       class(modal_ball_options_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
       integer, intent(in) :: level
-      type(sampling_type), intent(inout) :: sampling
       type(force_history_type), intent(in) :: coarse
-
+      type(sampling_type), intent(inout) :: sampling
+      class(source_model_type), allocatable, intent(out) :: refined
+      type(resolution_type), intent(out) :: resolution
+      class(modal_ball_options_type), allocatable :: finer
       real(wp) :: contact_steps
       integer :: refinement
+      logical :: few_modes
 
+      if (level == 0) call share_modes(self, ball, sampling)
       if (level > 1 .and. allocated(self%families)) deallocate (self%families)
-      self%level = level
-      self%coarse_frequency = get_coarse_frequency(ball)
+      allocate (finer, source=self)
+      finer%level = level
       refinement = 2**level
       contact_steps = coarse%contact_time*sampling%sample_rate*sampling%substeps
       ! Sticking rings converge slowly; without them few steps suffice.
@@ -192,64 +168,31 @@ contains
          refinement = min(2*refinement, max(refinement/2, ceiling(min_steps/contact_steps)))
       end if
       sampling%substeps = sampling%substeps*refinement
-      if (self%rings > 0 .or. .not. allocated(coarse%model_history)) return
+      few_modes = has_few_modes(self, self%coarse_frequency)
       ! A ball with few modes may have a larger contact than one with more.
-      if (has_few_modes(self, self%coarse_frequency)) return
-      self%outermost_angle = min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
+      if (self%rings == 0 .and. allocated(coarse%model_history) .and. .not. few_modes) finer%outermost_angle = &
+         min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
          + added_rings*greatest_angle/(coarse_rings - 1))
-   end subroutine set_level
+      resolution = resolution_type(lowers_error=level <= 1 .or. level <= highest_level .and. .not. few_modes &
+         .and. (self%rings == 0 .or. .not. self%highest_frequency > 0.0_wp), reference=level - 1)
+      call move_alloc(finer, refined)
+   end subroutine refine
 
-   !> Highest level of resolution: if the user sets the resolution, it does not grow.
-   function get_highest_level(self, ball, sampling) result(level)
-      class(modal_ball_options_type), intent(in) :: self
+   !> Computes the modes of levels 0 and 1.
+   subroutine share_modes(self, ball, sampling)
+      class(modal_ball_options_type), intent(inout) :: self
       type(ball_type), intent(in) :: ball
+      !> Sampling of the input.
       type(sampling_type), intent(in) :: sampling
-      integer :: level
+      type(error_type), allocatable :: error
+      real(wp) :: highest_omega
 
-      level = merge(highest_level, 1, self%chooses_resolution() &
-         .and. .not. has_few_modes(self, get_coarse_frequency(ball)))
-   end function get_highest_level
-
-   !> Whether the input leaves rings or modes open.
-   function chooses_resolution(self) result(yes)
-      class(modal_ball_options_type), intent(in) :: self
-      logical :: yes
-
-      yes = self%rings == 0 .or. .not. self%highest_frequency > 0.0_wp
-   end function chooses_resolution
-
-   !> Level that most of 80 random balls reach with such contacts and numbers of modes.
-   function get_expected_level(self, ball, contact) result(level)
-      class(modal_ball_options_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(force_history_type), intent(in) :: contact
-      integer :: level
-      real(wp) :: n_mode
-
-      n_mode = estimate_mode_count(ball, 2*pi*ratio*get_coarse_frequency(ball))
-      level = 1
-      if (n_mode > many_modes(1) .or. maxval(contact%model_history) < small_contact*ball%outer_radius) level = 2
-      if (n_mode > many_modes(2)) level = 3
-      ! Rings of thin walls that stick do not converge.
-      if (self%floor_friction == 'stick' .and. ball%wall_thickness < thin_wall*ball%outer_radius) level = 3
-      if (get_error_ratio(ball, contact) > usual_ratio) level = level + 1
-   end function get_expected_level
-
-   !> Approximate number of modes up to a frequency, within about a third: waves in the cross section of the wall, and
-   !> along the surface.
-   pure function estimate_mode_count(ball, omega) result(n_mode)
-      type(ball_type), intent(in) :: ball
-      !> Angular frequency, rad/s.
-      real(wp), intent(in) :: omega
-      real(wp) :: n_mode
-      real(wp) :: wavenumber, area
-
-      wavenumber = omega/get_shear_velocity(ball)
-      area = pi/2*(ball%outer_radius**2 - (ball%outer_radius - ball%wall_thickness)**2)
-      ! Shear and pressure waves.
-      n_mode = area/(4*pi)*wavenumber**2*(1 + (1 - 2*ball%poisson_ratio)/(2*(1 - ball%poisson_ratio))) &
-         + wavenumber*ball%outer_radius
-   end function estimate_mode_count
+      self%coarse_frequency = get_coarse_frequency(ball)
+      highest_omega = min(2*pi*max(get_level_frequency(self, 0), get_level_frequency(self, 1)), &
+         max_phase*sampling%sample_rate*sampling%substeps*max_refinement)
+      ! After an error there are no families; the drop repeats it, and returns the error.
+      call get_families(ball, self%cavity_gas, highest_omega, self%families, error)
+   end subroutine share_modes
 
    !> Highest frequency of the modes of level 0, Hz.
    pure function get_coarse_frequency(ball) result(frequency)
@@ -267,20 +210,11 @@ contains
       velocity = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))
    end function get_shear_velocity
 
-   !> Convergence of a result: its difference from the next coarser level.
-   function get_convergence(self, ball, level, history) result(convergence)
-      class(modal_ball_options_type), intent(in) :: self
+   !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
+   !> (docs/modal_ball.md).
+   pure function get_error_ratio(ball, history) result(ratio)
       type(ball_type), intent(in) :: ball
-      integer, intent(in) :: level
-      type(force_history_type), intent(in) :: history
-      type(convergence_type) :: convergence
-
-      convergence = convergence_type(reference=level - 1, ratio=get_error_ratio(ball, history))
-   end function get_convergence
-
-   !> Estimated error of a result divided by that difference: it is found from random balls (docs/modal_ball.md).
-   function get_error_ratio(ball, history) result(ratio)
-      type(ball_type), intent(in) :: ball
+      !> The result.
       type(force_history_type), intent(in) :: history
       real(wp) :: ratio
 

@@ -1,18 +1,31 @@
-!> Error of an impact due to its resolution: modes left out, rings, elements, time steps and samples. It is estimated by the
-!> change from a coarser resolution.
-module thud_numerical_error
+!> A drop at a resolution that is fine enough: the model is solved at two levels of resolution, and at higher ones until the
+!> levels of the octaves agree. Its numerical error (modes left out, rings, elements, time steps and samples) is estimated by
+!> the change from a coarser level.
+module thud_refined_drop
+   use thud_ball, only: ball_type
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_constants, only: pi
-   use thud_error, only: error_type
+   use thud_drop, only: drop_type
+   use thud_error, only: error_type, signal_base
    use thud_force_exposure, only: get_force_exposure_levels
-   use thud_force_history, only: add_model_quantity, force_history_type, numerical_error_type
+   use thud_force_history, only: add_model_quantity, force_history_type, get_model_quantity, has_quantity, &
+      numerical_error_type
    use thud_kinds, only: wp
+   use thud_motion, only: motion_type
+   use thud_receiver, only: receiver_type
+   use thud_sampling, only: sampling_type
+   use thud_source_model, only: resolution_type, source_model_type
    use thud_text, only: fixed
    implicit none (type, external)
    private
 
-   public :: add_verification, estimate_error, finer_prefix, finer_quantities, get_largest_error, get_model_quantity
-   public :: get_resolution_keys, has_quantity, resolution_quantities
+   public :: finer_prefix, finer_quantities, get_resolution_keys, resolution_quantities, solve_drop
+
+   !> Error of an octave level above which a finer resolution is tried, dB.
+   real(wp), parameter :: max_error = 0.2_wp
+
+   !> Bound of the levels of resolution; models stop at a lower one.
+   integer, parameter :: max_level = 10
 
    !> Names of the quantities of a drop at a finer resolution: levels of the octaves of the force on the floor, and others.
    character(len=24), parameter :: finer_quantities(*) = [character(len=24) :: 'finer_octave_31_5', 'finer_octave_63', &
@@ -30,6 +43,68 @@ module thud_numerical_error
    real(wp), parameter :: in_phase = 0.15_wp
 
 contains
+
+   !> Force history of one drop, with its numerical error.
+   subroutine solve_drop(model, ball, drop, sampling, history, error, receiver)
+      !> The model with its options, checked.
+      class(source_model_type), intent(in) :: model
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      type(sampling_type), intent(in) :: sampling
+      type(force_history_type), intent(out) :: history
+      !> Set if the drop leaves the range of the model, or at every resolution the steps are too coarse.
+      type(error_type), allocatable, intent(out) :: error
+      !> The structure under the source (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
+      class(source_model_type), allocatable :: shared, refined
+      type(force_history_type) :: drops(0:max_level), none
+      type(motion_type), allocatable :: motion
+      type(sampling_type) :: refined_sampling
+      type(resolution_type) :: resolution
+      real(wp) :: min_error(octave_count)
+      integer :: level
+      logical :: is_fine, is_last
+
+      allocate (shared, source=model)
+      refined_sampling = sampling
+      call shared%refine(ball, 0, none, refined_sampling, refined, resolution)
+      call refined%solve(ball, drop, refined_sampling, drops(0), error, receiver)
+      if (allocated(error)) then
+         if (error%code >= signal_base .or. error%has_short_record) return
+         drops(0) = none
+      end if
+      is_fine = .false.
+      do level = 1, max_level
+         refined_sampling = sampling
+         call shared%refine(ball, level, drops(level - 1), refined_sampling, refined, resolution)
+         is_last = is_fine .or. .not. resolution%lowers_error
+         ! The error is not known if the coarsest resolution fails and there is one level.
+         if (is_last .and. drops(level - 1)%numerical_error%known .and. .not. sampling%verify) exit
+         call refined%solve(ball, drop, refined_sampling, drops(level), error, receiver)
+         if (allocated(error)) then
+            if (level == 1 .or. error%code >= signal_base) return
+            ! The result stands without the finer one; `get_warnings` reports a missing verification.
+            deallocate (error)
+            exit
+         end if
+         resolution%ratio = max(resolution%ratio, drops(level)%error_ratio)
+         if (is_last) then
+            if (.not. drops(level - 1)%numerical_error%known) call estimate_error(drops(level), 1 + resolution%ratio, &
+               min_error, drops(level - 1))
+            if (sampling%verify) call add_verification(drops(level), drops(level - 1))
+            exit
+         end if
+         if (allocated(drops(resolution%reference)%floor_force)) call estimate_error(drops(resolution%reference), &
+            resolution%ratio, resolution%min_error, drops(level))
+         min_error = resolution%min_error
+         if (drops(level)%numerical_error%known) is_fine = maxval(drops(level)%numerical_error%octave) <= max_error
+         if (allocated(drops(level - 1)%motion)) deallocate (drops(level - 1)%motion)
+      end do
+      ! A copy of the snapshots would take their memory twice.
+      call move_alloc(drops(level - 1)%motion, motion)
+      history = drops(level - 1)
+      call move_alloc(motion, history%motion)
+   end subroutine solve_drop
 
    !> Estimates the error of a force history by its difference from a coarser one.
    subroutine estimate_error(coarse, ratio, min_error, history)
@@ -176,24 +251,6 @@ contains
       end if
    end subroutine get_resolution_keys
 
-   !> Whether the model has stated a quantity.
-   pure function has_quantity(history, name) result(yes)
-      type(force_history_type), intent(in) :: history
-      character(len=*), intent(in) :: name
-      logical :: yes
-
-      yes = any(history%model_quantity_name == name)
-   end function has_quantity
-
-   !> A quantity that the model has stated.
-   pure function get_model_quantity(history, name) result(value)
-      type(force_history_type), intent(in) :: history
-      character(len=*), intent(in) :: name
-      real(wp) :: value
-
-      value = history%model_quantity(findloc(history%model_quantity_name == name, .true., dim=1))
-   end function get_model_quantity
-
    !> The contact time, resolved between steps if possible.
    pure function get_contact_time(history) result(time)
       type(force_history_type), intent(in) :: history
@@ -203,12 +260,4 @@ contains
       time = merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp)
    end function get_contact_time
 
-   !> Largest error of an octave level, dB; 0 if no error is known.
-   pure function get_largest_error(history) result(error)
-      type(force_history_type), intent(in) :: history
-      real(wp) :: error
-
-      error = merge(maxval(history%numerical_error%octave), 0.0_wp, history%numerical_error%known)
-   end function get_largest_error
-
-end module thud_numerical_error
+end module thud_refined_drop
