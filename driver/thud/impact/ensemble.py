@@ -157,12 +157,14 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
-            while bar.n < len(numbers) or not blocks:
-                block = numbers[bar.n : bar.n + size]
+            start = 0
+            while start < len(numbers) or not blocks:
+                block = numbers[start : start + size]
                 began = time.perf_counter()
                 blocks.append(
                     _compute(content, columns, block, n_thread, levels=levels, forces=forces)
                 )
+                start += len(block)
                 rate = len(block) / (time.perf_counter() - began)
                 size = int(np.clip(_CALL_TIME * rate, 1, max(1, max_count)))
                 bar.update(len(block))
