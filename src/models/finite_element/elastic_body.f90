@@ -1,23 +1,34 @@
-!> The deforming ball: nodes, masses, material and gas, and the forces on its nodes.
+!> The deforming ball: nodes, masses, material and gas, and the forces on its nodes. The gas is adiabatic, of uniform
+!> pressure, in the volume inside the deformed inner surface.
 module thud_elastic_body
    use thud_ball, only: ball_type
-   use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume, new_cavity
-   use thud_element_block, only: add_nodal_forces, element_block_type, get_gradients, n_component, n_lane, &
-      n_symmetric, new_element_blocks
+   use thud_constants, only: pi
+   use thud_element_block, only: add_nodal_forces, element_block_type, get_gradients, n_lane, n_symmetric, new_element_blocks
    use thud_kinds, only: wp
    use thud_material, only: material_type
-   use thud_maxwell_branches, only: add_branch_stress, branch_step_type, new_branch_step
    use thud_mesh, only: mesh_type
-   use thud_rubber, only: add_viscous_stress, get_elastic_stress, get_isochoric, get_jacobians, &
-      get_mean_stress, get_nominal_stress
+   use thud_rubber, only: add_branch_stress, add_viscous_stress, branch_step_type, new_branch_step, set_elastic_stress, &
+      set_nominal_stress, set_strain, strain_type, stress_type
    implicit none (type, external)
    private
 
-   public :: body_state_type, cavity_closed, elastic_body_type, element_inverted, get_internal_forces, new_elastic_body, &
-      no_failure
+   public :: add_gas_forces, body_state_type, cavity_closed, cavity_type, elastic_body_type, element_inverted
+   public :: get_gas_energy, get_gas_pressure, get_internal_forces, get_volume, new_elastic_body, no_failure
 
    !> Reasons why forces cannot be computed.
    integer, parameter :: no_failure = 0, element_inverted = 1, cavity_closed = 2
+
+   !> The gas at first touch.
+   type :: cavity_type
+      !> Volume, m3.
+      real(wp) :: volume = 0.0_wp
+      !> Pressure in the undeformed ball, Pa.
+      real(wp) :: pressure = 0.0_wp
+      !> Pressure of the air around the ball, Pa.
+      real(wp) :: ambient = 0.0_wp
+      !> Ratio of specific heats.
+      real(wp) :: exponent = 1.0_wp
+   end type cavity_type
 
    !> The ball; arrays over nodes are [0:n_polar, 0:n_radial], components r and z last.
    type :: elastic_body_type
@@ -63,7 +74,8 @@ contains
       n = mesh%n_polar
       body%mesh = mesh
       body%material = material
-      body%cavity = new_cavity(ball, mesh%r(:, 0), mesh%z(:, 0))
+      body%cavity = cavity_type(get_volume(mesh%r(:, 0), mesh%z(:, 0)), ball%ambient_pressure + ball%gauge_pressure, &
+         ball%ambient_pressure, ball%heat_capacity_ratio)
       body%blocks = new_element_blocks(mesh)
       allocate (body%mass(0:n, 0:mesh%n_radial), source=0.0_wp)
       do k = 1, size(body%blocks)
@@ -97,10 +109,10 @@ contains
       real(wp), intent(out), contiguous :: force(0:, 0:, :)
       !> Energies and power.
       type(body_state_type), intent(out) :: state
-      real(wp), dimension(n_lane, n_component) :: f, rate, stress
-      real(wp), dimension(n_lane, n_symmetric) :: c, inverse, isochoric
-      real(wp), dimension(n_lane) :: jacobian, root, mean_stress, density, power, energy, loss, lowest
+      type(strain_type) :: strain
+      type(stress_type) :: stress
       type(branch_step_type) :: step(size(body%material%branch_time))
+      real(wp), dimension(n_lane) :: energy, loss, lowest
       real(wp) :: volume
       integer :: b, k, last
 
@@ -110,30 +122,26 @@ contains
       loss = 0.0_wp
       lowest = 1.0_wp
       ! Lanes without an element stay undeformed.
-      f = spread([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp], 1, n_lane)
-      rate = 0.0_wp
+      strain%f = spread([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp], 1, n_lane)
+      strain%rate = 0.0_wp
       associate (material => body%material)
          step = new_branch_step(material%branch_modulus, material%branch_time, interval)
          do k = 1, size(body%blocks)
             associate (block => body%blocks(k), i => body%blocks(k)%ring)
-               call get_gradients(block, last, position(:, i - 1:i, 1), position(:, i - 1:i, 2), f)
+               call get_gradients(block, last, position(:, i - 1:i, 1), position(:, i - 1:i, 2), strain%f)
                if (material%viscosity > 0.0_wp) call get_gradients(block, last, velocity(:, i - 1:i, 1), &
-                  velocity(:, i - 1:i, 2), rate)
-               call get_jacobians(f, jacobian)
-               call get_mean_stress(block, material%bulk_modulus, jacobian, mean_stress, density)
-               call get_isochoric(f, jacobian, root, c, inverse)
-               call get_elastic_stress(material%shear_modulus, material%mooney_share, c, inverse, isochoric, density)
-               power = 0.0_wp
+                  velocity(:, i - 1:i, 2), strain%rate)
+               call set_strain(strain)
+               call set_elastic_stress(block, material, strain, stress)
                do b = 1, size(step)
-                  call add_branch_stress(step(b), c, inverse, body%viscous(:, :, b, k), isochoric, density, power)
+                  call add_branch_stress(step(b), strain, body%viscous(:, :, b, k), stress)
                end do
-               call get_nominal_stress(block%weight, f, root, c, isochoric, mean_stress, stress)
-               if (material%viscosity > 0.0_wp) call add_viscous_stress(material%viscosity, block%weight, f, rate, root, &
-                  stress, power)
-               call add_nodal_forces(block, last, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
-               energy = energy + block%weight*density
-               loss = loss + block%weight*power
-               lowest = merge(jacobian, lowest, jacobian < lowest)
+               call set_nominal_stress(block%weight, strain, stress)
+               if (material%viscosity > 0.0_wp) call add_viscous_stress(material%viscosity, block%weight, strain, stress)
+               call add_nodal_forces(block, last, stress%nominal, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
+               energy = energy + block%weight*stress%density
+               loss = loss + block%weight*stress%power
+               lowest = merge(strain%jacobian, lowest, strain%jacobian < lowest)
             end associate
          end do
       end associate
@@ -156,5 +164,73 @@ contains
       force(0, :, 1) = 0.0_wp
       force(last, :, 1) = 0.0_wp
    end subroutine get_internal_forces
+
+   !> Volume inside a surface of frustums, m3.
+   pure function get_volume(r, z) result(volume)
+      !> Distances of the nodes from the axis, m: [0:n].
+      real(wp), intent(in) :: r(0:)
+      !> Heights of the nodes, from the lowest to the highest pole, m: [0:n].
+      real(wp), intent(in) :: z(0:)
+      real(wp) :: volume
+      integer :: n
+
+      n = ubound(r, 1)
+      volume = pi/3*sum((r(:n - 1)**2 + r(:n - 1)*r(1:) + r(1:)**2)*(z(1:) - z(:n - 1)))
+   end function get_volume
+
+   !> Overpressure of the gas.
+   pure function get_gas_pressure(cavity, volume) result(pressure)
+      type(cavity_type), intent(in) :: cavity
+      !> Volume, above 0, m3.
+      real(wp), intent(in) :: volume
+      !> Pressure above that of the air around the ball, Pa.
+      real(wp) :: pressure
+
+      pressure = cavity%pressure*(cavity%volume/volume)**cavity%exponent - cavity%ambient
+   end function get_gas_pressure
+
+   !> Work that changes the volume from that at first touch, done on the gas and on the air around the ball, J.
+   pure function get_gas_energy(cavity, volume) result(energy)
+      type(cavity_type), intent(in) :: cavity
+      !> Volume, above 0, m3.
+      real(wp), intent(in) :: volume
+      real(wp) :: energy
+      real(wp) :: ratio
+
+      ratio = cavity%volume/volume
+      associate (power => cavity%exponent - 1)
+         if (power > 1.0e-6_wp) then
+            energy = cavity%pressure*cavity%volume*(ratio**power - 1)/power
+         else
+            energy = cavity%pressure*cavity%volume*log(ratio)
+         end if
+      end associate
+      energy = energy + cavity%ambient*(volume - cavity%volume)
+   end function get_gas_energy
+
+   !> Adds the forces of an overpressure: its product with the gradient of the volume.
+   pure subroutine add_gas_forces(pressure, r, z, force_r, force_z)
+      !> Overpressure, Pa.
+      real(wp), intent(in) :: pressure
+      !> Distances of the nodes of the inner surface from the axis, m: [0:n].
+      real(wp), intent(in) :: r(0:)
+      !> Their heights, m: [0:n].
+      real(wp), intent(in) :: z(0:)
+      !> Forces outwards, N: [0:n].
+      real(wp), intent(inout) :: force_r(0:)
+      !> Forces upwards, N: [0:n].
+      real(wp), intent(inout) :: force_z(0:)
+      real(wp) :: scale, area
+      integer :: j
+
+      scale = pressure*pi/3
+      do j = 1, ubound(r, 1)
+         area = r(j - 1)**2 + r(j - 1)*r(j) + r(j)**2
+         force_z(j - 1) = force_z(j - 1) - scale*area
+         force_z(j) = force_z(j) + scale*area
+         force_r(j - 1) = force_r(j - 1) + scale*(2*r(j - 1) + r(j))*(z(j) - z(j - 1))
+         force_r(j) = force_r(j) + scale*(2*r(j) + r(j - 1))*(z(j) - z(j - 1))
+      end do
+   end subroutine add_gas_forces
 
 end module thud_elastic_body

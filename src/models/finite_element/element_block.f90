@@ -13,7 +13,6 @@ module thud_element_block
    use thud_constants, only: pi
    use thud_kinds, only: wp
    use thud_mesh, only: mesh_type
-   use thud_quadrilateral, only: get_gauss_points, get_shape
    implicit none (type, external)
    private
 
@@ -82,11 +81,11 @@ contains
    pure subroutine set_geometry(mesh, block)
       type(mesh_type), intent(in) :: mesh
       type(element_block_type), intent(inout) :: block
-      real(wp) :: point(2), weight(2), value(4), slope(4, 2), jacobian(2, 2), r(4), z(4)
+      real(wp) :: point(2), value(4), slope(4, 2), jacobian(2, 2), r(4), z(4)
       real(wp) :: determinant, radius, volume
       integer :: a, b, g, j
 
-      call get_gauss_points(point, weight)
+      point = [-1, 1]/sqrt(3.0_wp)
       do j = 1, block%n
          associate (line => block%before + j)
             r = reshape(transpose(mesh%r(line - 1:line, block%ring - 1:block%ring)), [4])
@@ -95,12 +94,17 @@ contains
          do b = 1, 2
             do a = 1, 2
                g = a + 2*(b - 1)
-               call get_shape(1, point(a), point(b), value, slope)
+               ! Bilinear shape functions of the nodes, and their derivatives along x and y.
+               associate (x => [1 - point(a), 1 + point(a)]/2, y => [1 - point(b), 1 + point(b)]/2)
+                  value = [x*y(1), x*y(2)]
+                  slope(:, 1) = [-y(1), y(1), -y(2), y(2)]/2
+                  slope(:, 2) = [-x, x]/2
+               end associate
                jacobian(1, :) = matmul(r, slope)
                jacobian(2, :) = matmul(z, slope)
                determinant = jacobian(1, 1)*jacobian(2, 2) - jacobian(1, 2)*jacobian(2, 1)
                radius = dot_product(value, r)
-               volume = 2*pi*radius*abs(determinant)*weight(a)*weight(b)
+               volume = 2*pi*radius*abs(determinant)
                block%map(j, :, g) = [jacobian(2, 2), -jacobian(2, 1), -jacobian(1, 2), jacobian(1, 1)]/(2*determinant)
                block%curvature(j, g) = 1/radius
                block%weight(j + n_element*(g - 1)) = volume

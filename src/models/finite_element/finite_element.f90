@@ -10,19 +10,17 @@ module thud_finite_element
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
-   use thud_impact_run, only: get_energy, get_mean_height, get_mean_velocity, impact_run_type, new_impact_run, &
-      update_position, update_velocity
+   use thud_impact_run, only: get_energy, get_mean_height, get_mean_velocity, get_stable_interval, impact_run_type, &
+      new_impact_run, update_position, update_velocity
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
-   use thud_mesh, only: new_mesh
+   use thud_mesh, only: get_nodal_areas, new_mesh
    use thud_motion, only: start_motion, take_snapshot
-   use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_receiver, only: can_strike, get_pole_count, receiver_type
    use thud_sampling, only: sampling_type
-   use thud_stable_step, only: get_stable_interval
    use thud_text, only: fixed, significant, to_text
    use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
@@ -205,7 +203,7 @@ contains
             //'allowed: at least '//significant(rounded_up*(self%flight_before + contacts%settling_time), 3)//' s')
          return
       end if
-      run = new_impact_run(ball, self, material, drop%gravity, gap, speed, receiver)
+      run = new_impact_run(ball, new_mesh(ball, self%mesh), material, self%contact, drop%gravity, gap, speed, receiver)
       if (self%snapshot_interval > 0.0_wp) then
          allocate (history%motion)
          call start_motion(run%position, get_frame_count(self, sampling), history%motion)
@@ -318,8 +316,7 @@ contains
       real(wp) :: interval, wanted
 
       interval = 1/sampling%sample_rate
-      wanted = interval/(self%step_safety*get_stable_interval(run%body%mesh%r, run%body%mesh%z, run%body%material, &
-         run%contact))
+      wanted = interval/(self%step_safety*get_stable_interval(run%body%mesh, run%body%material, run%contact))
       n_step = max(sampling%substeps, ceiling(min(wanted, 2.0_wp*max_steps)))
       associate (n_node => size(run%position)/2)
          if (n_step <= max_steps .and. real(n_step, wp)*n_sample*n_node <= max_work) return

@@ -8,6 +8,7 @@ module thud_finite_element_options
    use thud_field, only: field_type
    use thud_floor_contact, only: contact_options_type, get_contact_fields, new_floor_contact
    use thud_force_history, only: force_history_type
+   use thud_impact_run, only: get_stable_interval
    use thud_kinds, only: wp
    use thud_material, only: check_material, get_material_fields, material_options_type, material_type, &
       new_material
@@ -15,7 +16,6 @@ module thud_finite_element_options
    use thud_new_field, only: in_group, integer_field, real_field
    use thud_sampling, only: get_sample_count, sampling_type
    use thud_source_model, only: resolution_type, source_model_type
-   use thud_stable_step, only: get_stable_interval
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -182,7 +182,7 @@ contains
       ! The run reports a material that cannot be.
       call new_material(self%material, ball, material, error)
       interval = 1/sampling%sample_rate
-      if (.not. allocated(error)) interval = self%step_safety*get_stable_interval(mesh%r, mesh%z, material, &
+      if (.not. allocated(error)) interval = self%step_safety*get_stable_interval(mesh, material, &
          new_floor_contact(self%contact, ball, mesh))
       time = typical_contact + self%flight_before + self%flight_after
       if (self%bounces > 1) time = sampling%duration

@@ -18,9 +18,8 @@ module thud_floor_contact
    use thud_constants, only: pi
    use thud_field, only: field_type
    use thud_kinds, only: wp
-   use thud_mesh, only: mesh_type
+   use thud_mesh, only: get_nodal_areas, mesh_type
    use thud_new_field, only: real_field
-   use thud_nodal_areas, only: get_nodal_areas
    implicit none (type, external)
    private
 
@@ -102,6 +101,7 @@ contains
       real(wp), intent(out) :: energy
       !> Derivatives of the upward forces with respect to the height of the floor, N/m: [0:n_polar].
       real(wp), intent(out), optional :: stiffness(0:)
+      real(wp), dimension(0:ubound(position, 1)) :: area, depth
       real(wp) :: relative_depth
       integer :: j, n
 
@@ -121,39 +121,17 @@ contains
          end associate
       end do
       if (.not. contact%layer_stiffness > 0.0_wp) return
-      if (present(stiffness)) then
-         where (position(:, 2) < 0.0_wp) stiffness = stiffness + contact%layer_stiffness &
-            *get_nodal_areas(position(:, 1), 0*position(:, 1))
-      end if
-      call add_layer_forces(contact%layer_stiffness, position(:, 1), &
-         max(-position(:, 2), 0.0_wp), force(:, 1), force(:, 2), energy)
-   end subroutine get_contact_forces
-
-   !> Adds the forces of the layer: derivatives of its energy, half of stiffness times area times squared penetration. The
-   !> areas are those of the rings on the floor that belong to the nodes.
-   pure subroutine add_layer_forces(stiffness, r, penetration, outwards, upwards, energy)
-      !> Stiffness per area, N/m3.
-      real(wp), intent(in) :: stiffness
-      !> Distances of the nodes from the axis, m: [0:n_polar].
-      real(wp), intent(in) :: r(0:)
-      !> Depths of the nodes in the layer, 0 above it, m: [0:n_polar].
-      real(wp), intent(in) :: penetration(0:)
-      !> Forces, N: [0:n_polar].
-      real(wp), intent(inout) :: outwards(0:), upwards(0:)
-      !> Energy, J.
-      real(wp), intent(inout) :: energy
-      real(wp) :: area(0:ubound(r, 1))
-      integer :: n
-
-      n = ubound(r, 1)
-      area = get_nodal_areas(r, 0*r)
-      upwards = upwards + stiffness*area*penetration
-      energy = energy + stiffness*dot_product(area, penetration**2)/2
-      associate (inner => r(:n - 2), here => r(1:n - 1), outer => r(2:))
-         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(penetration(1:n - 1)**2*(outer - inner) &
-            + penetration(:n - 2)**2*(2*here + inner) - penetration(2:)**2*(2*here + outer))
+      ! Derivatives of half of stiffness times area times squared depth; the areas are those of rings on the floor.
+      area = get_nodal_areas(position(:, 1), 0*position(:, 1))
+      depth = max(-position(:, 2), 0.0_wp)
+      if (present(stiffness)) stiffness = stiffness + merge(contact%layer_stiffness*area, 0.0_wp, depth > 0.0_wp)
+      force(:, 2) = force(:, 2) + contact%layer_stiffness*area*depth
+      energy = energy + contact%layer_stiffness*dot_product(area, depth**2)/2
+      associate (inner => position(:n - 2, 1), here => position(1:n - 1, 1), outer => position(2:, 1))
+         force(1:n - 1, 1) = -contact%layer_stiffness*pi/6*(depth(1:n - 1)**2*(outer - inner) &
+            + depth(:n - 2)**2*(2*here + inner) - depth(2:)**2*(2*here + outer))
       end associate
-   end subroutine add_layer_forces
+   end subroutine get_contact_forces
 
    !> Upper bound of the stiffness of the floor under each node, N/m: [0:n_polar].
    pure function get_contact_stiffness(contact, r) result(stiffness)

@@ -11,7 +11,7 @@ module thud_mesh
    implicit none (type, external)
    private
 
-   public :: check_mesh, get_element_counts, get_mesh_fields, mesh_options_type, mesh_type, new_mesh
+   public :: check_mesh, get_element_counts, get_mesh_fields, get_nodal_areas, mesh_options_type, mesh_type, new_mesh
 
    !> Relative reduction of the element size around the lowest point, where the contact is, at the inner and at the outer
    !> surface. Elements are larger at the outer surface and reduced more there, since the smallest ones limit the step.
@@ -24,7 +24,8 @@ module thud_mesh
    !> Maximum ratio of the automatic number of elements along a thinner wall to that number.
    real(wp), parameter :: max_factor = 8.0_wp
 
-   !> Minimum number of elements from pole to pole.
+   !> Minimum number of elements through the wall (fewer do not bend as the wall does) and from pole to pole.
+   integer, parameter, public :: min_radial = 2
    integer, parameter :: min_polar = 8
 
    !> Numbers of elements.
@@ -114,5 +115,23 @@ contains
       mesh%r(0, :) = 0.0_wp
       mesh%r(mesh%n_polar, :) = 0.0_wp
    end function new_mesh
+
+   !> Nodal areas of a surface, m2: integrals of the shape functions over the adjacent frustums, as for a pressure: [0:n].
+   pure function get_nodal_areas(r, z) result(area)
+      !> Distances of the nodes from the axis, m: [0:n].
+      real(wp), intent(in) :: r(0:)
+      !> Their heights, m: [0:n].
+      real(wp), intent(in) :: z(0:)
+      real(wp) :: area(0:ubound(r, 1))
+      real(wp) :: width
+      integer :: j
+
+      area = 0.0_wp
+      do j = 1, ubound(r, 1)
+         width = hypot(r(j) - r(j - 1), z(j) - z(j - 1))
+         area(j - 1) = area(j - 1) + pi*width*(2*r(j - 1) + r(j))/3
+         area(j) = area(j) + pi*width*(r(j - 1) + 2*r(j))/3
+      end do
+   end function get_nodal_areas
 
 end module thud_mesh

@@ -69,31 +69,21 @@ contains
       type(moving_floor_type), intent(inout) :: floor
       !> Lengths of the previous step, 0 at the start, and of the present one, s.
       real(wp), intent(in) :: last_interval, interval
-      logical :: same
+      real(wp) :: length(3)
       integer :: i
 
-      same = .not. (abs(last_interval - floor%last_interval) > 0.0_wp .or. abs(interval - floor%interval) > 0.0_wp)
-      if (.not. same) call set_steps(floor, last_interval, interval)
+      if (abs(last_interval - floor%last_interval) > 0.0_wp .or. abs(interval - floor%interval) > 0.0_wp) then
+         floor%last_interval = last_interval
+         floor%interval = interval
+         length([here, after, next]) = last_interval/2 + [0.0_wp, interval/2, interval]
+         do i = 1, 3
+            floor%step(i) = new_receiver_step(floor%receiver, length(i))
+         end do
+      end if
       do i = 1, 3
          floor%free(i) = floor%motion%displacement + get_real_sum(floor%step(i)%displacement, floor%motion%amplitude)
       end do
    end subroutine predict
-
-   !> Steps of given lengths.
-   pure subroutine set_steps(floor, last_interval, interval)
-      type(moving_floor_type), intent(inout) :: floor
-      !> Lengths of the previous and the present step, s.
-      real(wp), intent(in) :: last_interval, interval
-      real(wp) :: length(3)
-      integer :: i
-
-      floor%last_interval = last_interval
-      floor%interval = interval
-      length([here, after, next]) = last_interval/2 + [0.0_wp, interval/2, interval]
-      do i = 1, 3
-         floor%step(i) = new_receiver_step(floor%receiver, length(i))
-      end do
-   end subroutine set_steps
 
    !> Solves for the displacements of a floor at an instant and at the next, by Newton's method within bounds.
    pure subroutine find_floor(floor, contact, mass, position, velocity, guess)
@@ -117,7 +107,7 @@ contains
       do iteration = 1, max_iterations
          floor%displacement = floor%free(here) + floor%step(here)%compliance*force
          floor%stop = floor%free(next) + floor%step(next)%compliance*force
-         call get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
+         call get_reaction(reaction, slope)
          ! The reaction falls as the force rises: the solution lies between the two.
          lower = max(lower, min(force, reaction))
          upper = min(upper, max(force, reaction))
@@ -126,38 +116,37 @@ contains
          force = force + change
          if (force < lower .or. force > upper) force = lower + (upper - lower)/2
       end do
+
+   contains
+
+      !> Reaction of the contact at the displacements of the trial force.
+      pure subroutine get_reaction(reaction, slope)
+         !> The reaction, N; its negative derivative with respect to the trial force, N/N.
+         real(wp), intent(out) :: reaction, slope
+         real(wp), dimension(0:ubound(mass, 1)) :: stiffness
+         real(wp), dimension(0:ubound(mass, 1), 2) :: relative_position, contact_force
+         real(wp) :: energy, span, needed
+         integer :: j
+
+         relative_position(:, 1) = position(:, 1)
+         relative_position(:, 2) = position(:, 2) + floor%displacement
+         call get_contact_forces(contact, relative_position, contact_force, energy, stiffness)
+         reaction = 0.0_wp
+         slope = 0.0_wp
+         span = (floor%last_interval + floor%interval)/2
+         do j = 0, ubound(mass, 1)
+            needed = -((position(j, 2) + floor%stop)/floor%interval + velocity(j))*mass(j)/span
+            if (needed > contact_force(j, 2) .and. .not. contact%layer_stiffness > 0.0_wp) then
+               reaction = reaction + needed
+               slope = slope + floor%step(next)%compliance*mass(j)/(floor%interval*span)
+            else
+               reaction = reaction + contact_force(j, 2)
+               slope = slope + floor%step(here)%compliance*stiffness(j)
+            end if
+         end do
+      end subroutine get_reaction
+
    end subroutine find_floor
-
-   !> Contact reaction at the floor displacements of a trial force.
-   pure subroutine get_contact_reaction(floor, contact, mass, position, velocity, reaction, slope)
-      type(moving_floor_type), intent(in) :: floor
-      type(floor_contact_type), intent(in) :: contact
-      !> As in `find_floor`.
-      real(wp), intent(in) :: mass(0:), position(0:, :), velocity(0:)
-      !> The reaction, N; its negative derivative with respect to the trial force, N/N.
-      real(wp), intent(out) :: reaction, slope
-      real(wp), dimension(0:ubound(mass, 1)) :: stiffness
-      real(wp), dimension(0:ubound(mass, 1), 2) :: relative_position, force
-      real(wp) :: energy, span, needed
-      integer :: j
-
-      relative_position(:, 1) = position(:, 1)
-      relative_position(:, 2) = position(:, 2) + floor%displacement
-      call get_contact_forces(contact, relative_position, force, energy, stiffness)
-      reaction = 0.0_wp
-      slope = 0.0_wp
-      span = (floor%last_interval + floor%interval)/2
-      do j = 0, ubound(mass, 1)
-         needed = -((position(j, 2) + floor%stop)/floor%interval + velocity(j))*mass(j)/span
-         if (needed > force(j, 2) .and. .not. contact%layer_stiffness > 0.0_wp) then
-            reaction = reaction + needed
-            slope = slope + floor%step(next)%compliance*mass(j)/(floor%interval*span)
-         else
-            reaction = reaction + force(j, 2)
-            slope = slope + floor%step(here)%compliance*stiffness(j)
-         end if
-      end do
-   end subroutine get_contact_reaction
 
    !> Advances a floor to the midpoint after an instant.
    pure subroutine advance_floor(floor, force)

@@ -6,9 +6,9 @@
 !> mesh, since nodes three apart share no element.
 module thud_pressed_ball
    use thud_ball, only: ball_type
-   use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume
    use thud_constants, only: pi
-   use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
+   use thud_elastic_body, only: add_gas_forces, body_state_type, cavity_type, elastic_body_type, get_gas_pressure, &
+      get_internal_forces, get_volume, new_elastic_body, no_failure
    use thud_error, only: error_type, numerical_error
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
@@ -19,7 +19,7 @@ module thud_pressed_ball
    implicit none (type, external)
    private
 
-   public :: get_energy, new_pressed_ball, press, pressed_ball_type
+   public :: new_pressed_ball, press, pressed_ball_type
 
    !> Maximum number of iterations for one approach of the plates, and of halvings of a step that does not converge.
    integer, parameter :: max_iterations = 25, max_halvings = 8
@@ -38,9 +38,7 @@ module thud_pressed_ball
 
    !> The ball; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: pressed_ball_type
-      !> The body without gas: the gas, which couples all nodes of the cavity, is treated separately.
       type(elastic_body_type) :: body
-      type(cavity_type) :: cavity
       !> Positions relative to the lower plate, m.
       real(wp), allocatable :: position(:, :, :)
       !> Nodes of the outer surface that lie on the lower and on the upper plate: [0:n_polar, 2].
@@ -49,10 +47,10 @@ module thud_pressed_ball
       real(wp) :: deflection = 0.0_wp
       !> Force on the plates, N.
       real(wp) :: force = 0.0_wp
-      !> Diameter of the undeformed ball, m; force on a node that counts as zero, N.
-      real(wp) :: diameter = 0.0_wp, tolerance = 0.0_wp
-      !> Thickness of the wall and of an element, m.
-      real(wp) :: wall = 0.0_wp, element_thickness = 0.0_wp
+      !> Diameter of the undeformed ball, thickness of the wall and of an element, m.
+      real(wp) :: diameter = 0.0_wp, wall = 0.0_wp, element_thickness = 0.0_wp
+      !> Force on a node that counts as zero, N.
+      real(wp) :: tolerance = 0.0_wp
    end type pressed_ball_type
 
 contains
@@ -60,31 +58,26 @@ contains
    !> The ball at rest between plates that just touch it. The material has its long-term modulus.
    pure function new_pressed_ball(ball, mesh, material) result(pressed)
       type(ball_type), intent(in) :: ball
-      !> Mesh of order 1, whose nodes are moved along the meridians.
+      !> Mesh, whose nodes are moved along the meridians.
       type(mesh_type), intent(in) :: mesh
       type(material_type), intent(in) :: material
       type(pressed_ball_type) :: pressed
       type(material_type) :: relaxed
-      type(mesh_type) :: symmetric
       integer :: n
 
       n = mesh%n_polar
-      symmetric = get_symmetric_mesh(mesh)
       relaxed = material
       relaxed%viscosity = 0.0_wp
       relaxed%branch_modulus = material%branch_modulus(:0)
       relaxed%branch_time = material%branch_time(:0)
-      pressed%body = new_elastic_body(ball, symmetric, relaxed)
-      pressed%cavity = pressed%body%cavity
-      pressed%body%cavity%pressure = 0.0_wp
-      pressed%body%cavity%ambient = 0.0_wp
+      pressed%body = new_elastic_body(ball, get_symmetric_mesh(mesh), relaxed)
       pressed%diameter = 2*ball%outer_radius
       pressed%tolerance = balanced*material%shear_modulus*ball%wall_thickness**2
       pressed%wall = ball%wall_thickness
       pressed%element_thickness = ball%wall_thickness/mesh%n_radial
       allocate (pressed%position(0:n, 0:mesh%n_radial, 2))
-      pressed%position(:, :, 1) = symmetric%r
-      pressed%position(:, :, 2) = symmetric%z + ball%outer_radius
+      pressed%position(:, :, 1) = pressed%body%mesh%r
+      pressed%position(:, :, 2) = pressed%body%mesh%z + ball%outer_radius
       allocate (pressed%touches(0:n, 2), source=.false.)
       pressed%touches(0, 1) = .true.
       pressed%touches(n, 2) = .true.
@@ -167,7 +160,7 @@ contains
       real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force, target, change
       logical :: fixed(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2)
       logical :: touching(0:pressed%body%mesh%n_polar, 2)
-      integer :: iteration, last, plate
+      integer :: iteration, last
       logical :: failed, same
 
       last = pressed%body%mesh%n_radial
@@ -181,17 +174,16 @@ contains
          target = pressed%position
          where (pressed%touches(:, 1)) target(:, last, 2) = 0.0_wp
          where (pressed%touches(:, 2)) target(:, last, 2) = pressed%diameter - pressed%deflection
-         call get_forces(pressed, pressed%position, force, failed)
+         call get_forces(pressed%body, pressed%position, force, failed)
          if (.not. failed) call get_newton_step(pressed, force, fixed, target - pressed%position, change, failed)
          if (failed) return
          pressed%position = pressed%position + change
-         call get_forces(pressed, pressed%position, force, failed)
+         call get_forces(pressed%body, pressed%position, force, failed)
          if (failed) return
-         do plate = 1, 2
-            associate (height => get_heights(pressed, plate), contact_force => merge(-1, 1, plate == 1)*force(:, last, 2))
-               touching(:, plate) = merge(contact_force > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
-            end associate
-         end do
+         associate (z => pressed%position(:, last, 2), top => pressed%diameter - pressed%deflection)
+            touching(:, 1) = merge(force(:, last, 2) < pressed%tolerance, z < 0.0_wp, pressed%touches(:, 1))
+            touching(:, 2) = merge(force(:, last, 2) > -pressed%tolerance, top - z < 0.0_wp, pressed%touches(:, 2))
+         end associate
          same = all(touching .eqv. pressed%touches)
          pressed%touches = touching
          converged = same .and. maxval(abs(force), mask=.not. fixed) < pressed%tolerance
@@ -201,21 +193,10 @@ contains
       pressed%force = -sum(force(:, last, 2), mask=pressed%touches(:, 1))
    end subroutine find_rest
 
-   !> Distances of the nodes of the outer surface from a plate, m: [0:n_polar].
-   pure function get_heights(pressed, plate) result(height)
-      type(pressed_ball_type), intent(in) :: pressed
-      !> 1 for the lower plate, 2 for the upper one.
-      integer, intent(in) :: plate
-      real(wp) :: height(0:pressed%body%mesh%n_polar)
-
-      height = pressed%position(:, pressed%body%mesh%n_radial, 2)
-      if (plate == 2) height = pressed%diameter - pressed%deflection - height
-   end function get_heights
-
    !> Forces of stress and gas on the nodes.
-   pure subroutine get_forces(pressed, position, force, failed)
-      !> The ball; unchanged on return.
-      type(pressed_ball_type), intent(inout) :: pressed
+   pure subroutine get_forces(body, position, force, failed)
+      !> The body, without viscosity; unchanged on return.
+      type(elastic_body_type), intent(inout) :: body
       !> Positions of the nodes, m.
       real(wp), intent(in), contiguous :: position(0:, 0:, :)
       !> Forces, N.
@@ -223,29 +204,10 @@ contains
       !> Whether an element is turned inside out or the cavity is closed.
       logical, intent(out) :: failed
       type(body_state_type) :: state
-      real(wp) :: pressure
 
-      call get_internal_forces(pressed%body, position, 0*position, 1.0_wp, force, state)
+      call get_internal_forces(body, position, 0*position, 1.0_wp, force, state)
       failed = state%failure /= no_failure
-      if (failed) return
-      pressure = get_gas_pressure(pressed%cavity, get_volume(position(:, 0, 1), position(:, 0, 2)))
-      call add_gas_forces(pressure, position(:, 0, 1), position(:, 0, 2), force(:, 0, 1), force(:, 0, 2))
-      force([0, pressed%body%mesh%n_polar], :, 1) = 0.0_wp
    end subroutine get_forces
-
-   !> Energy of the ball.
-   subroutine get_energy(pressed, energy)
-      !> The ball; unchanged on return.
-      type(pressed_ball_type), intent(inout) :: pressed
-      !> Strain energy and work done on the gas, J.
-      real(wp), intent(out) :: energy
-      type(body_state_type) :: state
-      real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force
-
-      call get_internal_forces(pressed%body, pressed%position, 0*pressed%position, 1.0_wp, force, state)
-      energy = state%strain_energy + get_gas_energy(pressed%cavity, get_volume(pressed%position(:, 0, 1), &
-         pressed%position(:, 0, 2)))
-   end subroutine get_energy
 
    !> Change of the positions that balances the forces.
    subroutine get_newton_step(pressed, force, fixed, shift, change, failed)
@@ -262,7 +224,7 @@ contains
       real(wp) :: gradient(0:ubound(force, 1), 0:ubound(force, 2), 2)
       real(wp), allocatable :: band(:, :), solution(:, :)
       integer, allocatable :: pivot(:)
-      real(wp) :: volume, slope, nearby
+      real(wp) :: volume, slope
       integer :: n, width, info
 
       change = 0.0_wp
@@ -279,8 +241,9 @@ contains
          call add_gas_forces(1.0_wp, r, z, gradient(:, 0, 1), gradient(:, 0, 2))
          volume = get_volume(r, z)
       end associate
-      nearby = volume*(1 - sqrt(epsilon(1.0_wp)))
-      slope = (get_gas_pressure(pressed%cavity, volume) - get_gas_pressure(pressed%cavity, nearby))/(volume - nearby)
+      associate (gas => pressed%body%cavity)
+         slope = -gas%exponent*(get_gas_pressure(gas, volume) + gas%ambient)/volume
+      end associate
       solution(:, 1) = in_order(merge(shift, force, fixed))
       solution(:, 2) = in_order(merge(0.0_wp, gradient, fixed))
       call dgbsv(n, width, width, 2, band, size(band, 1), pivot, solution, n, info)
@@ -316,54 +279,42 @@ contains
       !> Whether a trial position has no forces.
       logical, intent(out) :: failed
       real(wp), dimension(0:ubound(fixed, 1), 0:ubound(fixed, 2), 2) :: here, there, moved
-      type(pressed_ball_type) :: held
+      type(elastic_body_type) :: body
       real(wp) :: step
-      integer :: i, j, k, first, second
+      integer :: a, b, c, i, j, k, first, second, row, column
 
       band = 0.0_wp
       step = trial*pressed%element_thickness
-      held = pressed
+      body = pressed%body
       ! A gas whose pressure does not depend on its volume.
-      held%cavity = cavity_type(volume=1.0_wp, exponent=0.0_wp, pressure=get_gas_pressure(pressed%cavity, &
+      body%cavity = cavity_type(volume=1.0_wp, exponent=0.0_wp, pressure=get_gas_pressure(pressed%body%cavity, &
          get_volume(pressed%position(:, 0, 1), pressed%position(:, 0, 2))))
-      call get_forces(held, held%position, here, failed)
+      call get_forces(body, pressed%position, here, failed)
       do k = 1, 2
          do first = 0, 2
             do second = 0, 2
                if (failed) return
-               moved = held%position
+               moved = pressed%position
                moved(first::3, second::3, k) = moved(first::3, second::3, k) + step
-               call get_forces(held, moved, there, failed)
+               call get_forces(body, moved, there, failed)
                there = (here - there)/step
-               do i = second, ubound(fixed, 2), 3
-                  do j = first, ubound(fixed, 1), 3
-                     call add_column(j, i, k)
+               do b = 0, ubound(fixed, 2)
+                  do a = 0, ubound(fixed, 1)
+                     ! The moved node among the neighbors of this one.
+                     j = a - 1 + modulo(first - a + 1, 3)
+                     i = b - 1 + modulo(second - b + 1, 3)
+                     if (j < 0 .or. j > ubound(fixed, 1) .or. i < 0 .or. i > ubound(fixed, 2)) cycle
+                     column = 2*(j*size(fixed, 2) + i) + k
+                     do c = 1, 2
+                        row = 2*(a*size(fixed, 2) + b) + c
+                        band(2*width + 1 + row - column, column) = merge(merge(1.0_wp, 0.0_wp, row == column), &
+                           there(a, b, c), fixed(a, b, c))
+                     end do
                   end do
                end do
             end do
          end do
       end do
-
-   contains
-
-      !> Enters the derivatives with respect to one coordinate.
-      subroutine add_column(line, ring, component)
-         !> Its line, ring and component.
-         integer, intent(in) :: line, ring, component
-         integer :: a, b, c, row, column
-
-         column = 2*(line*size(fixed, 2) + ring) + component
-         do a = max(0, line - 1), min(ubound(fixed, 1), line + 1)
-            do b = max(0, ring - 1), min(ubound(fixed, 2), ring + 1)
-               do c = 1, 2
-                  row = 2*(a*size(fixed, 2) + b) + c
-                  if (.not. fixed(a, b, c)) band(2*width + 1 + row - column, column) = there(a, b, c)
-               end do
-            end do
-         end do
-         if (fixed(line, ring, component)) band(2*width + 1, column) = 1.0_wp
-      end subroutine add_column
-
    end subroutine get_tangent
 
 end module thud_pressed_ball
