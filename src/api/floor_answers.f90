@@ -18,11 +18,11 @@ module thud_floor_answers
    use thud_mobility_fit, only: fit_mobility
    use thud_modal_radiation, only: get_modal_radiation, modal_radiation_type
    use thud_modal_room, only: box_type, get_crossover, get_modal_room, modal_room_type
+   use thud_modes, only: get_mode_values
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
    use thud_request, only: request_type
    use thud_result_bundle, only: add_history, add_room_level
-   use thud_ritz_system, only: get_mode_values
    use thud_room, only: check_below, get_rating_index, get_room_bands, room_level_type, use_standard_positions
    use thud_room_prediction, only: get_area, get_box, get_positions, predict_room
    implicit none (type, external)
@@ -173,8 +173,8 @@ contains
       call bundle%add_array('level', shape(room%level), room%level)
       call bundle%add_array('mean', shape(room%mean), room%mean)
       call bundle%add_array('spread', shape(room%spread), room%spread)
-      call bundle%add_array('floor_energy', [size(ball, 2), 2], [room%floor_input, room%floor_loss])
-      call bundle%add_array('room_energy', [size(ball, 2), 2], [room%room_input, room%room_loss])
+      call bundle%add_array('floor_energy', shape(room%floor_energy), room%floor_energy)
+      call bundle%add_array('room_energy', shape(room%room_energy), room%room_energy)
       call bundle%add_number('floor_modes', real(room%floor_modes, wp))
       call bundle%add_number('room_modes', real(room%room_modes, wp))
       call bundle%add_number('crossover', get_crossover(box))
@@ -254,7 +254,7 @@ contains
       call bundle%add_number('width', modes%stack%width)
       associate (x => request%get_array('x'), y => request%get_array('y'))
          if (size(x) == 0) return
-         call get_mode_values(modes%modes, modes%stack%radiator, x, y, shapes)
+         shapes = get_mode_values(modes%modes, modes%stack%radiator, x, y)
          shapes = shapes(order, :)
          call bundle%add_array('shape', shape(shapes), shapes)
       end associate

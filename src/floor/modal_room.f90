@@ -5,13 +5,13 @@
 module thud_modal_room
    use thud_band, only: band_type
    use thud_constants, only: pi
-   use thud_floor_modes, only: floor_modes_type, get_poles
+   use thud_floor_modes, only: floor_modes_type, get_poles, get_selected_modes
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_kinds, only: wp
    use thud_matrix_product, only: get_product, get_transposed_product
-   use thud_mode_mixing, only: get_mixed, get_mixing, get_unmixed, is_identity, mixing_type
+   use thud_mode_mixing, only: are_mixed, get_mixed, get_unmixed
+   use thud_modes, only: get_mode_sums, get_mode_values
    use thud_plate, only: air_type
-   use thud_ritz_system, only: get_mode_values, get_ranges
    use thud_transform, only: get_signal
    implicit none (type, external)
    private
@@ -71,19 +71,37 @@ module thud_modal_room
       !> Sound pressure, Pa: [n_sample, n_microphone, n_ball], at this many samples per second.
       real(wp), allocatable :: pressure(:, :, :)
       real(wp) :: sample_rate = 0.0_wp
-      !> Energy into and lost by the modes of floor and room for each ball, J: [n_ball].
-      real(wp), allocatable :: floor_input(:), floor_loss(:), room_input(:), room_loss(:)
+      !> Energy into and lost by the modes of floor and room for each ball, J: [n_ball, 2].
+      real(wp), allocatable :: floor_energy(:, :), room_energy(:, :)
       !> Number of modes of floor and room.
       integer :: floor_modes = 0, room_modes = 0
    end type modal_room_type
 
    !> Pairs of half waves and modes of the floor that are coupled with them.
    type :: group_type
-      !> Numbers of the pairs and of the modes: [n_pair], [n_mode].
+      !> Indices of the pairs and of the modes: [n_pair], [n_mode].
       integer, allocatable :: pair(:), mode(:)
-      !> Their coupling, m2/sqrt(kg): [n_mode, n_pair].
-      complex(wp), allocatable :: coupling(:, :)
+      !> Their coupling, m2/sqrt(kg): [n_mode, n_pair]. If it is complex, negative imaginary parts follow the real ones in
+      !> further rows.
+      real(wp), allocatable :: coupling(:, :)
    end type group_type
+
+   !> Floor, room and positions.
+   type :: coupled_type
+      type(floor_modes_type) :: floor
+      !> Squared angular frequencies of the floor's modes with their losses, rad2/s2, and shapes at the balls, 1/sqrt(kg):
+      !> [n_mode], [n_mode, n_ball].
+      complex(wp), allocatable :: pole(:), gain(:, :)
+      type(box_type) :: box
+      !> Frequency of the highest modes of the room, Hz.
+      real(wp) :: highest = 0.0_wp
+      !> Half waves along length and width: [n_pair].
+      integer, allocatable :: lx(:), ly(:)
+      !> Positions of the microphones, m: [3, n_microphone].
+      real(wp), allocatable :: microphone(:, :)
+      !> What is coupled, by the parities of the half waves.
+      type(group_type) :: group(4)
+   end type coupled_type
 
    !> Answers of the room to the volume flow into a pair of half waves along length and width, at some frequencies.
    type :: answers_type
@@ -147,51 +165,55 @@ contains
       type(modal_room_type), intent(out) :: room
       !> Highest mid frequency of a band, Hz (default: the crossover).
       real(wp), intent(in), optional :: max_frequency
-      real(wp), allocatable :: omega(:), decay(:), drive(:, :), coupling(:, :), frequency(:)
-      complex(wp), allocatable :: pole(:), spectrum(:), sound(:, :, :)
-      integer, allocatable :: lx(:), ly(:), kept(:), moving(:)
-      real(wp) :: highest, duration, slowest
+      type(coupled_type) :: coupled
+      real(wp), allocatable :: omega(:), decay(:), frequency(:)
+      complex(wp), allocatable :: spectrum(:), sound(:, :, :)
+      integer, allocatable :: moving(:)
+      real(wp) :: duration, slowest
       integer :: i, j, n_sample, n_line
 
+      coupled%box = box
+      coupled%microphone = microphone
       room%n_band = count(box%bands%center <= get_crossover(box))
       if (present(max_frequency)) room%n_band = count(box%bands%center <= max_frequency)
       ! Bands that the modes of the floor do not reach are statistical.
       room%n_band = min(room%n_band, count(2*pi*box%bands%upper <= min(modes%limit, modes%known_limit)))
       do
          if (room%n_band == 0) exit
-         highest = room_ratio*box%bands(room%n_band)%upper
-         kept = pack([(i, i=1, size(modes%omega))], modes%omega < min(floor_ratio*2*pi*highest, modes%limit))
+         coupled%highest = room_ratio*box%bands(room%n_band)%upper
+         coupled%floor = get_selected_modes(modes, modes%omega < min(floor_ratio*2*pi*coupled%highest, modes%limit))
          ! A floor without modes there answers with its compliance only, which nothing here contains.
-         if (size(kept) == 0) then
+         if (size(coupled%floor%omega) == 0) then
             room%n_band = 0
             exit
          end if
-         pole = get_poles(modes, kept)
-         omega = sqrt(max(pole%re, tiny(1.0_wp)))
-         decay = get_decay(pole)
+         coupled%pole = get_poles(coupled%floor)
+         omega = sqrt(max(coupled%pole%re, tiny(1.0_wp)))
+         decay = get_decay(coupled%pole)
          slowest = max(minval(decay), 1.0_wp)
          ! Modes far below the bands ring longest, but the filters of the bands remove them.
          if (.not. with_pressure) slowest = max(minval(decay, omega > pi*box%bands(1)%lower), slowest)
          duration = 0.5_wp + 6*log(10.0_wp)/min(slowest, 6*log(10.0_wp)/maxval(box%reverberation_time))
-         n_line = int(highest*duration)
-         if (get_room_mode_count(box, highest)*n_line <= max_values) exit
+         n_line = int(coupled%highest*duration)
+         if (get_room_mode_count(box, coupled%highest)*n_line <= max_values) exit
          room%n_band = room%n_band - 1
       end do
       allocate (room%level(room%n_band, size(microphone, 2), size(ball, 2)))
       allocate (room%mean(room%n_band), room%spread(room%n_band))
-      allocate (room%floor_input(size(ball, 2)), room%floor_loss(size(ball, 2)), room%room_input(size(ball, 2)), &
-         room%room_loss(size(ball, 2)), source=0.0_wp)
+      allocate (room%floor_energy(size(ball, 2), 2), room%room_energy(size(ball, 2), 2), source=0.0_wp)
       if (room%n_band == 0) return
-      n_sample = 128*ceiling(sample_ratio*highest*duration/128)
+      n_sample = 128*ceiling(sample_ratio*coupled%highest*duration/128)
       room%sample_rate = n_sample/duration
+      room%floor_modes = size(coupled%pole)
       frequency = [(i, i=1, n_line)]/duration
       spectrum = get_spectrum(force, sample_rate, frequency)
-      call get_pairs(box, highest, lx, ly)
-      call get_coupling(modes, box, kept, lx, ly, coupling)
-      call get_mode_values(modes%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :), drive, kept)
-      room%floor_modes = size(pole)
-      call get_sound(pole, get_mixing(modes%modes, kept), drive, coupling, frequency, spectrum, box, lx, ly, highest, &
-         microphone, with_energies, sound, room)
+      coupled%gain = get_mode_values(coupled%floor%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :))
+      ! Balls on a rigid support move nothing: nobody drops them there.
+      moving = pack([(j, j=1, size(ball, 2))], &
+         maxval(abs(coupled%gain), dim=1) > 1.0e-6_wp*maxval(abs(coupled%gain)))
+      coupled%gain = get_unmixed(coupled%floor%modes%block, coupled%gain)
+      call couple(coupled)
+      call get_sound(coupled, frequency, spectrum, with_energies, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
       if (with_pressure) then
          allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
@@ -201,80 +223,78 @@ contains
             end do
          end do
       end if
-      ! Balls on a rigid support move nothing: nobody drops them there.
-      moving = pack([(j, j=1, size(drive, 2))], maxval(abs(drive), dim=1) > 1.0e-6_wp*maxval(abs(drive)))
       do i = 1, room%n_band
          associate (level => room%level(i, :, moving))
             room%mean(i) = 10*log10(sum(10**(level/10))/size(level))
-            room%spread(i) = sqrt(get_variance(reshape(level, [size(level)])))
+            room%spread(i) = sqrt(sum((level - sum(level)/size(level))**2)/size(level))
          end associate
       end do
    end subroutine get_modal_room
 
-   !> Modes of floor and room that are coupled: by the parities of the half waves.
-   pure function get_groups(lx, ly, coupling) result(group)
-      !> Half waves along length and width: [n_pair].
-      integer, intent(in) :: lx(:), ly(:)
-      !> Coupling of modes and pairs, m2/sqrt(kg): [n_mode, n_pair].
-      complex(wp), intent(in) :: coupling(:, :)
-      type(group_type) :: group(4)
-      integer :: i, k
+   !> Adds the half waves of the room and the modes of the floor that are coupled with them.
+   subroutine couple(coupled)
+      !> Box, floor and highest frequency are set.
+      type(coupled_type), intent(inout) :: coupled
+      complex(wp), allocatable :: coupling(:, :)
+      integer :: i, k, n(2)
 
-      do i = 1, 4
-         group(i)%pair = pack([(k, k=1, size(lx))], 2*mod(lx, 2) + mod(ly, 2) == i - 1)
-         group(i)%mode = pack([(k, k=1, size(coupling, 1))], &
-            maxval(abs(coupling(:, group(i)%pair)), dim=2) > 1.0e-12_wp*maxval(abs(coupling)))
-         group(i)%coupling = coupling(group(i)%mode, group(i)%pair)
-      end do
-   end function get_groups
+      associate (box => coupled%box, modes => coupled%floor%modes, plate => coupled%floor%stack%radiator)
+         n = int(2*coupled%highest*box%sides(1:2)/box%air%sound_speed)
+         coupled%lx = [((i, i=0, n(1)), k=0, n(2))]
+         coupled%ly = [((k, i=0, n(1)), k=0, n(2))]
+         associate (inside => get_mode_frequency(box, coupled%lx, coupled%ly, 0) <= coupled%highest)
+            coupled%lx = pack(coupled%lx, inside)
+            coupled%ly = pack(coupled%ly, inside)
+         end associate
+         associate (lx => coupled%lx, ly => coupled%ly, set => modes%displacement(plate))
+            associate (along => get_line_coupling(set%x, box%corner(1), box%sides(1), maxval(lx)), &
+               across => get_line_coupling(set%y, box%corner(2), box%sides(2), maxval(ly)))
+               coupling = get_unmixed(modes%block, cmplx(get_mode_sums(modes, plate, along(lx + 1, :), across(ly + 1, :)), &
+                  kind=wp))
+            end associate
+            do i = 1, 4
+               associate (group => coupled%group(i))
+                  group%pair = pack([(k, k=1, size(lx))], 2*mod(lx, 2) + mod(ly, 2) == i - 1)
+                  group%mode = pack([(k, k=1, size(coupling, 1))], &
+                     maxval(abs(coupling(:, group%pair)), dim=2) > 1.0e-12_wp*maxval(abs(coupling)))
+                  group%coupling = real(coupling(group%mode, group%pair), wp)
+                  if (any(abs(aimag(coupling(group%mode, group%pair))) > 0.0_wp)) group%coupling = &
+                     reshape([transpose(group%coupling), -transpose(aimag(coupling(group%mode, group%pair)))], &
+                     [2*size(group%mode), size(group%pair)], order=[2, 1])
+               end associate
+            end do
+         end associate
+      end associate
+   end subroutine couple
 
    !> Spectra of the sound at the microphones, and energies of floor and room (Parseval).
-   subroutine get_sound(pole, mixing, drive, coupling, frequency, spectrum, box, lx, ly, highest, microphone, &
-      with_energies, sound, room)
-      !> Squared angular frequencies of the floor's modes with their losses, rad2/s2: [n_mode].
-      complex(wp), intent(in) :: pole(:)
-      !> Their sums of the modes without losses.
-      type(mixing_type), intent(in) :: mixing
-      !> Shapes of the modes without losses at the balls, 1/sqrt(kg): [n_mode, n_ball].
-      real(wp), intent(in) :: drive(:, :)
-      !> Coupling of the pairs of half waves and these modes, m2/sqrt(kg): [n_pair, n_mode].
-      real(wp), intent(in) :: coupling(:, :)
+   subroutine get_sound(coupled, frequency, spectrum, with_energies, sound, room)
+      type(coupled_type), intent(in) :: coupled
       !> Frequencies in equal steps, Hz, and Fourier transform of the force, N s: [n_line].
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: spectrum(:)
-      type(box_type), intent(in) :: box
-      !> Half waves along length and width: [n_pair].
-      integer, intent(in) :: lx(:), ly(:)
-      !> Frequency of the highest modes of the room, Hz.
-      real(wp), intent(in) :: highest
-      !> Positions of the microphones, m: [3, n_microphone].
-      real(wp), intent(in) :: microphone(:, :)
       !> Also compute the energies.
       logical, intent(in) :: with_energies
       !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
       complex(wp), allocatable, intent(out) :: sound(:, :, :)
       type(modal_room_type), intent(inout) :: room
-      complex(wp) :: gain(size(pole), size(drive, 2))
       complex(wp), allocatable :: response(:, :)
       ! For each frequency real parts, then imaginary parts, for each ball or microphone.
       real(wp), allocatable :: flow(:, :), pressure(:, :)
-      type(group_type) :: group(4)
       type(answers_type) :: answers
       integer :: before, i, k, n, n_ball, n_microphone
 
-      n_ball = size(drive, 2)
-      n_microphone = size(microphone, 2)
+      n_ball = size(coupled%gain, 2)
+      n_microphone = size(coupled%microphone, 2)
       allocate (sound(size(frequency), n_microphone, n_ball))
-      gain = get_unmixed(mixing, cmplx(drive, kind=wp))
-      group = get_groups(lx, ly, get_unmixed(mixing, cmplx(transpose(coupling), kind=wp)))
       do before = 0, size(frequency) - 1, chunk_size
          n = min(chunk_size, size(frequency) - before)
          associate (lines => frequency(before + 1:before + n), force => spectrum(before + 1:before + n))
-            call get_answers(box, lx, ly, highest, lines, microphone, answers)
-            response = get_responses(pole, .not. is_identity(mixing), lines, force)
-            allocate (flow(size(lx), 2*n_ball*n))
-            do k = 1, size(group)
-               flow(group(k)%pair, :) = get_flow(group(k), gain, response)
+            call get_answers(coupled, lines, answers)
+            response = get_responses(coupled, lines, force)
+            allocate (flow(size(coupled%lx), 2*n_ball*n))
+            do k = 1, size(coupled%group)
+               flow(coupled%group(k)%pair, :) = get_flow(coupled%group(k), coupled%gain, response)
             end do
             do i = 1, n
                associate (here => flow(:, 2*n_ball*(i - 1) + 1:2*n_ball*i))
@@ -284,12 +304,13 @@ contains
                      pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
                   if (.not. with_energies) cycle
                   associate (energy => 2*frequency(1)*(here(:, :n_ball)**2 + here(:, n_ball + 1:)**2))
-                     room%room_input = room%room_input + matmul(answers%input(:, i), energy)
-                     room%room_loss = room%room_loss + matmul(answers%loss(:, i), energy)
+                     room%room_energy(:, 1) = room%room_energy(:, 1) + matmul(answers%input(:, i), energy)
+                     room%room_energy(:, 2) = room%room_energy(:, 2) + matmul(answers%loss(:, i), energy)
                   end associate
                end associate
             end do
-            if (with_energies) call add_floor_energies(pole, mixing, gain, lines, frequency(1), force, response, room)
+            if (with_energies) room%floor_energy = room%floor_energy &
+               + 2*frequency(1)*get_floor_energies(coupled, lines, force, response)
             deallocate (flow)
          end associate
       end do
@@ -297,25 +318,24 @@ contains
    end subroutine get_sound
 
    !> Velocities of modes per unit of their shape under the force, m s/(s sqrt(kg)): [n_mode, n_line].
-   pure function get_responses(pole, are_mixed, frequency, force) result(response)
-      !> Squared angular frequencies of the modes with their losses, rad2/s2: [n_mode].
-      complex(wp), intent(in) :: pole(:)
-      !> Whether losses mix the modes.
-      logical, intent(in) :: are_mixed
+   pure function get_responses(coupled, frequency, force) result(response)
+      type(coupled_type), intent(in) :: coupled
       !> Frequencies, Hz, and spectrum of the force there, N s: [n_line].
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: force(:)
-      complex(wp) :: response(size(pole), size(frequency))
-      real(wp), dimension(size(pole)) :: decay, difference, loss
+      complex(wp) :: response(size(coupled%pole), size(frequency))
+      real(wp), dimension(size(coupled%pole)) :: decay, difference, loss
+      logical :: is_mixed
       integer :: i
 
-      decay = get_decay(pole)
+      decay = get_decay(coupled%pole)
+      is_mixed = are_mixed(coupled%floor%modes%block)
       do i = 1, size(frequency)
          associate (w => 2*pi*frequency(i))
             ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes
             ! them.
-            loss = merge(pole%im, w*decay, are_mixed)
-            difference = pole%re - w**2
+            loss = merge(coupled%pole%im, w*decay, is_mixed)
+            difference = coupled%pole%re - w**2
             response(:, i) = force(i)*cmplx(0.0_wp, w, wp)*cmplx(difference, -loss, wp)/(difference**2 + loss**2)
          end associate
       end do
@@ -337,86 +357,56 @@ contains
       !> Shapes of the modes at the balls: [n_mode, n_ball]; their velocities per unit of it: [n_mode, n_line].
       complex(wp), intent(in) :: gain(:, :), response(:, :)
       real(wp), allocatable :: flow(:, :)
-      complex(wp) :: velocity(size(group%mode)), here(size(group%mode), size(gain, 2))
+      complex(wp) :: velocity(size(group%mode))
       real(wp), allocatable :: part(:, :, :, :)
-      integer :: i, j, n
-      logical :: is_real
+      integer :: i, j, n, rows
 
       n = size(group%mode)
-      here = gain(group%mode, :)
-      is_real = all(abs(aimag(group%coupling)) <= 0.0_wp)
-      allocate (part(n, size(gain, 2), 2, size(response, 2)))
+      rows = size(group%coupling, 1)
+      allocate (part(rows, size(gain, 2), 2, size(response, 2)))
       do i = 1, size(response, 2)
          do j = 1, size(gain, 2)
-            velocity = here(:, j)*response(group%mode, i)
-            part(:, j, 1, i) = velocity%re
-            part(:, j, 2, i) = velocity%im
+            velocity = gain(group%mode, j)*response(group%mode, i)
+            part(:n, j, 1, i) = velocity%re
+            part(:n, j, 2, i) = velocity%im
+            ! Of a complex coupling.
+            part(n + 1:, j, 1, i) = velocity(:rows - n)%im
+            part(n + 1:, j, 2, i) = -velocity(:rows - n)%re
          end do
       end do
-      flow = get_product_of(real(group%coupling, wp))
-      if (is_real) return
-      ! i*velocity has the parts (-im, re).
-      do i = 1, size(response, 2)
-         associate (re => part(:, :, 1, i), im => part(:, :, 2, i))
-            part(:, :, :, i) = reshape([-im, re], [n, size(gain, 2), 2])
-         end associate
-      end do
-      flow = flow + get_product_of(aimag(group%coupling))
-   contains
-
-      !> The transpose of a matrix times the parts.
-      pure function get_product_of(matrix) result(product)
-         real(wp), intent(in) :: matrix(:, :)
-         real(wp), allocatable :: product(:, :)
-
-         product = get_transposed_product(matrix, reshape(part, [n, size(part(1, :, :, :))]))
-      end function get_product_of
+      flow = get_transposed_product(group%coupling, reshape(part, [rows, size(gain, 2)*2*size(response, 2)]))
    end function get_flow
 
-   !> Adds the energies into the floor and lost by it, J.
-   subroutine add_floor_energies(pole, mixing, gain, frequency, step, force, response, room)
-      complex(wp), intent(in) :: pole(:)
-      type(mixing_type), intent(in) :: mixing
-      !> Shapes of the modes at the balls: [n_mode, n_ball].
-      complex(wp), intent(in) :: gain(:, :)
-      !> Frequencies and their step, Hz, and spectrum of the force there, N s: [n_line].
+   !> Sums over frequencies of the powers into the floor and lost by it per mean-square force, J s: [n_ball, 2].
+   pure function get_floor_energies(coupled, frequency, force, response) result(energy)
+      type(coupled_type), intent(in) :: coupled
+      !> Frequencies, Hz, and spectrum of the force there, N s: [n_line].
       real(wp), intent(in) :: frequency(:)
-      real(wp), intent(in) :: step
       complex(wp), intent(in) :: force(:)
-      !> Velocities of the modes per unit of `gain`: [n_mode, n_line].
+      !> Velocities of the modes per unit of their shape under the force: [n_mode, n_line].
       complex(wp), intent(in) :: response(:, :)
-      type(modal_room_type), intent(inout) :: room
-      complex(wp), dimension(size(pole), size(gain, 2)) :: stressed, velocity
+      real(wp) :: energy(size(coupled%gain, 2), 2)
+      complex(wp), dimension(size(coupled%pole), size(coupled%gain, 2)) :: stressed, velocity
       integer :: i, j
 
-      room%floor_input = room%floor_input + 2*step*real(matmul(matmul(response, conjg(force)), gain**2), wp)
-      if (is_identity(mixing)) then
-         room%floor_loss = room%floor_loss &
-            + 2*step*matmul(get_decay(pole)*sum(response%re**2 + response%im**2, dim=2), gain%re**2)
-         return
-      end if
-      ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
-      do i = 1, size(frequency)
-         do j = 1, size(gain, 2)
-            velocity(:, j) = gain(:, j)*response(:, i)
-            stressed(:, j) = pole*velocity(:, j)
+      associate (pole => coupled%pole, gain => coupled%gain, blocks => coupled%floor%modes%block)
+         energy(:, 1) = real(matmul(matmul(response, conjg(force)), gain**2), wp)
+         if (.not. are_mixed(blocks)) then
+            energy(:, 2) = matmul(get_decay(pole)*sum(response%re**2 + response%im**2, dim=2), gain%re**2)
+            return
+         end if
+         ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
+         energy(:, 2) = 0.0_wp
+         do i = 1, size(frequency)
+            velocity = gain*spread(response(:, i), 2, size(gain, 2))
+            stressed = get_mixed(blocks, spread(pole, 2, size(gain, 2))*velocity)
+            velocity = get_mixed(blocks, velocity)
+            do j = 1, size(gain, 2)
+               energy(j, 2) = energy(j, 2) + aimag(dot_product(velocity(:, j), stressed(:, j)))/(2*pi*frequency(i))
+            end do
          end do
-         velocity = get_mixed(mixing, velocity)
-         stressed = get_mixed(mixing, stressed)
-         do j = 1, size(gain, 2)
-            room%floor_loss(j) = room%floor_loss(j) &
-               + 2*step*aimag(dot_product(velocity(:, j), stressed(:, j)))/(2*pi*frequency(i))
-         end do
-      end do
-   end subroutine add_floor_energies
-
-   !> Mean-square deviation from the mean.
-   pure function get_variance(values) result(variance)
-      real(wp), intent(in) :: values(:)
-      real(wp) :: variance
-
-      variance = sum((values - sum(values)/size(values))**2)/size(values)
-   end function get_variance
+      end associate
+   end function get_floor_energies
 
    !> Number of modes of a room below a frequency, about.
    pure function get_room_mode_count(box, frequency) result(count)
@@ -451,23 +441,6 @@ contains
       end do
    end function get_spectrum
 
-   !> Pairs of half waves along length and width of a room's modes below a frequency.
-   pure subroutine get_pairs(box, highest, lx, ly)
-      type(box_type), intent(in) :: box
-      real(wp), intent(in) :: highest
-      integer, allocatable, intent(out) :: lx(:), ly(:)
-      integer :: n(2)
-      integer :: i, j
-
-      n = int(2*highest*box%sides(1:2)/box%air%sound_speed)
-      lx = [((i, i=0, n(1)), j=0, n(2))]
-      ly = [((j, i=0, n(1)), j=0, n(2))]
-      associate (inside => get_mode_frequency(box, lx, ly, 0) <= highest)
-         lx = pack(lx, inside)
-         ly = pack(ly, inside)
-      end associate
-   end subroutine get_pairs
-
    !> Natural frequency of a mode of the room, Hz.
    elemental function get_mode_frequency(box, lx, ly, lz) result(frequency)
       type(box_type), intent(in) :: box
@@ -487,42 +460,7 @@ contains
       cosine = cos(pi*spread(real(half_waves, wp), 2, size(position))*spread(position, 1, size(half_waves)))
    end function get_cosines
 
-   !> Integrals over the ceiling of the shapes of the radiating plate times those of the room, m2/sqrt(kg): [n_pair, n_mode].
-   subroutine get_coupling(modes, box, kept, lx, ly, coupling)
-      type(floor_modes_type), intent(in) :: modes
-      type(box_type), intent(in) :: box
-      !> Numbers of the modes: [n_mode].
-      integer, intent(in) :: kept(:)
-      integer, intent(in) :: lx(:), ly(:)
-      real(wp), allocatable, intent(out) :: coupling(:, :)
-      real(wp), allocatable :: along(:, :), across(:, :), product(:, :)
-      integer :: range(2, size(modes%modes%block))
-      integer :: i, j, k, n
-
-      associate (radiator => modes%modes%displacement(modes%stack%radiator))
-         along = get_line_coupling(radiator%x, box%corner(1), box%sides(1), maxval(lx))
-         across = get_line_coupling(radiator%y, box%corner(2), box%sides(2), maxval(ly))
-      end associate
-      allocate (coupling(size(lx), size(kept)))
-      range = get_ranges(modes%modes, kept)
-      n = 0
-      do i = 1, size(modes%modes%block)
-         if (range(2, i) < range(1, i)) cycle
-         associate (shape => modes%modes%block(i)%shape(modes%stack%radiator), n_mode => range(2, i) - range(1, i) + 1)
-            allocate (product(size(lx), size(shape%x)*size(shape%y)))
-            do j = 1, size(shape%y)
-               do k = 1, size(shape%x)
-                  product(:, (j - 1)*size(shape%x) + k) = along(lx + 1, shape%x(k))*across(ly + 1, shape%y(j))
-               end do
-            end do
-            coupling(:, n + 1:n + n_mode) = get_product(product, shape%coefficient(:, range(1, i):range(2, i)))
-            deallocate (product)
-            n = n + n_mode
-         end associate
-      end do
-   end subroutine get_coupling
-
-   !> Integrals of functions times cos(l pi x/side) over a side of the room, sqrt(m): [0:last, count].
+   !> Integrals of functions times cos(l pi x/side) over a side of the room, sqrt(m): [last + 1, count].
    pure function get_line_coupling(set, corner, side, last) result(coupling)
       type(function_set_type), intent(in) :: set
       !> Beginning of the side and its length, m.
@@ -538,69 +476,49 @@ contains
          get_functions(set, point, 0)*spread(weight, 2, set%count))
    end function get_line_coupling
 
-   !> Reverberation time at a frequency: that of the nearest band, s.
-   pure function get_reverberation_time(box, frequency) result(time)
-      type(box_type), intent(in) :: box
-      real(wp), intent(in) :: frequency
-      real(wp) :: time
-
-      time = box%reverberation_time(minloc(abs(log(max(frequency, 1.0_wp)/box%bands%center)), dim=1))
-   end function get_reverberation_time
-
    !> Answers to the volume flow into pairs of half waves: sums over the half waves along the height of the amplitudes
    !> rho0 c0**2/(V norm) i w/(w_r**2 - w**2 + i w 6 ln 10/T).
-   subroutine get_answers(box, lx, ly, highest, frequency, microphone, answers)
-      type(box_type), intent(in) :: box
-      integer, intent(in) :: lx(:), ly(:)
-      !> Frequency of the highest modes, Hz.
-      real(wp), intent(in) :: highest
+   subroutine get_answers(coupled, frequency, answers)
+      type(coupled_type), intent(in) :: coupled
       !> Frequencies, Hz: [n_line].
       real(wp), intent(in) :: frequency(:)
-      !> Positions of the microphones, m: [3, n_microphone].
-      real(wp), intent(in) :: microphone(:, :)
       type(answers_type), intent(out) :: answers
-      real(wp), allocatable :: shape(:, :), height(:)
-      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(microphone, 2))
-      real(wp) :: natural, decay
+      real(wp), allocatable :: shape(:, :)
+      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(coupled%microphone, 2))
+      real(wp) :: natural, decay, stiffness
       integer :: i, j, k, n
 
-      n = size(microphone, 2)
-      allocate (answers%pressure(2*n, size(lx), size(frequency)))
-      allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
-      shape = get_cosines(lx, microphone(1, :)/box%sides(1))*get_cosines(ly, microphone(2, :)/box%sides(2))
-      height = microphone(3, :)/box%sides(3)
-      do i = 1, size(lx)
-         k = 0
-         pressure = 0.0_wp
-         do
-            natural = get_mode_frequency(box, lx(i), ly(i), k)
-            if (natural > highest) exit
-            answers%n_mode = answers%n_mode + 1
-            decay = 6*log(10.0_wp)/get_reverberation_time(box, natural)
-            associate (w => 2*pi*frequency, stiffness => get_modal_stiffness(box, lx(i), ly(i), k))
+      n = size(coupled%microphone, 2)
+      associate (box => coupled%box, lx => coupled%lx, ly => coupled%ly, w => 2*pi*frequency, &
+         height => coupled%microphone(3, :)/coupled%box%sides(3))
+         allocate (answers%pressure(2*n, size(lx), size(frequency)))
+         allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
+         shape = get_cosines(lx, coupled%microphone(1, :)/box%sides(1))*get_cosines(ly, coupled%microphone(2, :)/box%sides(2))
+         do i = 1, size(lx)
+            k = 0
+            pressure = 0.0_wp
+            do
+               natural = get_mode_frequency(box, lx(i), ly(i), k)
+               if (natural > coupled%highest) exit
+               answers%n_mode = answers%n_mode + 1
+               ! The reverberation time of the nearest band.
+               decay = 6*log(10.0_wp)/box%reverberation_time(minloc(abs(log(max(natural, 1.0_wp)/box%bands%center)), dim=1))
+               ! rho0 c0**2/(V norm), Pa/m3: the norm is the mean-square shape.
+               stiffness = box%air%density*box%air%sound_speed**2/product(box%sides)*2**count([lx(i), ly(i), k] > 0)
                amplitude = stiffness*cmplx(0.0_wp, w, wp)/cmplx((2*pi*natural)**2 - w**2, w*decay, wp)
                answers%input(i, :) = answers%input(i, :) + amplitude%re
                answers%loss(i, :) = answers%loss(i, :) + (amplitude%re**2 + amplitude%im**2)*decay/stiffness
-            end associate
-            ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
-            do j = 1, n
-               pressure(:, j) = pressure(:, j) + (-1)**k*cos(k*pi*height(j))*shape(i, j)*amplitude
+               ! The floor is at the top of the room: the shape cos(k pi z/H) has the sign (-1)**k there.
+               do j = 1, n
+                  pressure(:, j) = pressure(:, j) + (-1)**k*cos(k*pi*height(j))*shape(i, j)*amplitude
+               end do
+               k = k + 1
             end do
-            k = k + 1
+            answers%pressure(:n, i, :) = transpose(pressure%re)
+            answers%pressure(n + 1:, i, :) = transpose(pressure%im)
          end do
-         answers%pressure(:n, i, :) = transpose(pressure%re)
-         answers%pressure(n + 1:, i, :) = transpose(pressure%im)
-      end do
+      end associate
    end subroutine get_answers
-
-   !> rho0 c0**2/(V norm) of a mode of the room with its mean-square shape as norm, Pa/m3.
-   pure function get_modal_stiffness(box, lx, ly, lz) result(stiffness)
-      type(box_type), intent(in) :: box
-      integer, intent(in) :: lx, ly, lz
-      real(wp) :: stiffness
-
-      stiffness = box%air%density*box%air%sound_speed**2/product(box%sides)*2**count([lx, ly, lz] > 0)
-   end function get_modal_stiffness
 
    !> Maximum Fast levels of sounds in bands.
    subroutine get_levels(bands, frequency, sound, sample_rate, n_sample, level)

@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgbsv, dgeev, dgels, dgemm, dgetf2, dgetrs, dposv, dpotrf, dstevr
+   public :: dgbsv, dgeev, dgels, dgemm, dgetf2, dgetrs, dposv, dpotrf, dpstrf, dstevr
    public :: dsygvd, dsygvx, dtrsm, zgeev
 
    interface
@@ -64,6 +64,18 @@ module thud_lapack
          real(wp), intent(inout) :: a(lda, *)
          integer, intent(out) :: info
       end subroutine dpotrf
+
+      !> Cholesky factor of a positive semidefinite matrix, with complete pivoting.
+      pure subroutine dpstrf(uplo, n, a, lda, piv, rank, tol, work, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(wp), intent(in) :: tol
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: piv(*), rank, info
+         real(wp), intent(out) :: work(*)
+      end subroutine dpstrf
 
       !> Matrix times matrix.
       pure subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)

@@ -9,14 +9,14 @@ module thud_floor_modes
    use thud_plate, only: air_type, get_total_loss, plate_type
    use thud_plate_stack, only: get_resolved_frequency, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
-   use thud_ritz_system, only: get_mode_values, mode_block_type, modes_type
+   use thud_modes, only: get_mode_values, get_some_modes, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
    use thud_text, only: to_text
    use thud_truncated_compliance, only: get_truncated_compliance
    implicit none (type, external)
    private
 
-   public :: floor_modes_type, get_floor_modes, get_mode_limit, get_poles, new_floor_receiver
+   public :: floor_modes_type, get_floor_modes, get_mode_limit, get_poles, get_selected_modes, new_floor_receiver
 
    !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
    !> omits 0.3 (f/mode_limit)**3 of the mobility of the infinite plate at a frequency f: 0.4 % at 707 Hz.
@@ -151,24 +151,36 @@ contains
       block%loss_factor = block%loss_factor + block%bearing_share*added
    end subroutine add_bearing_losses
 
-   !> Squared angular frequencies with their losses, omega**2 (1 + i eta), of mixed modes, rad2/s2: [n_mode].
-   pure function get_poles(modes, kept) result(pole)
+   !> Some of the modes of a floor.
+   pure function get_selected_modes(modes, is_selected) result(selected)
       type(floor_modes_type), intent(in) :: modes
-      !> Numbers of the modes as in `get_ranges`.
-      integer, intent(in) :: kept(:)
-      complex(wp) :: pole(size(kept))
-      complex(wp), allocatable :: all_poles(:)
+      !> [n_mode].
+      logical, intent(in) :: is_selected(:)
+      type(floor_modes_type) :: selected
+
+      selected%stack = modes%stack
+      selected%modes = get_some_modes(modes%modes, is_selected)
+      selected%omega = pack(modes%omega, is_selected)
+      selected%loss_factor = pack(modes%loss_factor, is_selected)
+      selected%limit = modes%limit
+      selected%sum_limit = modes%sum_limit
+      selected%known_limit = modes%known_limit
+   end function get_selected_modes
+
+   !> Squared angular frequencies with their losses, omega**2 (1 + i eta), of mixed modes, rad2/s2: [n_mode].
+   pure function get_poles(modes) result(pole)
+      type(floor_modes_type), intent(in) :: modes
+      complex(wp) :: pole(size(modes%omega))
       integer :: i, n
 
-      all_poles = modes%omega**2*cmplx(1.0_wp, modes%loss_factor, wp)
+      pole = modes%omega**2*cmplx(1.0_wp, modes%loss_factor, wp)
       n = 0
       do i = 1, size(modes%modes%block)
          associate (block => modes%modes%block(i))
-            if (allocated(block%pole)) all_poles(n + 1:n + size(block%pole)) = block%pole
+            if (allocated(block%pole)) pole(n + 1:n + size(block%pole)) = block%pole
             n = n + size(block%omega)
          end associate
       end do
-      pole = all_poles(kept)
    end function get_poles
 
    !> Whether a plate yields in shear: its waves are short, and many functions gain little.
@@ -203,7 +215,7 @@ contains
       has_all = .not. (is_uncoupled(modes%stack) .or. has_shear(modes%stack))
       associate (length => modes%stack%length, width => modes%stack%width, omega => modes%omega, &
          set => modes%modes%displacement(1))
-         call get_mode_values(modes%modes, 1, length*[source(1), point(1)], width*[source(2), point(2)], value)
+         value = get_mode_values(modes%modes, 1, length*[source(1), point(1)], width*[source(2), point(2)])
          gain = value(:, 1)*value(:, 2)
          individual = omega < modes%limit
          ! The mean mobility alone would take up too little energy: there would be no resonance.

@@ -9,15 +9,16 @@
 module thud_modal_radiation
    use thud_band, only: band_type
    use thud_constants, only: pi
-   use thud_coupled_modes, only: coupled_modes_type, get_coupled_modes, get_diagonal, new_part, part_type
-   use thud_floor_modes, only: floor_modes_type, get_poles
+   use thud_floor_modes, only: floor_modes_type, get_poles, get_selected_modes
+   use thud_function_set, only: get_overlap
    use thud_kinds, only: wp
-   use thud_mode_mixing, only: get_mixed, get_mixing, get_row, get_unmixed, is_identity, mixing_type
+   use thud_lapack, only: dpstrf
+   use thud_matrix_product, only: get_product
+   use thud_mode_mixing, only: are_mixed, get_mixed, get_unmixed
+   use thud_modes, only: get_integrals, get_merged_shape, get_mode_values, mode_block_type, modes_type, overlap_type, &
+      product_type, shape_type
    use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
-   use thud_plate_shapes, only: get_coefficients, get_shapes, get_squares, get_weighted, shapes_type
-   use thud_ritz_system, only: get_mode_values
-   use thud_wave_transforms, only: get_pair_powers, get_powers, get_some, get_transforms, new_wave_series, &
-      transforms_type, wave_series_type
+   use thud_wave_transforms, only: get_powers, get_transforms, new_wave_series, transforms_type, wave_series_type
    implicit none (type, external)
    private
 
@@ -29,9 +30,6 @@ module thud_modal_radiation
    !> Smallest loss factor and angular frequency, rad/s, of a mode: without losses a resonance has no mean.
    real(wp), parameter :: min_loss_factor = 1.0e-6_wp, min_omega = 1.0_wp
 
-   !> Relative error of mean squares by the amplitudes that represent them.
-   real(wp), parameter :: mean_error = 1.0e-4_wp
-
    !> Modes up to this ratio of frequencies take part in a band, and all modes up to this angular frequency, rad/s.
    real(wp), parameter :: max_ratio = 2.5_wp, min_highest = 2*pi*500.0_wp
 
@@ -39,6 +37,12 @@ module thud_modal_radiation
    !> frequencies to the band take part.
    integer, parameter :: max_modes = 2000, max_coupled = 200
    real(wp), parameter :: near_ratio = 1.3_wp
+
+   !> Orthonormal functions whose product has a smaller integral over a part are orthogonal there, but for rounding.
+   real(wp), parameter :: rounding = 1.0e-9_wp
+
+   !> Modes whose products have a smaller mean than this, relative to their squares, are orthogonal.
+   real(wp), parameter :: max_overlap = 0.05_wp
 
    !> Answer of a floor to a force at its mean position above the room, per band.
    type :: modal_radiation_type
@@ -54,6 +58,28 @@ module thud_modal_radiation
       !> Energy of the bearing plate beyond the room over that above the room: [n_band].
       real(wp), allocatable :: energy_beyond(:)
    end type modal_radiation_type
+
+   !> Part of the floor above the room.
+   type :: part_type
+      !> Area, m2.
+      real(wp) :: area = 0.0_wp
+      !> Integrals over the part, of the plate under the source and of the bearing plate.
+      type(overlap_type) :: struck, bearing
+   end type part_type
+
+   !> Modes whose shapes have products with a mean at the strike points.
+   type :: coupled_modes_type
+      type(mode_block_type), allocatable :: block(:)
+      !> Squared angular frequencies with their losses, omega**2 (1 + i eta), rad2/s2: [n_mode].
+      complex(wp), allocatable :: pole(:)
+      !> Shapes of the radiating plate.
+      type(shape_type) :: radiator
+      !> Means G over the strike points, and integrals over the bearing plate and its part above the room, of products of
+      !> shapes: [n_mode, n_mode].
+      real(wp), allocatable :: drive(:, :), velocity(:, :), above(:, :)
+      !> Means of products of different shapes vanish, and losses mix no modes.
+      logical :: is_orthogonal = .false.
+   end type coupled_modes_type
 
    !> Integrals over angular frequencies: radiated power over rho0 c0, squared velocity times area of the bearing plate and
    !> of its part above the room, m4/s2 rad/s, and 1, rad/s.
@@ -77,52 +103,35 @@ contains
       type(modal_radiation_type), intent(out) :: radiation
       !> Strike points, relative to length and width (default: the mean over the part above the room): [2, n].
       real(wp), intent(in), optional :: stated_strike(:, :)
+      type(floor_modes_type) :: selected
       type(wave_series_type) :: along, across
-      type(shapes_type) :: radiator
       type(part_type) :: part
       type(sums_type) :: sums
-      real(wp), allocatable :: drive(:, :)
-      complex(wp), allocatable :: pole(:)
-      type(mixing_type) :: mixing
-      integer, allocatable :: kept(:)
       real(wp) :: highest
       logical :: couples_all
       integer :: i
 
       allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
       allocate (radiation%radiated(size(bands)), radiation%energy_beyond(size(bands)))
-      allocate (radiation%upper_factor(size(bands)))
-      if (size(bands) == 0) return
-      highest = 2*pi*maxval(bands%upper)/air%sound_speed
-      part = new_part(modes, area)
-      couples_all = all([area(2) - area(1), area(4) - area(3)] &
-         < [modes%stack%length, modes%stack%width]*(1 - 1.0e-9_wp))
-      associate (displacement => modes%modes%displacement(modes%stack%radiator))
-         along = new_wave_series(displacement%x, area(1:2), highest)
-         across = new_wave_series(displacement%y, area(3:4), highest)
-      end associate
+      if (size(bands) > 0) then
+         highest = 2*pi*maxval(bands%upper)/air%sound_speed
+         part = new_part(modes, area)
+         couples_all = all([area(2) - area(1), area(4) - area(3)] &
+            < [modes%stack%length, modes%stack%width]*(1 - 1.0e-9_wp))
+         associate (displacement => modes%modes%displacement(modes%stack%radiator))
+            along = new_wave_series(displacement%x, area(1:2), highest)
+            across = new_wave_series(displacement%y, area(3:4), highest)
+         end associate
+      end if
       do i = 1, size(bands)
-         kept = get_participating(modes, bands(i), merge(max_coupled, max_modes, couples_all))
-         pole = get_poles(modes, kept)
-         pole%re = max(pole%re, min_omega**2)
-         pole%im = max(pole%im, min_loss_factor*pole%re)
-         mixing = get_mixing(modes%modes, kept)
-         radiator = get_shapes(modes, modes%stack%radiator, kept)
-         if (present(stated_strike)) then
-            call get_mode_values(modes%modes, 1, modes%stack%length*stated_strike(1, :), &
-               modes%stack%width*stated_strike(2, :), drive, kept)
-            call add_strikes(radiator, get_shapes(modes, modes%stack%bearing, kept), part, pole, mixing, drive, air, &
-               bands(i), get_some(along, radiator%x), get_some(across, radiator%y), sums)
-         else
-            call add_modes(get_coupled_modes(modes, part, radiator, kept, mixing), pole, air, bands(i), &
-               get_some(along, radiator%x), get_some(across, radiator%y), sums)
-         end if
+         selected = get_selected_modes(modes, take_part(modes, bands(i), merge(max_coupled, max_modes, couples_all)))
+         sums = get_sums(get_coupled_modes(selected, part, stated_strike), air, bands(i), along, across)
          if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) then
             ! A plate without modes there, or without resolved or known ones.
             radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
             radiation%conductance(i) = 1/get_resistance(plate)
             radiation%radiated(i) = 0.0_wp
-            radiation%energy_beyond(i) = part%whole/part%area - 1
+            radiation%energy_beyond(i) = modes%stack%length*modes%stack%width/part%area - 1
             cycle
          end if
          radiation%radiation_factor(i) = sums%power/sums%above
@@ -137,153 +146,205 @@ contains
       if (modes%stack%radiator /= modes%stack%bearing) radiation%upper_factor = get_plate_radiation(plate, air, bands%center)
    end subroutine get_modal_radiation
 
-   !> Numbers of the modes that take part in a band: all up to `max_ratio`, or, if these are too many, those near the band.
-   !> Modes of plates above each other with one number of half waves stay together, as their motions cancel.
-   pure function get_participating(modes, band, max_count) result(kept)
+   !> Whether modes take part in a band: all up to `max_ratio`, or, if these are too many, those near the band. Modes of
+   !> plates above each other with one number of half waves stay together, as their motions cancel.
+   pure function take_part(modes, band, max_count) result(yes)
       type(floor_modes_type), intent(in) :: modes
       type(band_type), intent(in) :: band
       !> Number of modes above which fewer take part.
       integer, intent(in) :: max_count
-      integer, allocatable :: kept(:)
-      logical :: is_kept(size(modes%omega))
-      integer :: i, k, n
+      logical :: yes(size(modes%omega))
+      integer :: i, n
 
-      is_kept = modes%omega < min(modes%limit, max(max_ratio*2*pi*band%upper, min_highest))
-      if (count(is_kept) > max_count) then
-         is_kept = is_kept .and. modes%omega > 2*pi*band%lower/near_ratio .and. modes%omega < 2*pi*band%upper*near_ratio
-         n = 0
-         do i = 1, size(modes%modes%block)
-            associate (n_mode => size(modes%modes%block(i)%omega))
-               if (n_mode <= size(modes%stack%plate)) is_kept(n + 1:n + n_mode) = any(is_kept(n + 1:n + n_mode)) &
-                  .and. modes%omega(n + 1:n + n_mode) < modes%limit
-               n = n + n_mode
-            end associate
-         end do
-      end if
-      kept = pack([(k, k=1, size(is_kept))], is_kept)
-   end function get_participating
-
-   !> Integrals over the frequencies of a band and means over strike points, with the cross terms of the modes.
-   subroutine add_strikes(radiator, bearing, part, pole, mixing, drive, air, band, along, across, sums)
-      !> Shapes of the radiating and of the bearing plate.
-      type(shapes_type), intent(in) :: radiator, bearing
-      type(part_type), intent(in) :: part
-      !> Squared angular frequencies with their losses, omega**2 (1 + i eta), rad2/s2: [n_mode].
-      complex(wp), intent(in) :: pole(:)
-      type(mixing_type), intent(in) :: mixing
-      !> Shapes at the strike points, 1/sqrt(kg): [n_mode, n_strike].
-      real(wp), intent(in) :: drive(:, :)
-      type(air_type), intent(in) :: air
-      type(band_type), intent(in) :: band
-      !> Transforms of the functions of x and of y.
-      type(wave_series_type), intent(in) :: along, across
-      type(sums_type), intent(out) :: sums
-      type(transforms_type) :: transforms
-      real(wp), allocatable :: amplitude(:, :), coefficient(:, :), weight(:, :)
-      real(wp) :: edge(2)
-      integer :: j, k
-
-      weight = reshape([get_squares(radiator), get_squares(bearing)], [size(pole), 2])
-      do j = 1, n_wavenumber
-         edge = get_interval(band, j)
-         call get_amplitudes(pole, mixing, drive, weight, 2*pi*edge, amplitude)
-         sums%width = sums%width + 2*pi*(edge(2) - edge(1))*size(drive, 2)
-         ! The functions are orthonormal.
-         call get_coefficients(bearing, amplitude, coefficient)
-         sums%velocity = sums%velocity + sum(coefficient**2)
-         sums%above = sums%above + sum(coefficient*get_weighted(coefficient, bearing%x, bearing%y, part%bearing))
-         call get_coefficients(radiator, amplitude, coefficient)
-         transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
-         sums%power = sums%power + sum(get_powers(transforms, [(k, k=1, size(radiator%x))], [(k, k=1, size(radiator%y))], &
-            coefficient))
-      end do
-   end subroutine add_strikes
-
-   !> Amplitudes of the modes whose squares and products add up to those of the responses to forces, integrated over
-   !> frequencies.
-   !>
-   !> With r_k = omega/(pole_k - omega**2), the integral of r_k conjg(r_l) is (F_k - conjg(F_l))/(conjg(pole_l) - pole_k), F
-   !> being that of pole/(pole - omega**2). The amplitudes are the columns of a Cholesky factor of these integrals, the
-   !> largest rest first, until the rest matters no more: far from their resonances, modes move alike at all frequencies.
-   subroutine get_amplitudes(pole, mixing, drive, weight, edge, amplitude)
-      !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
-      complex(wp), intent(in) :: pole(:)
-      type(mixing_type), intent(in) :: mixing
-      !> Shapes under the forces, 1/sqrt(kg): [n_mode, n_force].
-      real(wp), intent(in) :: drive(:, :)
-      !> Weights of the squared amplitudes in the sums that are wanted: [n_mode, n_sum].
-      real(wp), intent(in) :: weight(:, :)
-      !> Lowest and highest angular frequency, rad/s.
-      real(wp), intent(in) :: edge(2)
-      !> The amplitudes, (rad/s)**(1/2) m/(N s) sqrt(kg): [n_mode, n].
-      real(wp), allocatable, intent(out) :: amplitude(:, :)
-      complex(wp) :: integral(size(pole)), gain(size(pole), size(drive, 2))
-      real(wp), dimension(size(pole)) :: rest, share
-      real(wp), allocatable :: factor(:, :)
-      integer :: j, k, n
-
-      integral = get_integral(pole, edge(1), edge(2))
-      gain = get_unmixed(mixing, cmplx(drive, kind=wp))
-      rest = [(get_square(j), j=1, size(pole))]
-      share = 0.0_wp
-      do k = 1, size(weight, 2)
-         share = share + weight(:, k)/max(sum(weight(:, k)*rest), tiny(1.0_wp))
-      end do
-      allocate (factor(size(pole), size(pole)))
+      yes = modes%omega < min(modes%limit, max(max_ratio*2*pi*band%upper, min_highest))
+      if (count(yes) <= max_count) return
+      yes = yes .and. modes%omega > 2*pi*band%lower/near_ratio .and. modes%omega < 2*pi*band%upper*near_ratio
       n = 0
-      do while (n < size(pole))
-         if (sum(share*rest) <= mean_error) exit
-         j = maxloc(share*rest, dim=1)
-         factor(:, n + 1) = (get_products(j) - matmul(factor(:, :n), factor(j, :n)))/sqrt(rest(j))
-         n = n + 1
-         rest = max(rest - factor(:, n)**2, 0.0_wp)
-         rest(j) = 0.0_wp
+      do i = 1, size(modes%modes%block)
+         associate (n_mode => size(modes%modes%block(i)%omega))
+            if (n_mode <= size(modes%stack%plate)) yes(n + 1:n + n_mode) = any(yes(n + 1:n + n_mode)) &
+               .and. modes%omega(n + 1:n + n_mode) < modes%limit
+            n = n + n_mode
+         end associate
       end do
-      amplitude = factor(:, :n)
+   end function take_part
+
+   !> Part of a floor above a room.
+   function new_part(modes, area) result(part)
+      type(floor_modes_type), intent(in) :: modes
+      !> Its ends along length and width, m.
+      real(wp), intent(in) :: area(4)
+      type(part_type) :: part
+
+      part%area = (area(2) - area(1))*(area(4) - area(3))
+      if (part%area > modes%stack%length*modes%stack%width*(1 - 1.0e-9_wp)) return
+      associate (displacement => modes%modes%displacement)
+         part%struck = new_overlap(displacement(1))
+         part%bearing = new_overlap(displacement(modes%stack%bearing))
+      end associate
    contains
 
-      !> Integral of the squared response of a mode.
-      pure function get_square(number) result(square)
-         integer, intent(in) :: number
-         real(wp) :: square
-         complex(wp), allocatable :: weight(:)
-         integer :: k, first
+      !> Integrals over the part.
+      function new_overlap(set) result(overlap)
+         type(product_type), intent(in) :: set
+         type(overlap_type) :: overlap
 
-         call get_row(mixing, number, first, weight)
-         associate (of => [(k, k=first, first + size(weight) - 1)])
-            square = real(sum([(weight(k)*sum(get_cross_integrals(of(k), of)*conjg(weight) &
-               *matmul(conjg(gain(of, :)), gain(of(k), :))), k=1, size(weight))]), wp)
+         allocate (overlap%x, source=get_overlap(set%x, 0, set%x, 0, area(1), area(2)))
+         allocate (overlap%y, source=get_overlap(set%y, 0, set%y, 0, area(3), area(4)))
+      end function new_overlap
+   end function new_part
+
+   !> Modes in sets whose shapes have products with a mean at the strike points.
+   function get_coupled_modes(modes, part, stated_strike) result(coupled)
+      type(floor_modes_type), intent(in) :: modes
+      type(part_type), intent(in) :: part
+      !> Strike points, relative to length and width (default: the mean over the part): [2, n].
+      real(wp), intent(in), optional :: stated_strike(:, :)
+      type(coupled_modes_type), allocatable :: coupled(:)
+      type(shape_type) :: bearing
+      complex(wp), allocatable :: pole(:)
+      integer, allocatable :: set(:), members(:)
+      integer :: last(0:size(modes%modes%block))
+      integer :: i, j, k
+
+      pole = get_poles(modes)
+      pole%re = max(pole%re, min_omega**2)
+      pole%im = max(pole%im, min_loss_factor*pole%re)
+      last(0) = 0
+      do i = 1, size(modes%modes%block)
+         last(i) = last(i - 1) + size(modes%modes%block(i)%omega)
+      end do
+      if (present(stated_strike)) then
+         set = spread(1, 1, size(modes%modes%block))
+      else
+         set = get_sets(modes%modes, part%struck)
+      end if
+      allocate (coupled(maxval([0, set])))
+      do i = 1, size(coupled)
+         members = pack([(k, k=1, size(set))], set == i)
+         bearing = get_merged_shape(modes%modes, modes%stack%bearing, members)
+         associate (these => coupled(i))
+            these%block = modes%modes%block(members)
+            these%pole = pole([([(j, j=last(members(k) - 1) + 1, last(members(k)))], k=1, size(members))])
+            these%radiator = get_merged_shape(modes%modes, modes%stack%radiator, members)
+            if (present(stated_strike)) then
+               associate (shape => get_mode_values(modes%modes, 1, modes%stack%length*stated_strike(1, :), &
+                  modes%stack%width*stated_strike(2, :)))
+                  these%drive = matmul(shape, transpose(shape))/size(shape, 2)
+               end associate
+            else
+               these%drive = get_integrals(get_merged_shape(modes%modes, 1, members), part%struck)/part%area
+            end if
+            these%velocity = get_integrals(bearing, overlap_type())
+            these%above = these%velocity
+            if (allocated(part%bearing%x)) these%above = get_integrals(bearing, part%bearing)
+            these%is_orthogonal = are_orthogonal(these%drive) .and. .not. are_mixed(these%block)
          end associate
-      end function get_square
+      end do
+   end function get_coupled_modes
 
-      !> Integrals of the products of the responses of all modes with that of one: [n_mode].
-      pure function get_products(number) result(product)
-         integer, intent(in) :: number
-         real(wp) :: product(size(pole))
-         complex(wp) :: unmixed(size(pole), 1)
-         complex(wp), allocatable :: weight(:)
-         integer :: i, k, first
+   !> Whether shapes are orthogonal, from the means of their products.
+   pure function are_orthogonal(mean) result(yes)
+      real(wp), intent(in) :: mean(:, :)
+      logical :: yes
+      integer :: i
 
-         call get_row(mixing, number, first, weight)
-         unmixed = 0.0_wp
-         do k = 1, size(weight)
-            associate (l => first + k - 1)
-               unmixed(:, 1) = unmixed(:, 1) + conjg(weight(k)*get_cross_integrals(l, [(i, i=1, size(pole))])) &
-                  *matmul(gain, conjg(gain(l, :)))
+      yes = .true.
+      associate (norm => sqrt([(mean(i, i), i=1, size(mean, 1))]))
+         do i = 2, size(norm)
+            yes = yes .and. all(abs(mean(:i - 1, i)) <= max_overlap*norm(i)*norm(:i - 1))
+         end do
+      end associate
+   end function are_orthogonal
+
+   !> Index of the set of each block: blocks with functions that are not orthogonal belong to one. Over the whole floor,
+   !> each block has its own: [n_block].
+   pure function get_sets(modes, overlap) result(set)
+      type(modes_type), intent(in) :: modes
+      !> Integrals over the strike points of products of the functions of the plate under the source.
+      type(overlap_type), intent(in) :: overlap
+      integer :: set(size(modes%block))
+      integer :: i, j, n
+
+      set = [(i, i=1, size(set))]
+      if (.not. allocated(overlap%x)) return
+      do i = 2, size(set)
+         do j = 1, i - 1
+            if (set(i) == set(j)) cycle
+            associate (one => modes%block(i)%shape(1), other => modes%block(j)%shape(1))
+               if (any(abs(overlap%x(one%x, other%x)) > rounding) .and. any(abs(overlap%y(one%y, other%y)) > rounding)) &
+                  where (set == max(set(i), set(j))) set = min(set(i), set(j))
             end associate
          end do
-         product = real(reshape(get_mixed(mixing, unmixed), [size(pole)]), wp)
-      end function get_products
+      end do
+      ! Indices without gaps.
+      n = 0
+      do i = 1, size(set)
+         if (set(i) /= i) cycle
+         n = n + 1
+         where (set == i) set = -n
+      end do
+      set = -set
+   end function get_sets
 
-      !> Integrals of r_k conjg(r_l) of one mode k and others l.
-      pure function get_cross_integrals(one, others) result(cross)
-         integer, intent(in) :: one
-         integer, intent(in) :: others(:)
-         complex(wp) :: cross(size(others))
+   !> Integrals over the frequencies of a band, averaged over the strike points.
+   function get_sums(coupled, air, band, along, across) result(sums)
+      type(coupled_modes_type), intent(in) :: coupled(:)
+      type(air_type), intent(in) :: air
+      type(band_type), intent(in) :: band
+      !> Transforms of the functions of x and of y of the radiating plate.
+      type(wave_series_type), intent(in) :: along, across
+      type(sums_type) :: sums
+      type(transforms_type) :: transforms
+      type(shape_type) :: motion
+      real(wp), allocatable :: response(:, :)
+      real(wp) :: edge(2)
+      integer :: i, j, n_x, n_y
 
-         cross = (integral(one) - conjg(integral(others)))/(conjg(pole(others)) - pole(one))
-      end function get_cross_integrals
-   end subroutine get_amplitudes
+      n_x = maxval([(maxval(coupled(i)%radiator%x), i=1, size(coupled))])
+      n_y = maxval([(maxval(coupled(i)%radiator%y), i=1, size(coupled))])
+      do j = 1, n_wavenumber
+         edge = band%lower*(band%upper/band%lower)**([j - 1, j]/real(n_wavenumber, wp))
+         sums%width = sums%width + 2*pi*(edge(2) - edge(1))
+         if (size(coupled) == 0) cycle
+         transforms = get_transforms(along, across, n_x, n_y, 2*pi*sqrt(product(edge))/air%sound_speed)
+         do i = 1, size(coupled)
+            response = get_responses(coupled(i), 2*pi*edge)
+            sums%velocity = sums%velocity + sum(response*coupled(i)%velocity)
+            sums%above = sums%above + sum(response*coupled(i)%above)
+            motion = coupled(i)%radiator
+            motion%coefficient = get_product(motion%coefficient, get_factor(response, coupled(i)%is_orthogonal))
+            sums%power = sums%power + sum(get_powers(transforms, motion))
+         end do
+      end do
+   end function get_sums
+
+   !> Columns whose products with themselves add up to a matrix, [n, at most n]: motions that radiate apart.
+   pure function get_factor(matrix, is_diagonal) result(factor)
+      !> Positive semidefinite: [n, n].
+      real(wp), intent(in) :: matrix(:, :)
+      !> Of the matrix, only the diagonal counts.
+      logical, intent(in) :: is_diagonal
+      real(wp), allocatable :: factor(:, :)
+      real(wp) :: lower(size(matrix, 1), size(matrix, 1)), work(2*size(matrix, 1))
+      integer :: pivot(size(matrix, 1))
+      integer :: i, n, rank, info
+
+      n = size(matrix, 1)
+      allocate (factor(n, n), source=0.0_wp)
+      if (is_diagonal) then
+         do i = 1, n
+            factor(i, i) = sqrt(matrix(i, i))
+         end do
+         return
+      end if
+      lower = matrix
+      call dpstrf('L', n, lower, n, pivot, rank, -1.0_wp, work, info)
+      do i = 1, rank
+         factor(pivot(i:), i) = lower(i:, i)
+      end do
+      factor = factor(:, :rank)
+   end function get_factor
 
    !> Integral of pole/(pole - omega**2) over angular frequencies.
    elemental function get_integral(pole, low, high) result(integral)
@@ -298,75 +359,32 @@ contains
       end associate
    end function get_integral
 
-   !> Lowest and highest frequency of one of `n_wavenumber` parts of a band, Hz.
-   pure function get_interval(band, number) result(edge)
-      type(band_type), intent(in) :: band
-      integer, intent(in) :: number
-      real(wp) :: edge(2)
-
-      edge = band%lower*(band%upper/band%lower)**([number - 1, number]/real(n_wavenumber, wp))
-   end function get_interval
-
-   !> Integrals over the frequencies of a band, averaged over the strike points.
-   subroutine add_modes(coupled, pole, air, band, along, across, sums)
-      type(coupled_modes_type), intent(in) :: coupled(:)
-      !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
-      complex(wp), intent(in) :: pole(:)
-      type(air_type), intent(in) :: air
-      type(band_type), intent(in) :: band
-      !> Transforms of the functions of x and of y.
-      type(wave_series_type), intent(in) :: along, across
-      type(sums_type), intent(out) :: sums
-      type(transforms_type) :: transforms
-      real(wp), allocatable :: response(:, :)
-      real(wp) :: edge(2)
-      integer :: i, j
-
-      do j = 1, n_wavenumber
-         edge = get_interval(band, j)
-         sums%width = sums%width + 2*pi*(edge(2) - edge(1))
-         transforms = get_transforms(along, across, 2*pi*sqrt(product(edge))/air%sound_speed)
-         do i = 1, size(coupled)
-            associate (these => coupled(i))
-               response = get_responses(pole(these%mode), these%mixing, these%drive, 2*pi*edge)
-               sums%velocity = sums%velocity + sum(response*these%velocity)
-               sums%above = sums%above + sum(response*these%above)
-               if (these%is_orthogonal) then
-                  sums%power = sums%power + sum(get_diagonal(response) &
-                     *get_powers(transforms, these%radiator%x, these%radiator%y, these%radiator%coefficient))
-               else
-                  sums%power = sums%power + sum(response*get_pair_powers(transforms, these%radiator))
-               end if
-            end associate
-         end do
-      end do
-   end subroutine add_modes
-
    !> Integrals over frequencies and means over strike points of products of the responses of modes, rad/s (m/(N s))**2 kg:
    !> [n_mode, n_mode].
-   pure function get_responses(pole, mixing, drive, edge) result(response)
-      !> Squared angular frequencies with their losses, rad2/s2: [n_mode].
-      complex(wp), intent(in) :: pole(:)
-      type(mixing_type), intent(in) :: mixing
-      !> Means of products of shapes over the strike points, 1/kg: [n_mode, n_mode].
-      real(wp), intent(in) :: drive(:, :)
+   !>
+   !> With r_k = omega/(pole_k - omega**2), the integral of r_k conjg(r_l) is (F_k - conjg(F_l))/(conjg(pole_l) - pole_k), F
+   !> being that of pole/(pole - omega**2).
+   pure function get_responses(modes, edge) result(response)
+      type(coupled_modes_type), intent(in) :: modes
       !> Lowest and highest angular frequency, rad/s.
       real(wp), intent(in) :: edge(2)
-      real(wp) :: response(size(pole), size(pole))
-      complex(wp) :: integral(size(pole)), product(size(pole), size(pole))
+      real(wp) :: response(size(modes%pole), size(modes%pole))
+      complex(wp) :: integral(size(modes%pole)), product(size(modes%pole), size(modes%pole))
       integer :: i
 
-      integral = get_integral(pole, edge(1), edge(2))
-      do i = 1, size(pole)
-         product(:, i) = (integral - conjg(integral(i)))/(conjg(pole(i)) - pole)
-      end do
-      if (is_identity(mixing)) then
-         response = drive*real(product, wp)
+      associate (pole => modes%pole)
+         integral = get_integral(pole, edge(1), edge(2))
+         do i = 1, size(pole)
+            product(:, i) = (integral - conjg(integral(i)))/(conjg(pole(i)) - pole)
+         end do
+      end associate
+      if (.not. are_mixed(modes%block)) then
+         response = modes%drive*real(product, wp)
          return
       end if
       ! With the matrix W: W (product * (W' G W)) W', where ' is the conjugate transpose.
-      product = product*get_unmixed(mixing, get_hermitian(get_unmixed(mixing, cmplx(drive, kind=wp))))
-      response = real(get_mixed(mixing, get_hermitian(get_mixed(mixing, product))), wp)
+      product = product*get_unmixed(modes%block, get_hermitian(get_unmixed(modes%block, cmplx(modes%drive, kind=wp))))
+      response = real(get_mixed(modes%block, get_hermitian(get_mixed(modes%block, product))), wp)
    end function get_responses
 
    !> Conjugate transpose of a matrix.

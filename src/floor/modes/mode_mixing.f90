@@ -6,28 +6,15 @@
 module thud_mode_mixing
    use thud_kinds, only: wp
    use thud_lapack, only: zgeev
-   use thud_ritz_system, only: get_ranges, modes_type
+   use thud_modes, only: mode_block_type
    implicit none (type, external)
    private
 
-   public :: diagonalize, get_mixed, get_mixing, get_row, get_unmixed, is_identity, mixing_type
+   public :: are_mixed, diagonalize, get_mixed, get_unmixed
 
    !> Relative shift of the squared frequencies that separates equal poles; for two equal poles with one shape W does not
    !> exist.
    real(wp), parameter :: separation = 1.0e-9_wp
-
-   !> The matrix W of the modes of one block.
-   type :: mixing_block_type
-      !> Number of modes.
-      integer :: count = 0
-      !> The matrix: [count, count]; not allocated if each mode stands for itself.
-      complex(wp), allocatable :: weight(:, :)
-   end type mixing_block_type
-
-   !> The matrix W of some modes, block after block.
-   type :: mixing_type
-      type(mixing_block_type), allocatable :: block(:)
-   end type mixing_type
 
 contains
 
@@ -62,102 +49,48 @@ contains
       end do
    end subroutine diagonalize
 
-   !> Mixing of some modes.
-   pure function get_mixing(modes, kept) result(mixing)
-      type(modes_type), intent(in) :: modes
-      !> Numbers of the modes as in `get_ranges`: [n_mode].
-      integer, intent(in) :: kept(:)
-      type(mixing_type) :: mixing
-      integer :: range(2, size(modes%block))
-      integer :: i, n
-
-      range = get_ranges(modes, kept)
-      allocate (mixing%block(count(range(2, :) > 0)))
-      n = 0
-      do i = 1, size(modes%block)
-         if (range(2, i) == 0) cycle
-         n = n + 1
-         associate (first => range(1, i), last => range(2, i))
-            mixing%block(n)%count = last - first + 1
-            if (allocated(modes%block(i)%mixing)) mixing%block(n)%weight = modes%block(i)%mixing(first:last, first:last)
-         end associate
-      end do
-   end function get_mixing
-
-   !> A row of W within the block of its mode.
-   pure subroutine get_row(mixing, number, first, weight)
-      type(mixing_type), intent(in) :: mixing
-      !> Number of the mode.
-      integer, intent(in) :: number
-      !> Number of the first mode of the block, or of the mode if it stands for itself.
-      integer, intent(out) :: first
-      !> The row from there on: [count].
-      complex(wp), allocatable, intent(out) :: weight(:)
-      integer :: i
-
-      first = 1
-      i = 1
-      do while (number >= first + mixing%block(i)%count)
-         first = first + mixing%block(i)%count
-         i = i + 1
-      end do
-      if (allocated(mixing%block(i)%weight)) then
-         weight = mixing%block(i)%weight(number - first + 1, :)
-      else
-         first = number
-         weight = [(1.0_wp, 0.0_wp)]
-      end if
-   end subroutine get_row
-
-   !> Whether each mode stands for itself.
-   pure function is_identity(mixing) result(yes)
-      type(mixing_type), intent(in) :: mixing
+   !> Whether losses mix some modes.
+   pure function are_mixed(blocks) result(yes)
+      type(mode_block_type), intent(in) :: blocks(:)
       logical :: yes
       integer :: i
 
-      yes = .not. any([(allocated(mixing%block(i)%weight), i=1, size(mixing%block))])
-   end function is_identity
+      yes = any([(allocated(blocks(i)%mixing), i=1, size(blocks))])
+   end function are_mixed
 
    !> W times a matrix: [n_mode, n].
-   pure function get_mixed(mixing, values) result(mixed)
-      type(mixing_type), intent(in) :: mixing
+   pure function get_mixed(blocks, values) result(mixed)
+      type(mode_block_type), intent(in) :: blocks(:)
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: mixed(size(values, 1), size(values, 2))
+      integer :: i, n
 
-      mixed = get_product(mixing, values, .false.)
+      mixed = values
+      n = 0
+      do i = 1, size(blocks)
+         associate (last => n + size(blocks(i)%omega))
+            if (allocated(blocks(i)%mixing)) mixed(n + 1:last, :) = matmul(blocks(i)%mixing, values(n + 1:last, :))
+            n = last
+         end associate
+      end do
    end function get_mixed
 
    !> The transpose of W times a matrix: [n_mode, n].
-   pure function get_unmixed(mixing, values) result(unmixed)
-      type(mixing_type), intent(in) :: mixing
+   pure function get_unmixed(blocks, values) result(unmixed)
+      type(mode_block_type), intent(in) :: blocks(:)
       complex(wp), intent(in) :: values(:, :)
       complex(wp) :: unmixed(size(values, 1), size(values, 2))
+      integer :: i, n
 
-      unmixed = get_product(mixing, values, .true.)
-   end function get_unmixed
-
-   !> W or its transpose times a matrix: [n_mode, n].
-   pure function get_product(mixing, values, transposed) result(product)
-      type(mixing_type), intent(in) :: mixing
-      complex(wp), intent(in) :: values(:, :)
-      logical, intent(in) :: transposed
-      complex(wp) :: product(size(values, 1), size(values, 2))
-      integer :: i, before
-
-      product = values
-      before = 0
-      do i = 1, size(mixing%block)
-         associate (block => mixing%block(i), first => before + 1, last => before + mixing%block(i)%count)
-            if (.not. allocated(block%weight)) then
-               continue
-            else if (transposed) then
-               product(first:last, :) = matmul(transpose(block%weight), values(first:last, :))
-            else
-               product(first:last, :) = matmul(block%weight, values(first:last, :))
-            end if
+      unmixed = values
+      n = 0
+      do i = 1, size(blocks)
+         associate (last => n + size(blocks(i)%omega))
+            if (allocated(blocks(i)%mixing)) unmixed(n + 1:last, :) = matmul(transpose(blocks(i)%mixing), &
+               values(n + 1:last, :))
+            n = last
          end associate
-         before = before + mixing%block(i)%count
       end do
-   end function get_product
+   end function get_unmixed
 
 end module thud_mode_mixing

@@ -4,25 +4,17 @@
 !> The matrices couple only some functions (of the same number for simply supported plates, of the same symmetry for
 !> symmetric ones). The system falls into blocks of functions that are coupled, which are solved one by one.
 module thud_ritz_system
-   use thud_function_set, only: function_set_type, get_functions
    use thud_kinds, only: wp
    use thud_lapack, only: dposv, dsygvd
    use thud_matrix_product, only: get_product, get_transposed_product
+   use thud_modes, only: mode_block_type, modes_type, product_type
    implicit none (type, external)
    private
 
-   public :: add_displacement, add_mass, add_stiffness, get_mode_values, get_ranges, mode_block_type, modes_type
-   public :: product_type, ritz_system_type, solve_ritz_system
+   public :: add_displacement, add_mass, add_stiffness, ritz_system_type, solve_ritz_system
 
    !> A matrix entry below this fraction of the largest one in its row or column is rounding.
    real(wp), parameter :: rounding = 1.0e-11_wp
-
-   !> Functions of x and y whose products make up a displacement or a rotation.
-   type :: product_type
-      type(function_set_type) :: x, y
-      !> The displacement has no mass; it follows the others statically.
-      logical :: is_static = .false.
-   end type product_type
 
    !> A part of the energy: half the double sum of coefficients times x times y.
    type :: term_type
@@ -48,34 +40,6 @@ module thud_ritz_system
    type :: members_type
       integer, allocatable :: number(:)
    end type members_type
-
-   !> One displacement in the modes of a block.
-   type :: shape_type
-      !> Numbers of the functions of x and y: [n_x], [n_y].
-      integer, allocatable :: x(:), y(:)
-      !> Coefficients of their products, x first: [n_x*n_y, n_mode].
-      real(wp), allocatable :: coefficient(:, :)
-   end type shape_type
-
-   !> Modes of a block, normalized to a modal mass of 1 kg.
-   type :: mode_block_type
-      !> Angular frequencies, ascending, rad/s, loss factors, and fractions of the energy in the bearing plate: [n_mode].
-      real(wp), allocatable :: omega(:), loss_factor(:), bearing_share(:)
-      !> Stiffness times loss factor, and stiffness of the bearing plate, rad2/s2, of the lower modes: [n, n]; not allocated
-      !> if all parts have one loss factor, and if all belong to the bearing plate.
-      real(wp), allocatable :: damping(:, :), bearing(:, :)
-      !> Squared angular frequencies with their losses, rad2/s2, of modes with losses as sums of these modes, and the matrix
-      !> of the sums (`thud_mode_mixing`): [n_mode], [n_mode, n_mode]; not allocated if the modes remain as they are.
-      complex(wp), allocatable :: pole(:), mixing(:, :)
-      !> Shapes of the displacements; not allocated for static ones: [n_displacement].
-      type(shape_type), allocatable :: shape(:)
-   end type mode_block_type
-
-   !> Modes of a system, block after block.
-   type :: modes_type
-      type(product_type), allocatable :: displacement(:)
-      type(mode_block_type), allocatable :: block(:)
-   end type modes_type
 
 contains
 
@@ -458,71 +422,5 @@ contains
       failed = info /= 0
       omega = sqrt(max(omega, 0.0_wp))
    end subroutine get_eigenmodes
-
-   !> First and last of some modes in each block, 1 and 0 if there is none: [2, n_block].
-   pure function get_ranges(modes, kept) result(range)
-      type(modes_type), intent(in) :: modes
-      !> Numbers of the modes, block after block: ascending, and consecutive in each block.
-      integer, intent(in) :: kept(:)
-      integer :: range(2, size(modes%block))
-      integer :: i, before, n
-
-      before = 0
-      n = 0
-      do i = 1, size(modes%block)
-         associate (n_mode => size(modes%block(i)%omega))
-            range(:, i) = [1, 0]
-            do while (n < size(kept))
-               if (kept(n + 1) > before + n_mode) exit
-               n = n + 1
-               if (range(2, i) == 0) range(1, i) = kept(n) - before
-               range(2, i) = kept(n) - before
-            end do
-            before = before + n_mode
-         end associate
-      end do
-   end function get_ranges
-
-   !> Values of a displacement of modes at points, block after block: [n_mode, n_point].
-   subroutine get_mode_values(modes, displacement, x, y, value, kept)
-      type(modes_type), intent(in) :: modes
-      !> Number of the displacement.
-      integer, intent(in) :: displacement
-      !> Coordinates of the points, m: [n_point].
-      real(wp), intent(in) :: x(:), y(:)
-      !> Values, 1/sqrt(kg).
-      real(wp), allocatable, intent(out) :: value(:, :)
-      !> Numbers of the modes as in `get_ranges` (default: all).
-      integer, intent(in), optional :: kept(:)
-      real(wp), allocatable :: at_x(:, :), at_y(:, :), product(:, :)
-      integer :: range(2, size(modes%block))
-      integer :: i, j, k, l, n
-
-      associate (set => modes%displacement(displacement))
-         allocate (at_x, source=get_functions(set%x, x, 0))
-         allocate (at_y, source=get_functions(set%y, y, 0))
-      end associate
-      range(1, :) = 1
-      range(2, :) = [(size(modes%block(i)%omega), i=1, size(modes%block))]
-      if (present(kept)) range = get_ranges(modes, kept)
-      allocate (value(sum(range(2, :) - range(1, :) + 1), size(x)))
-      n = 0
-      do i = 1, size(modes%block)
-         if (range(2, i) < range(1, i)) cycle
-         associate (shape => modes%block(i)%shape(displacement), n_mode => range(2, i) - range(1, i) + 1)
-            if (allocated(product)) deallocate (product)
-            allocate (product(size(shape%x)*size(shape%y), size(x)))
-            do j = 1, size(x)
-               do k = 1, size(shape%y)
-                  do l = 1, size(shape%x)
-                     product((k - 1)*size(shape%x) + l, j) = at_x(j, shape%x(l))*at_y(j, shape%y(k))
-                  end do
-               end do
-            end do
-            value(n + 1:n + n_mode, :) = get_transposed_product(shape%coefficient(:, range(1, i):range(2, i)), product)
-            n = n + n_mode
-         end associate
-      end do
-   end subroutine get_mode_values
 
 end module thud_ritz_system

@@ -9,8 +9,8 @@ module thud_sampled_modes
    use thud_function_set, only: function_set_type, new_splines
    use thud_kinds, only: wp
    use thud_mode_table, only: mode_table_type, read_mode_table
+   use thud_modes, only: product_type
    use thud_plate_stack, only: orthotropic_type
-   use thud_ritz_system, only: product_type
    implicit none (type, external)
    private
 

@@ -6,10 +6,10 @@ module thud_stack_modes
       new_polynomials, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
+   use thud_modes, only: modes_type, product_type
    use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, has_sines, &
       layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
-   use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, modes_type, product_type, ritz_system_type, &
-      solve_ritz_system
+   use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, ritz_system_type, solve_ritz_system
    implicit none (type, external)
    private
 
