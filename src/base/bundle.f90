@@ -9,12 +9,10 @@ module thud_bundle
 
    public :: bundle_type, retrieve, store
 
-   !> A number or an array, in `values` or in `cube`.
+   !> A number or an array.
    type :: item_type
-      !> The numbers, in Fortran's array order: [n].
-      real(wp), allocatable :: values(:)
-      !> A large array, moved here instead of copied: [:, :, :].
-      real(wp), allocatable :: cube(:, :, :)
+      !> The numbers, in Fortran's array order: [:, :, :].
+      real(wp), allocatable :: values(:, :, :)
    end type item_type
 
    !> Texts and arrays, each with its name.
@@ -56,9 +54,7 @@ contains
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: value
 
-      call add_line(self, name, '')
-      call new_item(self)
-      self%items(self%n_item)%values = [value]
+      call self%add_array(name, [integer ::], [value])
    end subroutine add_number
 
    !> Adds an array of any rank.
@@ -71,7 +67,7 @@ contains
 
       call add_line(self, name, get_form(extents))
       call new_item(self)
-      self%items(self%n_item)%values = values(:product(extents))
+      self%items(self%n_item)%values = reshape(values(:product(extents)), [product(extents), 1, 1])
    end subroutine add_array
 
    !> Adds an array of rank 3 without copying it.
@@ -83,7 +79,7 @@ contains
 
       call add_line(self, name, get_form(shape(values)))
       call new_item(self)
-      call move_alloc(values, self%items(self%n_item)%cube)
+      call move_alloc(values, self%items(self%n_item)%values)
    end subroutine move_array
 
    !> Extents of an array as in the header.
@@ -117,7 +113,6 @@ contains
          allocate (more(2*self%n_item))
          do i = 1, self%n_item
             call move_alloc(self%items(i)%values, more(i)%values)
-            call move_alloc(self%items(i)%cube, more(i)%cube)
          end do
          call move_alloc(more, self%items)
       end if
@@ -130,16 +125,7 @@ contains
       integer :: n
       integer :: i
 
-      n = 0
-      do i = 1, self%n_item
-         associate (item => self%items(i))
-            if (allocated(item%cube)) then
-               n = n + size(item%cube)
-            else
-               n = n + size(item%values)
-            end if
-         end associate
-      end do
+      n = sum([(size(self%items(i)%values), i=1, self%n_item)])
    end function count_values
 
    !> Copies the numbers of all items, in the order of the header.
@@ -151,13 +137,7 @@ contains
 
       at = 0
       do i = 1, self%n_item
-         associate (item => self%items(i))
-            if (allocated(item%cube)) then
-               call append(size(item%cube), item%cube)
-            else
-               call append(size(item%values), item%values)
-            end if
-         end associate
+         call append(size(self%items(i)%values), self%items(i)%values)
       end do
 
    contains

@@ -5,7 +5,7 @@ module thud_field
    use thud_interval, only: get_range_text, interval_type, new_interval
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: is_number, join, join_quoted, lower_case, quoted, replaced, shortened, to_text
+   use thud_text, only: is_number, join, join_quoted, lower_case, shortened, to_text
    implicit none (type, external)
    private
 
@@ -46,9 +46,6 @@ module thud_field
    character(len=*), parameter :: flags(*) = [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', &
       't', 'f']
 
-   !> Marks list entries that are not given.
-   real(wp), parameter :: unset = -huge(1.0_wp)
-
    !> Description of one key and a pointer to its variable.
    type :: field_type
       !> Namelist group.
@@ -62,18 +59,10 @@ module thud_field
       character(len=8) :: unit = ''
       !> Help text: what the value is, in a few words.
       character(len=128) :: meaning = ''
-      !> The variable of a real key, else null.
-      real(wp), pointer :: real_value => null()
-      !> The variable of an integer key, else null.
-      integer, pointer :: integer_value => null()
-      !> The variable of a logical key, else null.
-      logical, pointer :: logical_value => null()
-      !> The variable of a list key, else null.
-      type(list_type), pointer :: list_value => null()
-      !> The variable of a text key, else null.
-      character(len=name_length), pointer :: text_value => null()
-      !> The variable of a key with a list of texts, else null.
-      type(text_list_type), pointer :: text_list_value => null()
+      !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`, `texts`.
+      character(len=6) :: kind = ''
+      !> The variable: real, integer, logical, text, `list_type` or `text_list_type`.
+      class(*), pointer :: value => null()
       !> Allowed range of numbers, see `thud_interval`.
       character(len=72) :: range = ''
       !> The entries of the list must be whole numbers.
@@ -98,7 +87,8 @@ module thud_field
       procedure :: set_from_text
       procedure :: set_number
       procedure :: get_number
-      procedure :: get_kind
+      procedure :: get_entries
+      procedure :: get_words
       procedure :: get_text
       procedure :: get_allowed
       procedure :: is_empty
@@ -118,10 +108,8 @@ contains
       integer :: i
 
       choice = ''
-      do i = 1, size(fields)
-         if (fields(i)%n_choice == 0 .or. fields(i)%owner /= field%owner) cycle
-         if (fields(i)%key == field%needs(1)) choice = fields(i)%text_value(:key_length)
-      end do
+      i = findloc(fields%owner == field%owner .and. fields%key == field%needs(1), .true., dim=1)
+      if (i > 0) choice = fields(i)%choices(nint(fields(i)%get_number()))
    end function get_needed_choice
 
    !> Whether a key has an effect with the choices of the case.
@@ -149,20 +137,16 @@ contains
             inside = .true.
             suggestion = ''
             interval = get_interval(fields, i)
-            if (field%n_choice > 0) then
-               inside = any(field%choices(:field%n_choice) == field%text_value)
-               if (.not. inside) call get_suggestion(trim(field%text_value), field%choices(:field%n_choice), suggestion)
-            else if (associated(field%list_value)) then
-               associate (entries => field%list_value%values(:field%list_value%count))
-                  inside = all(interval%contains(entries))
-                  if (field%whole_entries) inside = inside .and. .not. any(abs(entries - anint(entries)) > 0.0_wp)
-               end associate
+            call field%get_text(text)
+            if (field%kind == 'choice') then
+               inside = field%get_number() > 0.0_wp
+               if (.not. inside) call get_suggestion(text(2:len(text) - 1), field%choices(:field%n_choice), suggestion)
             else if (field%range /= '') then
-               inside = interval%contains(field%get_number())
+               inside = all(interval%contains(field%get_entries()))
+               if (field%whole_entries) inside = inside .and. all(is_whole(field%get_entries()))
             end if
             if (inside) cycle
-            call field%get_text(text)
-            error = field%get_error(text, 'is not allowed'//suggestion, interval)
+            error = field%get_error(text, interval, suggestion)
             return
          end associate
       end do
@@ -191,110 +175,87 @@ contains
       character(len=*), intent(in) :: text
       !> Set if the text is not a value of the key's kind.
       type(error_type), allocatable, intent(out) :: error
-      character(len=2*name_length) :: word
-      character(len=128) :: message
-      character(len=:), allocatable :: line, wanted
-      integer :: status, whole
-      real(wp) :: list(list_length + 1)
-      real(wp) :: number
-      namelist /list_group/ list
-      namelist /text_group/ word
+      type(list_type) :: numbers
+      type(text_list_type) :: texts
+      logical :: valid
 
-      status = 1
-      if (associated(self%real_value)) then
-         wanted = 'a number'
-         if (is_number(text)) read (text, *, iostat=status, iomsg=message) number
-         if (status == 0) self%real_value = number
-      else if (associated(self%list_value)) then
-         wanted = 'a list of up to '//to_text(list_length)//' numbers'
-         line = '&list_group list = '//text//' /'
-         list = unset
-         if (are_numbers(text)) read (line, nml=list_group, iostat=status, iomsg=message)
-         if (status == 0) call set_list(list, self%list_value, status)
-      else if (associated(self%text_list_value)) then
-         wanted = 'a list of up to '//to_text(text_list_length)//' short texts in quotes'
-         call set_text_list(text, self%text_list_value, status)
-      else if (associated(self%integer_value)) then
-         wanted = 'a whole number'
-         if (is_number(text)) read (text, *, iostat=status, iomsg=message) whole
-         if (status == 0) self%integer_value = whole
-      else if (associated(self%logical_value)) then
-         wanted = '.true. or .false.'
-         if (any(lower_case(text) == flags)) status = 0
-         if (status == 0) self%logical_value = scan(text, 'tT') > 0
-      else
-         wanted = 'short text in quotes'
-         line = '&text_group word = '//text//' /'
-         word = ''
-         if (scan(text(1:1), '''"') == 1 .and. text(len(text):) == text(1:1)) then
-            read (line, nml=text_group, iostat=status, iomsg=message)
-         end if
-         ! A longer text would have been cut.
-         if (status == 0) status = merge(0, 1, len_trim(text) <= len(word) + 2 .and. len_trim(word) <= name_length)
-         if (status == 0) self%text_value = word(:name_length)
-         if (status == 0 .and. self%n_choice > 0) self%text_value = lower_case(self%text_value)
-      end if
-      if (status /= 0) error = self%get_error(text, 'is not '//wanted, new_interval(self%range))
+      select type (value => self%value)
+      type is (logical)
+         valid = any(lower_case(text) == flags)
+         if (valid) value = scan(text, 'tT') > 0
+      type is (list_type)
+         call read_numbers(text, numbers, valid)
+         if (valid) value = numbers
+      type is (text_list_type)
+         call read_texts(text, texts, valid)
+         if (valid) value = texts
+      type is (character(len=*))
+         call read_texts(text, texts, valid)
+         valid = valid .and. texts%count == 1
+         if (valid) value = texts%values(1)
+         if (valid .and. self%kind == 'choice') value = lower_case(value)
+      class default
+         valid = is_number(text) .and. (self%kind == 'real' .or. verify(text, '+-0123456789') == 0)
+         if (valid) call read_numbers(text, numbers, valid)
+         if (valid) call self%set_number(numbers%values(1), 0, error)
+         valid = valid .and. .not. allocated(error)
+      end select
+      if (.not. valid) error = self%get_error(text, new_interval(self%range))
    end subroutine set_from_text
 
-   !> Whether a list holds only numbers, some perhaps with repeats such as `3*0.1`. The namelist reader would skip other
+   !> Reads numbers between commas or blanks, some perhaps with repeats such as `3*0.1`. The namelist reader would skip other
    !> entries without an error (`-`), or read them as null values (`1*`).
-   pure function are_numbers(text) result(yes)
+   subroutine read_numbers(text, list, valid)
       character(len=*), intent(in) :: text
-      logical :: yes
+      type(list_type), intent(out) :: list
+      !> False if there are too many entries, gaps between them, or something that is not a number.
+      logical, intent(out) :: valid
       character(len=len(text) + 1) :: remaining
-      integer :: last
+      character(len=128) :: message
+      real(wp) :: number
+      integer :: last, n, star, status
 
-      yes = .true.
-      remaining = adjustl(replaced(text, ',', ' '))
-      do while (yes .and. remaining /= '')
-         last = index(remaining, ' ') - 1
-         yes = is_number(remaining(index(remaining(:last), '*') + 1:last))
+      valid = .false.
+      remaining = adjustl(text)
+      do while (remaining /= '')
+         last = scan(remaining, ' ,') - 1
+         star = index(remaining(:last), '*')
+         n = 1
+         status = 0
+         if (star > 0) status = verify(remaining(:star - 1), '0123456789')
+         if (star > 0 .and. status == 0) read (remaining(:star - 1), *, iostat=status, iomsg=message) n
+         valid = status == 0 .and. n > 0 .and. n <= list_length - list%count .and. is_number(remaining(star + 1:last))
+         if (valid) read (remaining(star + 1:last), *, iostat=status, iomsg=message) number
+         valid = valid .and. status == 0
+         if (.not. valid) return
+         list%values(list%count + 1:list%count + n) = number
+         list%count = list%count + n
          remaining = adjustl(remaining(last + 1:))
+         if (remaining(1:1) == ',') remaining = adjustl(remaining(2:))
       end do
-   end function are_numbers
+   end subroutine read_numbers
 
-   !> Sets a list from the entries that were read.
-   subroutine set_list(entries, list, status)
-      !> The entries; `unset` for entries missing from the input: [list_length + 1].
-      real(wp), intent(in) :: entries(:)
-      type(list_type), intent(inout) :: list
-      !> Nonzero if there are too many entries or gaps between them.
-      integer, intent(out) :: status
-      logical :: is_set(size(entries))
-
-      ! Written so that a NaN counts as given; the range check reports it later.
-      is_set = .not. entries <= unset
-      status = merge(0, 1, all(is_set(:count(is_set))) .and. count(is_set) <= list_length)
-      if (status /= 0) return
-      list%count = count(is_set)
-      list%values(:list%count) = entries(:list%count)
-   end subroutine set_list
-
-   !> Sets a list of texts from texts in quotes, separated by commas or blanks.
-   subroutine set_text_list(text, list, status)
+   !> Reads texts in quotes, with commas or blanks between them.
+   subroutine read_texts(text, list, valid)
       character(len=*), intent(in) :: text
-      type(text_list_type), intent(inout) :: list
-      !> Nonzero if there are too many texts, one is too long, or something else stands between them.
-      integer, intent(out) :: status
-      type(text_list_type) :: entries
+      type(text_list_type), intent(out) :: list
+      !> False if there are too many texts, one is too long, or something else stands between them.
+      logical, intent(out) :: valid
       character(len=:), allocatable :: entry
       integer :: first, last
 
-      status = 1
-      first = verify(text, ' ,')
-      do while (first > 0)
-         if (scan(text(first:first), '''"') == 0 .or. entries%count == text_list_length) return
+      last = 0
+      do
+         first = last + verify(text(last + 1:), ' ,')
+         valid = first == last
+         if (valid .or. list%count == text_list_length) return
+         if (scan(text(first:first), '''"') == 0) return
          call read_quoted(text, first, entry, last)
          if (last == 0 .or. len_trim(entry) > name_length) return
-         entries%count = entries%count + 1
-         entries%values(entries%count) = entry
-         first = verify(text(last + 1:), ' ,')
-         if (first > 0) first = last + first
+         list%count = list%count + 1
+         list%values(list%count) = entry
       end do
-      list = entries
-      status = 0
-   end subroutine set_text_list
+   end subroutine read_texts
 
    !> Reads a text in quotes; a doubled quote stands for one.
    pure subroutine read_quoted(text, first, entry, last)
@@ -323,17 +284,52 @@ contains
    end subroutine read_quoted
 
    !> Value as a number: the index of a choice, 0 or 1 for a flag.
-   function get_number(self) result(number)
+   pure function get_number(self) result(number)
       class(field_type), intent(in) :: self
-      !> The number; 0 for free text and lists.
+      !> The number; 0 for a choice that is not allowed, for free text and lists.
       real(wp) :: number
+      real(wp), allocatable :: entries(:)
 
       number = 0.0_wp
-      if (associated(self%real_value)) number = self%real_value
-      if (associated(self%integer_value)) number = real(self%integer_value, wp)
-      if (associated(self%logical_value)) number = merge(1.0_wp, 0.0_wp, self%logical_value)
-      if (self%n_choice > 0) number = real(findloc(self%choices(:self%n_choice) == self%text_value, .true., dim=1), wp)
+      allocate (entries, source=self%get_entries())
+      if (size(entries) == 1 .and. self%kind /= 'list') number = entries(1)
    end function get_number
+
+   !> Entries of a list; of another kind its value as a number: [n_entry].
+   pure function get_entries(self) result(entries)
+      class(field_type), intent(in) :: self
+      real(wp), allocatable :: entries(:)
+
+      select type (value => self%value)
+      type is (real(wp))
+         entries = [value]
+      type is (integer)
+         entries = [real(value, wp)]
+      type is (logical)
+         entries = [merge(1.0_wp, 0.0_wp, value)]
+      type is (character(len=*))
+         entries = [real(findloc(self%choices(:self%n_choice) == value, .true., dim=1), wp)]
+      type is (list_type)
+         entries = value%values(:value%count)
+      class default
+         allocate (entries(0))
+      end select
+   end function get_entries
+
+   !> Entries of a list of texts, or the only text: [n_entry].
+   pure subroutine get_words(self, words)
+      class(field_type), intent(in) :: self
+      character(len=name_length), allocatable, intent(out) :: words(:)
+
+      select type (value => self%value)
+      type is (text_list_type)
+         words = value%values(:value%count)
+      type is (character(len=*))
+         words = [character(len=name_length) :: value]
+      class default
+         allocate (words(0))
+      end select
+   end subroutine get_words
 
    !> Sets the variable from a number as `get_number` returns it.
    subroutine set_number(self, number, entry, error)
@@ -343,52 +339,50 @@ contains
       integer, intent(in) :: entry
       !> Set if the key cannot have this value.
       type(error_type), allocatable, intent(out) :: error
-      logical :: whole
+      logical :: valid
 
-      whole = abs(number) <= real(huge(1), wp)
-      if (whole) whole = .not. abs(number - anint(number)) > 0.0_wp
-      if (associated(self%real_value)) then
-         self%real_value = number
-      else if (associated(self%list_value)) then
-         self%list_value%values(entry) = number
-      else if (.not. whole) then
-         error = self%get_error(to_text(number), 'is not a whole number', new_interval(self%range))
-      else if (associated(self%integer_value)) then
-         self%integer_value = nint(number)
-      else if (associated(self%logical_value)) then
-         self%logical_value = nint(number) /= 0
-      else if (nint(number) >= 1 .and. nint(number) <= self%n_choice) then
-         self%text_value = self%choices(nint(number))
-      else
-         error = self%get_error(to_text(number), 'is not the number of a choice', new_interval(self%range))
-      end if
+      valid = is_whole(number)
+      select type (value => self%value)
+      type is (real(wp))
+         value = number
+         return
+      type is (list_type)
+         value%values(entry) = number
+         return
+      type is (integer)
+         if (valid) value = nint(number)
+      type is (logical)
+         if (valid) value = nint(number) /= 0
+      type is (character(len=*))
+         valid = valid .and. number >= 1 .and. number <= self%n_choice
+         if (valid) value = self%choices(nint(number))
+      end select
+      if (.not. valid) error = self%get_error(to_text(number), new_interval(self%range))
    end subroutine set_number
 
-   !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`, `texts`.
-   pure function get_kind(self) result(kind)
-      class(field_type), intent(in) :: self
-      character(len=6) :: kind
+   !> Whether a number is an integer.
+   elemental function is_whole(number) result(yes)
+      real(wp), intent(in) :: number
+      logical :: yes
 
-      kind = 'text'
-      if (associated(self%real_value)) kind = 'real'
-      if (associated(self%integer_value)) kind = 'whole'
-      if (associated(self%logical_value)) kind = 'flag'
-      if (associated(self%list_value)) kind = 'list'
-      if (associated(self%text_list_value)) kind = 'texts'
-      if (self%n_choice > 0) kind = 'choice'
-   end function get_kind
+      yes = abs(number) <= huge(1) .and. .not. abs(number - anint(number)) > 0.0_wp
+   end function is_whole
 
    !> Error that names group, key, value and allowed range.
-   function get_error(self, value, problem, interval) result(error)
+   function get_error(self, value, interval, suggestion) result(error)
       class(field_type), intent(in) :: self
-      !> The value as text; the fault, as `is not a whole number`.
-      character(len=*), intent(in) :: value, problem
+      !> The value as text.
+      character(len=*), intent(in) :: value
       type(interval_type), intent(in) :: interval
+      !> A word that may be meant, from `get_suggestion`.
+      character(len=*), intent(in), optional :: suggestion
       type(error_type) :: error
-      character(len=:), allocatable :: allowed
+      character(len=:), allocatable :: allowed, problem
 
+      problem = ' is not allowed'
+      if (present(suggestion)) problem = problem//suggestion
       call self%get_allowed(allowed, interval)
-      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' '//problem &
+      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//problem &
          //'; allowed: '//allowed)
    end function get_error
 
@@ -397,20 +391,19 @@ contains
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
       character(len=:), allocatable, intent(out) :: text
+      character(len=name_length), allocatable :: words(:)
 
-      if (associated(self%real_value)) then
-         text = to_text(self%real_value)
-      else if (associated(self%list_value)) then
-         text = join(self%list_value%values(:self%list_value%count))
-      else if (associated(self%text_list_value)) then
-         text = join_quoted(self%text_list_value%values(:self%text_list_value%count))
-      else if (associated(self%integer_value)) then
-         text = to_text(self%integer_value)
-      else if (associated(self%logical_value)) then
-         text = to_text(self%logical_value)
-      else
-         text = quoted(self%text_value)
-      end if
+      select case (self%kind)
+      case ('choice', 'text', 'texts')
+         call self%get_words(words)
+         text = join_quoted(words)
+      case ('whole')
+         text = to_text(nint(self%get_number()))
+      case ('flag')
+         text = to_text(self%get_number() > 0.0_wp)
+      case default
+         text = join(self%get_entries())
+      end select
    end subroutine get_text
 
    !> The allowed range in words: `0 < outer_radius <= 10 m`.
@@ -420,24 +413,25 @@ contains
       character(len=:), allocatable, intent(out) :: text
       !> The range with resolved ends (default: unresolved).
       type(interval_type), intent(in), optional :: interval
+      type(interval_type) :: range
 
-      if (self%n_choice > 0) then
+      select case (self%kind)
+      case ('choice')
          text = join_quoted(self%choices(:self%n_choice))
-      else if (associated(self%text_value)) then
+      case ('text')
          text = 'text in quotes, up to '//to_text(name_length)//' characters'
-      else if (associated(self%text_list_value)) then
+      case ('texts')
          text = 'up to '//to_text(text_list_length)//' texts in quotes, each up to '//to_text(name_length)//' characters'
-      else if (associated(self%logical_value)) then
+      case ('flag')
          text = '.true., .false.'
-      else
-         if (present(interval)) then
-            call get_range_text(interval, trim(self%key), text)
-         else
-            call get_range_text(new_interval(self%range), trim(self%key), text)
-         end if
+      case default
+         range = new_interval(self%range)
+         if (present(interval)) range = interval
+         call get_range_text(range, trim(self%key), text)
          if (self%unit /= '') text = text//' '//trim(self%unit)
-         if (associated(self%integer_value) .or. self%whole_entries) text = text//', whole'
-      end if
+         if (self%kind == 'whole' .or. self%whole_entries) text = text//', whole'
+         if (self%kind == 'list') text = text//', up to '//to_text(list_length)//' numbers'
+      end select
    end subroutine get_allowed
 
    !> Whether the field is a list without entries, which a namelist cannot hold.
@@ -446,8 +440,12 @@ contains
       logical :: empty
 
       empty = .false.
-      if (associated(self%list_value)) empty = self%list_value%count == 0
-      if (associated(self%text_list_value)) empty = self%text_list_value%count == 0
+      select type (value => self%value)
+      type is (list_type)
+         empty = value%count == 0
+      type is (text_list_type)
+         empty = value%count == 0
+      end select
    end function is_empty
 
 end module thud_field

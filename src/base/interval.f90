@@ -22,14 +22,8 @@ module thud_interval
       character(len=expression_length) :: lower_expression = '', upper_expression = ''
    contains
       procedure :: contains => contains_value
-      procedure :: contains_rows
       procedure :: resolve
    end type interval_type
-
-   !> Value of an expression for one value of each key, or for each row of a table of values.
-   interface evaluate
-      module procedure evaluate_row, evaluate_rows
-   end interface evaluate
 
 contains
 
@@ -77,54 +71,16 @@ contains
       if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
    end subroutine resolve
 
-   !> Whether the value of one key lies in the interval, for each row of values of all keys: [n_row].
-   pure function contains_rows(self, key, keys, values) result(inside)
-      class(interval_type), intent(in) :: self
-      !> Index of the key.
-      integer, intent(in) :: key
-      character(len=*), intent(in) :: keys(:)
-      !> Values of the keys: [n_row, n_key].
-      real(wp), intent(in) :: values(:, :)
-      logical :: inside(size(values, 1))
-      type(interval_type) :: resolved
-      real(wp), allocatable :: lower(:), upper(:)
-      integer :: i
-
-      allocate (lower(size(inside)), upper(size(inside)))
-      lower = self%lower
-      upper = self%upper
-      if (self%lower_expression /= '') lower = evaluate(self%lower_expression, keys, values)
-      if (self%upper_expression /= '') upper = evaluate(self%upper_expression, keys, values)
-      resolved = self
-      do i = 1, size(inside)
-         resolved%lower = lower(i)
-         resolved%upper = upper(i)
-         inside(i) = resolved%contains(values(i, key))
-      end do
-   end function contains_rows
-
-   !> Value of an expression for one value of each key.
-   pure function evaluate_row(expression, keys, values) result(value)
+   !> Value of a product or quotient of numbers and keys; NaN if a key is unknown.
+   pure function evaluate(expression, keys, values) result(value)
       !> An expression such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression
+      !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
+      !> Values of the keys: [n_key].
       real(wp), intent(in) :: values(:)
       real(wp) :: value
-      real(wp) :: only(1)
-
-      only = evaluate_rows(expression, keys, reshape(values, [1, size(values)]))
-      value = only(1)
-   end function evaluate_row
-
-   !> Value of a product or quotient of numbers and keys; NaN if a key is unknown.
-   pure function evaluate_rows(expression, keys, values) result(value)
-      character(len=*), intent(in) :: expression
-      character(len=*), intent(in) :: keys(:)
-      real(wp), intent(in) :: values(:, :)
-      !> The values: [n_row].
-      real(wp) :: value(size(values, 1))
-      real(wp) :: operand(size(values, 1))
-      real(wp) :: number
+      real(wp) :: operand
       integer :: start, length, key, status
       character(len=len(expression)) :: word
       character(len=128) :: message
@@ -138,11 +94,10 @@ contains
          word = adjustl(expression(start:start + length - 1))
          key = findloc(keys == word, .true., dim=1)
          if (key > 0) then
-            operand = values(:, key)
+            operand = values(key)
          else
-            read (word, *, iostat=status, iomsg=message) number
-            if (status /= 0) number = ieee_value(number, ieee_quiet_nan)
-            operand = number
+            read (word, *, iostat=status, iomsg=message) operand
+            if (status /= 0) operand = ieee_value(operand, ieee_quiet_nan)
          end if
          if (operator == '*') value = value*operand
          if (operator == '/') value = value/operand
@@ -150,7 +105,7 @@ contains
          if (start > len(expression)) exit
          operator = expression(start - 1:start - 1)
       end do
-   end function evaluate_rows
+   end function evaluate
 
    !> Whether a value lies in the interval; NaN never does.
    elemental function contains_value(self, value) result(inside)

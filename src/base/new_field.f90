@@ -21,11 +21,11 @@ contains
       logical, intent(in), optional :: is_numerical, derived_at_zero, is_calibrated
       type(field_type) :: field
 
-      field = field_type(key=key, unit=unit, meaning=meaning, range=range)
+      field = field_type(kind='real', key=key, unit=unit, meaning=meaning, range=range)
       if (present(is_numerical)) field%is_numerical = is_numerical
       if (present(derived_at_zero)) field%derived_at_zero = derived_at_zero
       if (present(is_calibrated)) field%is_calibrated = is_calibrated
-      field%real_value => variable
+      field%value => variable
    end function real_field
 
    !> Describes an integer key.
@@ -36,8 +36,8 @@ contains
       character(len=*), intent(in) :: meaning, range
       type(field_type) :: field
 
-      field = field_type(key=key, meaning=meaning, range=range)
-      field%integer_value => variable
+      field = field_type(kind='whole', key=key, meaning=meaning, range=range)
+      field%value => variable
    end function integer_field
 
    !> Describes a key that is true or false.
@@ -47,8 +47,8 @@ contains
       character(len=*), intent(in) :: meaning
       type(field_type) :: field
 
-      field = field_type(key=key, meaning=meaning)
-      field%logical_value => variable
+      field = field_type(kind='flag', key=key, meaning=meaning)
+      field%value => variable
    end function logical_field
 
    !> Describes a key with a list of numbers that share one range.
@@ -61,9 +61,9 @@ contains
       logical, intent(in), optional :: whole
       type(field_type) :: field
 
-      field = field_type(key=key, unit=unit, meaning=meaning, range=range)
+      field = field_type(kind='list', key=key, unit=unit, meaning=meaning, range=range)
       if (present(whole)) field%whole_entries = whole
-      field%list_value => variable
+      field%value => variable
    end function list_field
 
    !> Describes a key with free text.
@@ -73,8 +73,8 @@ contains
       character(len=*), intent(in) :: meaning
       type(field_type) :: field
 
-      field = field_type(key=key, meaning=meaning)
-      field%text_value => variable
+      field = field_type(kind='text', key=key, meaning=meaning)
+      field%value => variable
    end function text_field
 
    !> Describes a key with the path of a file.
@@ -95,8 +95,8 @@ contains
       character(len=*), intent(in) :: meaning
       type(field_type) :: field
 
-      field = field_type(key=key, meaning=meaning)
-      field%text_list_value => variable
+      field = field_type(kind='texts', key=key, meaning=meaning)
+      field%value => variable
    end function text_list_field
 
    !> Describes a key that takes one of several words.
@@ -109,6 +109,7 @@ contains
       type(field_type) :: field
 
       field = text_field(key, variable, meaning)
+      field%kind = 'choice'
       field%n_choice = size(choices)
       field%choices(:size(choices)) = choices
    end function choice_field

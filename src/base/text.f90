@@ -296,7 +296,7 @@ contains
    end function quoted
 
    !> Length of a text as a namelist character constant.
-   pure function quoted_length(text) result(length)
+   elemental function quoted_length(text) result(length)
       character(len=*), intent(in) :: text
       !> Length including the quotes, with quotes inside doubled.
       integer :: length
@@ -310,7 +310,7 @@ contains
       !> The words: [n_word].
       character(len=*), intent(in) :: words(:)
       !> The words in quotes, separated by commas.
-      character(len=joined_length(words)) :: text
+      character(len=sum(quoted_length(words)) + 2*max(size(words) - 1, 0)) :: text
       character(len=2*len(words) + 2) :: constants(size(words))
       integer :: i
 
@@ -319,16 +319,6 @@ contains
       end do
       text = join(constants)
    end function join_quoted
-
-   !> Length of a list of words in quotes.
-   pure function joined_length(words) result(length)
-      character(len=*), intent(in) :: words(:)
-      !> Length of the text from `join_quoted`.
-      integer :: length
-      integer :: i
-
-      length = sum([(quoted_length(words(i)), i=1, size(words))]) + 2*max(size(words) - 1, 0)
-   end function joined_length
 
    !> Texts separated by commas: `one, two, three`.
    pure function join_words(words) result(text)

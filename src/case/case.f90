@@ -265,7 +265,7 @@ contains
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
-      fields = pack(fields, [(fields(i)%get_kind() == 'real' &
+      fields = pack(fields, [(fields(i)%kind == 'real' &
          .and. (fields(i)%owner == case%model .or. any(fields(i)%group == ['ball', 'drop'])), i=1, size(fields))])
    end function get_source_fields
 

@@ -299,7 +299,7 @@ contains
          if (fields(i)%key /= 'loss_factor') cycle
          law = fields(i)%get_needed_choice(get_active_fields(case))
          if (law /= fields(i)%needs(2)) call add(warnings, &
-            '&'//trim(fields(i)%group)//': loss_factor = '//to_text(fields(i)%real_value)//' is that of the standard ball ' &
+            '&'//trim(fields(i)%group)//': loss_factor = '//to_text(fields(i)%get_number())//' is that of the standard ball ' &
             //'with '//trim(fields(i)%needs(1))//' = '//quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
       end do
    end subroutine add_law_warning

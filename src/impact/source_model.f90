@@ -1,7 +1,7 @@
 !> The abstract source model: options from namelist groups, and the force of one drop.
 !>
-!> A model is a type `<name>_type` that extends this one, in the module `thud_<name>`; the list of names in
-!> src/CMakeLists.txt registers it. Its options form the namelist group `&<name>` unless stated otherwise. The
+!> A model is a type `<name>_type` that extends this one, in the module `thud_<name>`, and stands in
+!> src/case/registry.f90. Its options form the namelist group `&<name>` unless stated otherwise. The
 !> descriptions of arguments in this file hold for every model.
 module thud_source_model
    use thud_ball, only: ball_type

@@ -2,6 +2,7 @@
 module thud_batch_samples
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type
+   use thud_error, only: error_type
    use thud_field, only: field_type
    use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
    use thud_kinds, only: wp
@@ -44,6 +45,7 @@ contains
       !> The samples: [n_sample].
       type(sample_type), intent(out) :: samples(:)
       type(sample_type), target :: sample
+      type(error_type), allocatable :: error
       type(field_type), allocatable :: fields(:), sample_fields(:)
       integer :: index_of(size(columns))
       integer :: i, j
@@ -61,7 +63,7 @@ contains
       do i = 1, size(samples)
          do j = 1, size(columns)
             if (index_of(j) > 0) then
-               sample_fields(index_of(j))%real_value = values(j, i)
+               call sample_fields(index_of(j))%set_number(values(j, i), 0, error)
             else
                sample%flux = nint(values(j, i))
                ! A number that is not whole is no valid choice.

@@ -2,7 +2,7 @@
 module thud_column
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length, list_type
+   use thud_field, only: field_type, key_length
    use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
@@ -34,11 +34,10 @@ contains
       !> Set if a name is unknown or given twice, or the list has no such entry.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
-      type(list_type), pointer :: list
       logical, allocatable :: possible(:)
       character(len=:), allocatable :: group, key, suggestion
       logical :: known
-      integer :: i, j
+      integer :: count, i, j
 
       allocate (fields, source=get_active_fields(case))
       ! All samples must have levels in the same bands.
@@ -50,12 +49,12 @@ contains
          ! Without a group, the name means the first of the keys with this name, which belongs to the source.
          columns(i)%field = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
             .true., dim=1)
-         nullify (list)
+         count = 0
          known = known .and. columns(i)%field > 0
          if (columns(i)%field > 0) then
-            list => fields(columns(i)%field)%list_value
-            if (associated(list)) then
-               known = known .and. columns(i)%entry >= 1 .and. columns(i)%entry <= list%count
+            if (fields(columns(i)%field)%kind == 'list') then
+               count = size(fields(columns(i)%field)%get_entries())
+               known = known .and. columns(i)%entry >= 1 .and. columns(i)%entry <= count
             else
                known = known .and. index(names(i), '(') == 0
             end if
@@ -64,8 +63,8 @@ contains
             call get_suggestion(trim(names(i)), pack(fields%key, possible), suggestion)
             error = input_error(quoted(names(i))//' is not a key of samples'//suggestion//'; allowed: ' &
                //join_quoted(pack(fields%key, possible)))
-            if (columns(i)%field > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
-               //' is not an entry of the list; allowed: '//trim(key)//'(1) to '//trim(key)//'('//to_text(list%count)//')')
+            if (count > 0) error = input_error(quoted(names(i)) &
+               //' is not an entry of the list; allowed: '//trim(key)//'(1) to '//trim(key)//'('//to_text(count)//')')
          else if (any([(columns(j)%field == columns(i)%field .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
             error = input_error(quoted(names(i))//' is given twice; allowed: once')
          end if

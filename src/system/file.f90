@@ -23,34 +23,25 @@ module thud_file
 contains
 
    !> The text of a file.
-   subroutine read_text_file(path, text, error, kind, max_size)
+   subroutine read_text_file(path, text, error)
       character(len=*), intent(in) :: path
       !> Content, without a byte order mark.
       character(len=:), allocatable, intent(out) :: text
       !> Set if the file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
-      !> What the file is to be, for messages (default: namelist file); maximum size, bytes (default: `max_input_size`).
-      character(len=*), intent(in), optional :: kind
-      integer(int64), intent(in), optional :: max_size
-      character(len=:), allocatable :: wanted
-      integer(int64) :: bytes, limit
+      integer(int64) :: bytes
       integer :: descriptor, count, done
-
-      wanted = 'namelist file'
-      if (present(kind)) wanted = kind
-      limit = max_input_size
-      if (present(max_size)) limit = max_size
 
       ! Fortran's own `inquire` and `open` would drop blanks at the end of a path.
       call get_file_size(path, bytes)
       if (directory_exists(path)) then
-         error = input_error('this is a directory; allowed: the path of a '//wanted)
+         error = input_error('this is a directory; allowed: the path of a namelist file')
       else if (bytes < 0) then
-         error = input_error('there is no such file; allowed: the path of a '//wanted)
-      else if (bytes > limit .or. bytes < 1) then
+         error = input_error('there is no such file; allowed: the path of a namelist file')
+      else if (bytes > max_input_size .or. bytes < 1) then
          ! Pipes and devices have no size; opening one could block.
          error = input_error('the file is '//trim(merge('empty or not a regular file', 'too large                  ', &
-            bytes < 1))//'; allowed: a '//wanted//' of 1 to '//to_text(int(limit))//' bytes')
+            bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(max_input_size))//' bytes')
       end if
       if (allocated(error)) return
       descriptor = open_descriptor(path)
@@ -62,7 +53,7 @@ contains
          done = done + count
       end do
       call close_descriptor(descriptor)
-      if (done < len(text)) error = input_error('the file cannot be read; allowed: a readable '//wanted)
+      if (done < len(text)) error = input_error('the file cannot be read; allowed: a readable namelist file')
       if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
 

@@ -106,7 +106,10 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     page = (REPOSITORY / "docs/how_to_add.md").read_text()
     model = root / "src/models/linear_spring.f90"
     model.write_text(example(page, "fortran"))
-    insert(root / "src/CMakeLists.txt", "  measured_modes\n", example(page, "cmake"))
+    registry = root / "src/case/registry.f90"
+    insert(registry, "   use thud_joist_floor, only: joist_floor_type\n", example(page, "fortran use"))
+    insert(registry, "'two_mass'", example(page, "fortran name").rstrip("\n"))
+    insert(registry, "(two_mass_type :: models(6)%model)\n", example(page, "fortran allocation"))
     insert(model, "      real(wp) :: stiffness = 6.0e4_wp\n", example(page, "fortran component"))
     insert(model, "      fields = [ &\n", example(page, "fortran field"))
     insert(

@@ -150,15 +150,15 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("height,mass\n1,\n", naming("line 2", "mass", "''")),
         ("height,mass\nnan,2\n", naming("line 2", "height", "'nan'")),
         ("height,momentum_flux\n1,all\n", naming("line 2", "momentum_flux", "'all'", "'none'")),
-        ("height\n1." + "0" * 70 + "e-1\n", naming("line 2", 256, 64)),
-        ("height\n" + "1," * 300 + "1\n", naming("line 2", 256, 64)),
+        ("height\n1." + "0" * 70 + "e-1\n", naming("line 2", 64)),
+        ("height\n" + "1," * 300 + "1\n", naming("line 2", 64)),
         ("height\n1e400\n", naming("line 2", "height", "'1e400'")),
-        ("height\n" + "1" * 5000 + "\n", naming("line 2", 4096)),
+        ("height\n" + "1" * 5000 + "\n", naming("line 2", 64)),
         ("height;mass\n1;1,575\n", naming("line 2", "'1,575'", "1575")),
         ('height,mass\n1,"1,575"\n', naming("line 2", "'1,575'", "1575")),
         ("height;mass\n1.5;2\n1;2,5\n", naming("line 3", "'2,5'")),
         ("height;mass\n0,5;2.5\n", naming("line 2", "'2.5'")),
-        ("height,mass\n1" + " " * 5000 + ",99\n", naming("line 2", 4096)),
+        ("height,mass\n1" + " " * 2**20 + ",99\n", naming("line 2", 2**20)),
     ],
 )
 def test_bad_tables_are_refused(
@@ -328,7 +328,7 @@ def test_endless_lines_take_no_memory(run: Run, case: Path) -> None:
 
     result = run(case, "--samples", "/dev/zero", preexec_fn=little_memory)
     assert (result.returncode, result.stdout) == (1, "")
-    assert re.search(naming("/dev/zero", "line 1", 4096), result.stderr)
+    assert re.search(naming("/dev/zero", "line 1", 2**20), result.stderr)
 
 
 def test_nothing_is_written_where_results_have_no_place(

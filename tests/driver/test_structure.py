@@ -29,16 +29,6 @@ def fortran_uses(root: Path) -> dict[str, set[str]]:
     module_line = re.compile(r"^ *module +(?!procedure\b)(\w+)", re.IGNORECASE | re.MULTILINE)
     use_line = re.compile(r"^ *use\b[ ,\w]*?(?:::)? *(thud_\w+)", re.IGNORECASE | re.MULTILINE)
     texts = {path: path.read_text(encoding="utf-8") for path in sorted(root.rglob("*.f90"))}
-    registry = root / "case/registry.f90.in"
-    if registry.exists():
-        texts[registry] = registry.read_text(encoding="utf-8")
-        for kind, suffix in (("source", ""), ("floor", "_floor")):
-            lists = (root / "CMakeLists.txt").read_text(encoding="utf-8")
-            found = re.search(rf"set\({kind}_models\n([^)]*)\)", lists)
-            assert found
-            names = [name.removesuffix(suffix) + suffix for name in found[1].split()]
-            uses = "".join(f"   use thud_{name}, only: {name}_type\n" for name in names)
-            texts[registry] = texts[registry].replace(f"@thud_{kind}_uses@", uses)
     places = {
         name: path.relative_to(root).as_posix()
         for path, text in texts.items()

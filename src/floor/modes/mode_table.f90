@@ -1,14 +1,15 @@
 !> Modes of a floor from a file: measured ones, or those of another program.
 !>
-!> The file is a table with commas, semicolons or tabs between the cells, one column per mode after two further columns.
+!> The file is a table, see `thud_table_reader`, with one column per mode after two further columns.
 !> Rows that begin with `frequency` (Hz), `loss_factor` and, if the shapes are not normalized to a modal mass of 1 kg,
 !> `modal_mass` (kg) describe the modes. All other rows are points: x, y (m) and the shapes of the modes there, the motion
-!> normal to the floor. A row that begins with `x` is a header; empty rows and text after a `#` are skipped.
+!> normal to the floor. A row that begins with `x` is a header.
 module thud_mode_table
    use thud_error, only: error_type, input_error
    use thud_function_set, only: min_nodes
    use thud_kinds, only: wp
-   use thud_text, only: fixed, is_number, lower_case, newline, quoted, tab, to_text
+   use thud_table_reader, only: cell_length, open_table, read_number, read_row, row_error, table_reader_type
+   use thud_text, only: fixed, lower_case, quoted, to_text
    implicit none (type, external)
    private
 
@@ -53,41 +54,38 @@ module thud_mode_table
 
 contains
 
-   !> Modes in the text of a file.
-   subroutine read_mode_table(text, table, error)
-      character(len=*), intent(in) :: text
+   !> Modes in a file.
+   subroutine read_mode_table(path, table, error)
+      character(len=*), intent(in) :: path
       type(mode_table_type), intent(out) :: table
       !> Set if the modes are not complete.
       type(error_type), allocatable, intent(out) :: error
       type(rows_type) :: rows
 
-      call read_rows(text, rows, error)
+      call read_rows(path, rows, error)
       if (.not. allocated(error)) call find_grid(rows, table, error)
       if (.not. allocated(error)) call check_shapes(table, error)
    end subroutine read_mode_table
 
-   !> Reads all rows of a text.
-   subroutine read_rows(text, rows, error)
-      character(len=*), intent(in) :: text
+   !> Reads all rows of a file.
+   subroutine read_rows(path, rows, error)
+      character(len=*), intent(in) :: path
       type(rows_type), intent(out) :: rows
       !> Set if a row is not one of a table, or one is missing.
       type(error_type), allocatable, intent(out) :: error
+      type(table_reader_type) :: table
+      character(len=cell_length), allocatable :: cells(:)
       real(wp), allocatable :: value(:), more(:, :)
       character(len=label_length) :: label
-      integer :: first, length, row
 
-      first = 1
-      row = 0
-      do while (first <= len(text))
-         length = index(text(first:), newline) - 1
-         if (length < 0) length = len(text) - first + 1
-         row = row + 1
-         call read_row(text(first:first + length - 1), label, value, error)
-         if (allocated(error)) then
-            error = input_error('line '//to_text(row)//': '//error%message)
-            return
+      call open_table(path, table, error)
+      do
+         if (.not. allocated(error)) call read_row(table, cells, error)
+         if (.not. allocated(error)) then
+            if (size(cells) == 0) exit
+            call read_values(table, cells, label, value, error)
          end if
-         first = first + length + 1
+         if (allocated(error)) return
          select case (label)
           case ('frequency')
             call set_row(rows%frequency, 1)
@@ -98,7 +96,7 @@ contains
           case ('point')
             if (rows%n_point == 0) allocate (rows%point(size(value), 64))
             if (size(value) /= size(rows%point, 1)) then
-               error = input_error('line '//to_text(row)//' has '//to_text(size(value))//' values, points before it have ' &
+               error = row_error(table, 'it has '//to_text(size(value))//' values, points before it have ' &
                   //to_text(size(rows%point, 1))//'; allowed: x, y and the shape of each mode')
                return
             end if
@@ -141,12 +139,12 @@ contains
          integer :: i
 
          if (allocated(target_row)) then
-            error = input_error('line '//to_text(row)//': '//trim(labels(number))//' is given twice; allowed: once')
+            error = row_error(table, trim(labels(number))//' is given twice; allowed: once')
             return
          end if
          i = findloc(value > 0.0_wp .and. value <= highest_value(number), .false., dim=1)
          if (i > 0) then
-            error = input_error('line '//to_text(row)//': '//trim(labels(number))//' of mode '//to_text(i)//' is ' &
+            error = row_error(table, trim(labels(number))//' of mode '//to_text(i)//' is ' &
                //to_text(value(i))//'; allowed: above 0, up to '//to_text(highest_value(number)))
             return
          end if
@@ -155,58 +153,34 @@ contains
    end subroutine read_rows
 
    !> Reads one row.
-   subroutine read_row(line, label, value, error)
-      character(len=*), intent(in) :: line
-      !> One of `labels`, `point`, or blank for a row without values.
+   subroutine read_values(table, cells, label, value, error)
+      type(table_reader_type), intent(in) :: table
+      !> The cells: [n_cell].
+      character(len=cell_length), intent(in) :: cells(:)
+      !> One of `labels`, `point`, or blank for a header.
       character(len=label_length), intent(out) :: label
       !> Its values; of a point with coordinates.
       real(wp), allocatable, intent(out) :: value(:)
       !> Set if a cell is neither a number nor a label.
       type(error_type), allocatable, intent(out) :: error
-      character(len=len(line)) :: text
-      character(len=64) :: word
-      character(len=128) :: message
-      integer :: i, first, last, length, status
+      logical :: valid
+      integer :: i, first
 
       label = ''
-      text = line
-      i = index(text, '#')
-      if (i > 0) text(i:) = ''
-      do i = 1, len_trim(text)
-         if (scan(text(i:i), ';'//tab) == 1) text(i:i) = ','
-         if (text(i:i) == achar(13)) text(i:i) = ' '
-      end do
-      if (verify(text, ', ') == 0) return
-      allocate (value(count([(text(i:i) == ',', i=1, len_trim(text))]) + 1))
-      last = len_trim(text)
-      first = 1
+      if (index(lower_case(cells(1)), 'x') == 1) return
+      label = 'point'
+      if (any(labels == lower_case(cells(1)))) label = lower_case(cells(1)(:label_length))
+      ! Between the label and the values there is a cell for the unit.
+      first = merge(1, 3, label == 'point')
+      allocate (value(max(size(cells) - first + 1, 0)))
       do i = 1, size(value)
-         length = index(text(first:last)//',', ',') - 1
-         status = merge(0, 1, len_trim(adjustl(text(first:first + length - 1))) <= len(word))
-         word = adjustl(text(first:first + length - 1))
-         first = first + length + 1
-         if (i == 1) then
-            if (index(lower_case(word), 'x') == 1) return
-            if (any(labels == lower_case(trim(word)))) label = lower_case(trim(word))
-         end if
-         ! Between the label and the values there is a cell for the unit.
-         if (label /= '' .and. i <= 2) cycle
-         if (.not. is_number(trim(word))) status = 1
-         if (status == 0) read (word, *, iostat=status, iomsg=message) value(i)
-         if (status == 0) status = merge(0, 1, abs(value(i)) <= huge(value))
-         if (status /= 0) then
-            label = ''
-            error = input_error(quoted(trim(word))//' in column '//to_text(i)//' is not a number; allowed: finite numbers ' &
-               //'with a decimal point, and in the first column also frequency, loss_factor, modal_mass or x')
-            return
-         end if
+         call read_number(cells(first + i - 1), value(i), valid)
+         if (valid) cycle
+         error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not a ' &
+            //'number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
+         return
       end do
-      if (label /= '') then
-         value = value(3:)
-      else
-         label = 'point'
-      end if
-   end subroutine read_row
+   end subroutine read_values
 
    !> Puts the points on their grid.
    subroutine find_grid(rows, table, error)

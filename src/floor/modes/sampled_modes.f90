@@ -4,13 +4,14 @@ module thud_sampled_modes
    use thud_ascending, only: get_ascending_order
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_file, only: read_text_file
    use thud_floor_modes, only: floor_modes_type
    use thud_function_set, only: function_set_type, new_splines
    use thud_kinds, only: wp
    use thud_mode_table, only: mode_table_type, read_mode_table
    use thud_modes, only: product_type
    use thud_plate_stack, only: orthotropic_type
+   use thud_system, only: get_file_size
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
@@ -27,11 +28,17 @@ contains
       type(floor_modes_type), intent(out) :: modes
       !> Set if the file cannot be read, or its modes are not complete; the message begins with the path.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: text
       type(mode_table_type) :: table
+      integer(int64) :: bytes
 
-      call read_text_file(path, text, error, 'table of modes', max_size)
-      if (.not. allocated(error)) call read_mode_table(text, table, error)
+      ! Pipes and devices have no size; opening one could block.
+      call get_file_size(path, bytes)
+      if (bytes < 1 .or. bytes > max_size) then
+         error = input_error('there is no such file, or it is empty, a directory, not regular or too large; allowed: a table ' &
+            //'of modes of up to '//to_text(int(max_size))//' bytes')
+      else
+         call read_mode_table(path, table, error)
+      end if
       if (allocated(error)) then
          error = input_error(path//': '//error%message)
       else

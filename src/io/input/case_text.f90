@@ -91,23 +91,18 @@ contains
       character(len=*), intent(in) :: directory
       !> Set if a path is too long.
       type(error_type), allocatable, intent(out) :: error
+      character(len=name_length), allocatable :: words(:)
       integer(int64) :: bytes
       integer :: i
 
       do i = 1, size(fields)
          if (.not. fields(i)%is_path) cycle
-         associate (path => fields(i)%text_value)
-            if (path == '' .or. path(1:1) == '/') cycle
-            call get_file_size(directory//trim(path), bytes)
-            if (bytes < 0) cycle
-            if (len(directory) + len_trim(path) > name_length) then
-               error = input_error('&'//trim(fields(i)%group)//': '//trim(fields(i)%key)//' = '//quoted(directory &
-                  //trim(path))//' is too long; allowed: up to '//to_text(name_length)//' characters with the directory ' &
-                  //'of the case')
-               return
-            end if
-            path = directory//path
-         end associate
+         call fields(i)%get_words(words)
+         if (words(1) == '' .or. words(1)(1:1) == '/') cycle
+         call get_file_size(directory//trim(words(1)), bytes)
+         if (bytes < 0) cycle
+         call fields(i)%set_from_text(quoted(directory//trim(words(1))), error)
+         if (allocated(error)) return
       end do
    end subroutine resolve_paths
 

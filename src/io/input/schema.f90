@@ -145,7 +145,7 @@ contains
       value = json_value(field)
       if (field%is_calibrated) value = 'null'
       text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
-         //text_value(field%key)//', "kind": '//text_value(field%get_kind())//', "unit": '//text_value(field%unit) &
+         //text_value(field%key)//', "kind": '//text_value(field%kind)//', "unit": '//text_value(field%unit) &
          //', "default": '//value//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
          //text_value(field%meaning)//', "needs": '//list_of(pack(field%needs, field%needs /= ''))
       if (field%range /= '') then
@@ -154,7 +154,7 @@ contains
             //end_value(interval%upper, interval%upper_expression)//', "lower_open": ' &
             //trim(merge('true ', 'false', interval%lower_open))//', "upper_open": ' &
             //trim(merge('true ', 'false', interval%upper_open))//', "whole": ' &
-            //trim(merge('true ', 'false', field%whole_entries .or. field%get_kind() == 'whole'))
+            //trim(merge('true ', 'false', field%whole_entries .or. field%kind == 'whole'))
       end if
       text = text//'}'
    end subroutine describe
@@ -164,17 +164,19 @@ contains
       type(field_type), intent(in) :: field
       !> A JSON value.
       character(len=:), allocatable :: value
+      character(len=name_length), allocatable :: words(:)
 
       call field%get_text(value)
-      select case (field%get_kind())
+      call field%get_words(words)
+      select case (field%kind)
       case ('flag')
          value = trim(merge('true ', 'false', value == '.true.'))
       case ('list')
          value = '['//value//']'
       case ('texts')
-         value = list_of(field%text_list_value%values(:field%text_list_value%count))
+         value = list_of(words)
       case ('choice', 'text')
-         value = text_value(field%text_value)
+         value = text_value(words(1))
       case default
          continue
       end select

@@ -127,13 +127,16 @@ contains
       do i = 1, size(samples)
          sample = samples(i)
          do j = 1, size(fields)
-            values(i, j) = fields(j)%real_value
+            values(i, j) = fields(j)%get_number()
          end do
       end do
       valid = samples%flux >= 1 .and. samples%flux <= size(compression_weights)
       do i = 1, size(fields)
          range = new_interval(fields(i)%range)
-         valid = valid .and. range%contains_rows(i, fields%key, values)
+         do j = 1, size(samples)
+            call range%resolve(fields%key, values(j, :))
+            valid(j) = valid(j) .and. range%contains(values(j, i))
+         end do
       end do
    end subroutine check_samples
 

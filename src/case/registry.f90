@@ -1,0 +1,76 @@
+!> The source models and the floors by name.
+module thud_registry
+   use thud_finite_element, only: finite_element_type
+   use thud_floor_model, only: floor_model_type
+   use thud_hollow_sphere, only: hollow_sphere_type
+   use thud_hunt_crossley, only: hunt_crossley_type
+   use thud_infinite_plate_floor, only: infinite_plate_floor_type
+   use thud_joist_floor, only: joist_floor_type
+   use thud_laminate_floor, only: laminate_floor_type
+   use thud_measured_mobility_floor, only: measured_mobility_floor_type
+   use thud_measured_modes, only: measured_modes_type
+   use thud_modal_ball, only: modal_ball_type
+   use thud_modal_floor, only: modal_floor_type
+   use thud_oscillator_floor, only: oscillator_floor_type
+   use thud_plate_floor, only: plate_floor_type
+   use thud_rigid_floor, only: rigid_floor_type
+   use thud_source_model, only: source_model_type
+   use thud_two_mass, only: two_mass_type
+   implicit none (type, external)
+   private
+
+   public :: floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
+
+   !> Names of the models and of the namelist groups with their options; the first is the default.
+   character(len=24), parameter :: model_names(*) = [character(len=24) :: 'modal_ball', 'finite_element', &
+      'hollow_sphere', 'measured_modes', 'hunt_crossley', 'two_mass']
+
+   !> Names of the floors and of their namelist groups; the first, the default, is rigid.
+   character(len=24), parameter :: floor_names(*) = [character(len=24) :: 'rigid', 'infinite_plate', 'oscillator', &
+      'plate', 'laminate_floor', 'joist_floor', 'measured_mobility', 'modal_floor']
+
+   !> Element of a list of models of different types.
+   type :: model_slot_type
+      !> The model with its options.
+      class(source_model_type), allocatable :: model
+   end type model_slot_type
+
+   !> Element of a list of floors of different types.
+   type :: floor_slot_type
+      !> The floor with its options.
+      class(floor_model_type), allocatable :: model
+   end type floor_slot_type
+
+contains
+
+   !> All models with their default options.
+   subroutine new_models(models)
+      !> The models, in the order of `model_names`: [n_model].
+      type(model_slot_type), allocatable, intent(out) :: models(:)
+
+      allocate (models(size(model_names)))
+      allocate (modal_ball_type :: models(1)%model)
+      allocate (finite_element_type :: models(2)%model)
+      allocate (hollow_sphere_type :: models(3)%model)
+      allocate (measured_modes_type :: models(4)%model)
+      allocate (hunt_crossley_type :: models(5)%model)
+      allocate (two_mass_type :: models(6)%model)
+   end subroutine new_models
+
+   !> All floors with their default options.
+   subroutine new_floors(floors)
+      !> The floors, in the order of `floor_names`: [n_floor].
+      type(floor_slot_type), allocatable, intent(out) :: floors(:)
+
+      allocate (floors(size(floor_names)))
+      allocate (rigid_floor_type :: floors(1)%model)
+      allocate (infinite_plate_floor_type :: floors(2)%model)
+      allocate (oscillator_floor_type :: floors(3)%model)
+      allocate (plate_floor_type :: floors(4)%model)
+      allocate (laminate_floor_type :: floors(5)%model)
+      allocate (joist_floor_type :: floors(6)%model)
+      allocate (measured_mobility_floor_type :: floors(7)%model)
+      allocate (modal_floor_type :: floors(8)%model)
+   end subroutine new_floors
+
+end module thud_registry

@@ -1,0 +1,273 @@
+!> Tables of text, files or pipes of any size, row by row. The first row determines whether tabs, semicolons, commas or blanks
+!> separate the cells, which may stand in quotes. Decimal commas are allowed in quotes, or if the comma is not the separator;
+!> a table must not mix decimal points and commas. Empty lines and text after a `#` are skipped.
+module thud_table_reader
+   use thud_error, only: error_type, input_error
+   use thud_kinds, only: wp
+   use thud_system, only: close_descriptor, directory_exists, open_descriptor, read_bytes
+   use thud_text, only: byte_order_mark, is_number, newline, quoted, replaced, tab, to_text
+   implicit none (type, external)
+   private
+
+   public :: cell_length, open_table, read_number, read_row, row_error, table_reader_type
+
+   !> Maximum length of a line.
+   integer, parameter :: line_length = 1048576
+
+   !> Maximum length of a cell.
+   integer, parameter :: cell_length = 64
+
+   !> An open table.
+   type :: table_reader_type
+      private
+      integer :: descriptor = -1
+      !> The bytes read last.
+      character(len=65536) :: buffer = ''
+      !> Number of bytes in the buffer, and number already returned.
+      integer :: filled = 0, taken = 0
+      !> Number of the latest line.
+      integer :: line = 0
+      !> Separator of the cells; a line feed, which no line holds, until the first row, and for a single column.
+      character(len=1) :: separator = newline
+      !> Decimal mark of the numbers; blank until a number has one.
+      character(len=1) :: decimal = ' '
+   end type table_reader_type
+
+contains
+
+   !> Opens a table.
+   subroutine open_table(path, table, error)
+      character(len=*), intent(in) :: path
+      type(table_reader_type), intent(out) :: table
+      !> Set if the file cannot be read; no message of a table names its path.
+      type(error_type), allocatable, intent(out) :: error
+
+      table%descriptor = open_descriptor(path)
+      call fill(table, error)
+      if (directory_exists(path)) error = input_error('this is a directory; allowed: a table')
+      if (index(table%buffer, byte_order_mark) == 1) table%taken = len(byte_order_mark)
+   end subroutine open_table
+
+   !> Refills the buffer; the table is closed at its end.
+   subroutine fill(table, error)
+      type(table_reader_type), intent(inout) :: table
+      !> Set if the file cannot be read.
+      type(error_type), allocatable, intent(out) :: error
+
+      table%taken = 0
+      table%filled = -1
+      if (table%descriptor >= 0) call read_bytes(table%descriptor, table%buffer, table%filled)
+      if (table%filled < 0) error = input_error('the file cannot be read; allowed: a table')
+      if (table%filled <= 0) call close_descriptor(table%descriptor)
+   end subroutine fill
+
+   !> The next line, without its end. Fortran's `read` would load a whole line into memory, however long.
+   subroutine read_line(table, line, error)
+      type(table_reader_type), intent(inout) :: table
+      !> The line; not allocated at the end of the table. Of a longer comment, its beginning.
+      character(len=:), allocatable, intent(out) :: line
+      !> Set if the line is too long or cannot be read.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: stop, n
+
+      stop = 0
+      do while (stop == 0 .and. table%descriptor >= 0)
+         if (table%taken >= table%filled) call fill(table, error)
+         if (allocated(error) .or. table%filled == 0) exit
+         if (.not. allocated(line)) then
+            line = ''
+            table%line = table%line + 1
+         end if
+         stop = index(table%buffer(table%taken + 1:table%filled), newline)
+         n = merge(stop - 1, table%filled - table%taken, stop > 0)
+         if (len(line) <= line_length) line = line//table%buffer(table%taken + 1:table%taken + n)
+         table%taken = table%taken + n + min(stop, 1)
+         if (len(line) <= line_length .or. line(1:1) == '#') cycle
+         error = row_error(table, 'it is too long; allowed: up to '//to_text(line_length)//' characters')
+         exit
+      end do
+   end subroutine read_line
+
+   !> The cells of the next row.
+   subroutine read_row(table, cells, error)
+      type(table_reader_type), intent(inout) :: table
+      !> The cells, without quotes and surrounding blanks, numbers with decimal points; none at the end: [n_cell].
+      character(len=cell_length), allocatable, intent(out) :: cells(:)
+      !> Set if a line cannot be read, a cell is too long, a quote is not closed, or a decimal mark is not clear.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: line
+      logical :: is_first
+
+      is_first = table%line == 0
+      do
+         call read_line(table, line, error)
+         if (allocated(error)) return
+         if (.not. allocated(line)) exit
+         ! On some systems lines end with a carriage return and a line feed.
+         line = trim(adjustl(replaced(line(:index(line//'#', '#') - 1), achar(13), ' ')))
+         if (line == '') cycle
+         if (is_first) call find_separator(get_structure(line), table%separator)
+         call split_line(table, line, cells, error)
+         if (.not. allocated(error)) call find_decimal(table, cells, error)
+         return
+      end do
+      allocate (cells(0))
+   end subroutine read_row
+
+   !> Separator of a table: the first of tab, semicolon, comma and blank that its first row holds.
+   pure subroutine find_separator(structure, separator)
+      !> The first row, without quoted text.
+      character(len=*), intent(in) :: structure
+      !> Unchanged for a single column.
+      character(len=1), intent(inout) :: separator
+      character(len=*), parameter :: known = tab//';, '
+      integer :: i
+
+      do i = len(known), 1, -1
+         if (index(structure, known(i:i)) > 0) separator = known(i:i)
+      end do
+   end subroutine find_separator
+
+   !> Splits a line into cells.
+   subroutine split_line(table, line, cells, error)
+      type(table_reader_type), intent(in) :: table
+      !> The line, without surrounding blanks.
+      character(len=*), intent(in) :: line
+      !> The cells, without surrounding blanks and quotes: [n_cell].
+      character(len=cell_length), allocatable, intent(out) :: cells(:)
+      !> Set if a cell is too long, or a quote is not closed.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=len(line)) :: structure
+      integer :: i, n, at, length, last
+
+      structure = get_structure(line)
+      associate (separator => table%separator)
+         last = len(line)
+         ! Spreadsheets may end lines with the separator.
+         if (separator == ';') last = verify(structure, '; ', back=.true.)
+         allocate (cells(count([(structure(i:i) == separator, i=1, last)]) + 1))
+         n = 0
+         at = 1
+         do while (at <= last + merge(1, 0, separator /= ' '))
+            length = index(structure(at:last)//separator, separator) - 1
+            n = n + 1
+            cells(n) = adjustl(line(at:at + length - 1))
+            if (len_trim(adjustl(line(at:at + length - 1))) > cell_length) then
+               error = row_error(table, quoted(trim(cells(n)))//'... is too long; allowed: values of up to ' &
+                  //to_text(cell_length)//' characters')
+            else if (scan(cells(n)(1:1), '''"') == 1) then
+               call unquote(table, cells(n), error)
+            end if
+            if (allocated(error)) return
+            at = at + length + 1
+            if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
+         end do
+      end associate
+      cells = cells(:n)
+   end subroutine split_line
+
+   !> Removes the quotes around a cell, and blanks next to them.
+   subroutine unquote(table, cell, error)
+      type(table_reader_type), intent(in) :: table
+      character(len=cell_length), intent(inout) :: cell
+      !> Set if the quote is not closed.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: last
+
+      last = len_trim(cell)
+      if (last > 1 .and. cell(last:last) == cell(1:1)) then
+         cell = adjustl(cell(2:last - 1))
+      else
+         error = row_error(table, 'a quote is not closed: '//trim(cell)//'; allowed: quotes that begin and end in one cell')
+      end if
+   end subroutine unquote
+
+   !> Finds the decimal mark of a table from the numbers of a row, and replaces it by a point.
+   subroutine find_decimal(table, cells, error)
+      type(table_reader_type), intent(inout) :: table
+      !> The cells of the row: [n_cell].
+      character(len=cell_length), intent(inout) :: cells(:)
+      !> Set if a number has another decimal mark than earlier ones, or its comma may also separate thousands.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: ambiguous, i, at
+
+      ambiguous = 0
+      do i = 1, size(cells)
+         at = scan(cells(i), '.,')
+         if (at == 0 .or. .not. is_number(trim(replaced(cells(i), ',', '.')))) cycle
+         if (table%decimal /= ' ' .and. cells(i)(at:at) /= table%decimal) then
+            error = row_error(table, quoted(trim(cells(i)))//' has another decimal mark than the numbers before it; ' &
+               //'allowed: one decimal mark in a table')
+            return
+         end if
+         if (table%decimal == ' ' .and. may_separate_thousands(cells(i))) then
+            ambiguous = i
+         else
+            table%decimal = cells(i)(at:at)
+         end if
+      end do
+      if (ambiguous > 0 .and. table%decimal == ' ') error = row_error(table, quoted(trim(cells(ambiguous))) &
+         //' may have a decimal comma or be a thousand times as much; allowed: numbers such as 1575 and 1,5750')
+      do i = 1, size(cells)
+         cells(i) = replaced(cells(i), ',', '.')
+      end do
+   end subroutine find_decimal
+
+   !> Whether the comma of a number may separate thousands, as in 1,575.
+   pure function may_separate_thousands(cell) result(may)
+      character(len=*), intent(in) :: cell
+      logical :: may
+      integer :: first, comma
+
+      first = verify(cell, '+-')
+      comma = index(cell, ',')
+      may = comma > first .and. comma - first <= 3 .and. len_trim(cell) - comma == 3 .and. cell(first:first) /= '0' &
+         .and. verify(trim(cell(first:)), '0123456789,') == 0
+   end function may_separate_thousands
+
+   !> A line with `x` for quoted text, because separators in quotes do not separate.
+   pure function get_structure(line) result(structure)
+      character(len=*), intent(in) :: line
+      character(len=len(line)) :: structure
+      character(len=1) :: quote
+      integer :: i
+
+      structure = line
+      quote = ' '
+      do i = 1, len(line)
+         if (quote /= ' ') then
+            if (line(i:i) == quote) quote = ' '
+            structure(i:i) = 'x'
+         else if (scan(line(i:i), '''"') == 1) then
+            quote = line(i:i)
+            structure(i:i) = 'x'
+         end if
+      end do
+   end function get_structure
+
+   !> The finite number in a cell.
+   pure subroutine read_number(cell, value, valid)
+      character(len=*), intent(in) :: cell
+      real(wp), intent(out) :: value
+      !> The cell is one.
+      logical, intent(out) :: valid
+      character(len=128) :: message
+      integer :: status
+
+      value = 0.0_wp
+      status = merge(0, 1, is_number(trim(cell)))
+      if (status == 0) read (cell, *, iostat=status, iomsg=message) value
+      valid = status == 0 .and. abs(value) <= huge(value)
+   end subroutine read_number
+
+   !> Error for the latest row.
+   function row_error(table, message) result(error)
+      type(table_reader_type), intent(in) :: table
+      !> The fault in the row.
+      character(len=*), intent(in) :: message
+      type(error_type) :: error
+
+      error = input_error('line '//to_text(table%line)//': '//message)
+   end function row_error
+
+end module thud_table_reader
