@@ -5,38 +5,98 @@
 !> creep of the material. Time steps are exact for each mode. In every step the forces of the surface rings make gaps and
 !> pressures complementary: no ring penetrates, none pulls, and there is no penalty stiffness.
 module thud_modal_ball
-   use thud_ball, only: ball_type
-   use thud_ball_motion, only: ball_motion_type, new_ball_motion, stays_clear, take_step
+   use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: add_model_quantity, add_to_means, force_history_type, max_residual, new_force_history
-   use thud_interrupt, only: check_interrupt
+   use thud_field, only: field_type, list_type, name_length
+   use thud_force_history, only: add_model_quantity, force_history_type
    use thud_kinds, only: wp
-   use thud_lapack, only: dgemm
-   use thud_modal_ball_options, only: get_error_ratio, max_phase, modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
-   use thud_modal_damping, only: set_damping
-   use thud_mode_step, only: get_energies, mode_step_type, index_amplitude, set_factors
-   use thud_receiver, only: can_strike, get_pole_count, new_receiver_step, receiver_step_type, receiver_type
-   use thud_ring_contact, only: new_ring_contact, ring_contact_type
-   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_sphere_modes, only: basis_type, family_type, get_families, get_static_family, limit_family, new_basis
-   use thud_static_step, only: new_static_step, static_step_type
-   use thud_surface_rings, only: new_surface_rings, surface_rings_type
-   use thud_text, only: fixed, significant, to_text
+   use thud_modal_run, only: march, modal_run_type, new_history, start_run
+   use thud_mode_step, only: damping_type, index_amplitude, new_damping, new_modes, new_static_step, set_factors
+   use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
+   use thud_prony, only: check_fractional_loss
+   use thud_receiver, only: new_receiver_step, receiver_type
+   use thud_ring_contact, only: new_ring_contact
+   use thud_sampling, only: sampling_type
+   use thud_source_model, only: resolution_type, source_model_type
+   use thud_sphere_modes, only: basis_type, family_type, get_families, get_flexibility, limit_family, new_basis
+   use thud_surface_rings, only: get_ring_response, greatest_angle, new_surface_rings
+   use thud_text, only: to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
 
    public :: modal_ball_type
 
-   !> Number of harmonics whose energies are recorded separately, from n = 0 on.
-   integer, parameter :: n_family = 6
+   !> Rings of levels 0 and 1.
+   real(wp), parameter :: coarse_rings = 36.0_wp, default_rings = 40.0_wp
 
-   !> The model.
-   type, extends(modal_ball_options_type) :: modal_ball_type
+   !> Minimum of the highest frequency of the modes of level 0, Hz, and the same for stiff balls, divided by the velocity of
+   !> shear waves per outer radius.
+   real(wp), parameter :: min_frequency = 1000.0_wp, min_relative_frequency = 2.1_wp
+
+   !> Minimum of the highest frequency that the user may state, Hz.
+   real(wp), parameter :: lowest_frequency = 10.0_wp
+
+   !> Ratio of frequencies from one level to the next, and of rings from level 1 on.
+   real(wp), parameter :: ratio = 1.4_wp
+
+   !> Highest level of resolution.
+   integer, parameter :: highest_level = 3
+
+   !> Angle of the outermost ring divided by that of the contact of a coarser drop; rings of level 0 are added.
+   real(wp), parameter :: margin = 1.1_wp
+   integer, parameter :: added_rings = 2
+
+   !> Error of a level divided by its difference from the next coarser one: 1/(ratio**2 - 1) for the error of second order,
+   !> and half as much again for modes that enter one by one (docs/modal_ball.md).
+   real(wp), parameter :: usual_ratio = 1.5_wp
+
+   !> Deflection relative to the radius above which, and Poisson's ratio below which it is larger.
+   real(wp), parameter :: wide_contact = 0.36_wp, compressible = 0.4_wp
+
+   !> Number of steps in a contact from level 1 on, as far as at most twice the steps of a level reach it.
+   real(wp), parameter :: min_steps = 500.0_wp
+
+   !> Maximum number of steps of level 1 in a step of the input, see `refine`.
+   integer, parameter :: max_refinement = 4
+
+   !> Maximum phase angle of a mode in a step; faster modes respond statically.
+   real(wp), parameter :: max_phase = pi/2
+
+   !> The model with its options.
+   type, extends(source_model_type) :: modal_ball_type
+      !> Highest frequency of modes that oscillate, Hz; 0: chosen with the resolution.
+      real(wp) :: highest_frequency = 0.0_wp
+      !> Number of rings of the surface that carry the pressure; 0: chosen with the resolution.
+      integer :: rings = 0
+      !> Loss factor: `constant`, `rising` in proportion to frequency, or of a `fractional` law.
+      character(len=name_length) :: damping_law = 'rising'
+      !> Loss factor, twice the damping ratio.
+      real(wp) :: loss_factor = 0.31_wp
+      !> Frequency at which `loss_factor` applies if it is not constant, Hz. At this frequency the storage modulus is the
+      !> modulus of the ball.
+      real(wp) :: loss_frequency = 74.0_wp
+      !> Order of the fractional derivative.
+      real(wp) :: fractional_order = 0.3_wp
+      !> Whether the gas in the cavity resists changes of its volume.
+      logical :: cavity_gas = .true.
+      !> Whether gravity acts during the contact too.
+      logical :: contact_gravity = .false.
+      !> Friction of the floor: `none`, or `stick` (touching rings do not slide).
+      character(len=name_length) :: floor_friction = 'none'
+      !> Harmonics treated as quasi-static instead of oscillating.
+      type(list_type) :: static_families
+      !> Set by `refine`, no keys: angle of the outermost ring from the lowest point, rad, and modes that levels 0 and 1
+      !> share: [0:highest harmonic].
+      real(wp) :: outermost_angle = greatest_angle
+      type(family_type), allocatable :: families(:)
    contains
+      procedure :: get_fields
+      procedure :: check
+      procedure :: refine
       procedure :: solve
       procedure :: compress
       procedure :: get_standard_modulus
@@ -44,6 +104,153 @@ module thud_modal_ball
    end type modal_ball_type
 
 contains
+
+   !> Keys and allowed ranges.
+   function get_fields(self) result(fields)
+      class(modal_ball_type), intent(in), target :: self
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('highest_frequency', self%highest_frequency, 'Hz', &
+         'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]', &
+         is_numerical=.true.), &
+         integer_field('rings', self%rings, &
+         'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
+         choice_field('damping_law', self%damping_law, 'damping law: loss factor as a function of frequency', &
+         [character(len=10) :: 'constant', 'rising', 'fractional']), &
+         only_with('damping_law', ['rising    ', 'fractional', 'constant  '], [real_field('loss_factor', &
+         self%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', is_calibrated=.true.)]), &
+         only_with('damping_law', ['rising    ', 'fractional'], [real_field('loss_frequency', self%loss_frequency, 'Hz', &
+         'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]', &
+         is_calibrated=.true.)]), &
+         only_with('damping_law', ['fractional'], [real_field('fractional_order', self%fractional_order, '', &
+         'order of the derivative, for fractional; 1: as rising', '(0, 1]')]), &
+         logical_field('cavity_gas', self%cavity_gas, 'the gas in the cavity resists volume changes'), &
+         logical_field('contact_gravity', self%contact_gravity, 'gravity acts also during the contact'), &
+         choice_field('floor_friction', self%floor_friction, 'friction of the floor: none or infinite (sticking)', &
+         [character(len=5) :: 'none', 'stick']), &
+         list_field('static_families', self%static_families, '', 'harmonics treated as quasi-static', &
+         '[0, 400]', whole=.true.)]
+   end function get_fields
+
+   !> Returns an error if no fractional law has this loss factor, if there is a single ring, or if the modes without inertia
+   !> would creep more slowly than the contact.
+   subroutine check(self, ball, sampling, error)
+      class(modal_ball_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      type(sampling_type), intent(in) :: sampling
+      type(error_type), allocatable, intent(out) :: error
+
+      if (self%rings == 1) then
+         error = input_error('&modal_ball: rings = 1 cannot carry a pressure; allowed: from 2, or 0 for automatic')
+      else if (self%highest_frequency > 0.0_wp .and. self%highest_frequency < lowest_frequency) then
+         error = input_error('&modal_ball: highest_frequency = '//to_text(self%highest_frequency) &
+            //' Hz is not allowed; allowed: from '//to_text(lowest_frequency)//' to 20000 Hz, or 0 for automatic')
+      else if (self%damping_law == 'fractional') then
+         call check_fractional_loss('modal_ball', self%fractional_order, self%loss_factor, self%loss_frequency, &
+            error)
+      end if
+   end subroutine check
+
+   !> The model at a level of resolution: modes, rings around the contact of the coarser drop, and time steps. Levels 0 and 1
+   !> share their modes. If the user sets the resolution, it does not grow.
+   subroutine refine(self, ball, level, coarse, sampling, refined, resolution)
+      class(modal_ball_type), intent(inout) :: self
+      type(ball_type), intent(in) :: ball
+      integer, intent(in) :: level
+      type(force_history_type), intent(in) :: coarse
+      type(sampling_type), intent(inout) :: sampling
+      class(source_model_type), allocatable, intent(out) :: refined
+      type(resolution_type), intent(out) :: resolution
+      class(modal_ball_type), allocatable :: finer
+      type(error_type), allocatable :: error
+      real(wp) :: contact_steps
+      integer :: refinement
+      logical :: few_modes
+
+      ! After an error there are no families; the drop repeats it, and returns the error.
+      if (level == 0) call get_families(ball, self%cavity_gas, min(2*pi*max(get_frequency(self, ball, 0), &
+         get_frequency(self, ball, 1)), max_phase*sampling%sample_rate*sampling%substeps*max_refinement), &
+         self%families, error)
+      if (level > 1 .and. allocated(self%families)) deallocate (self%families)
+      allocate (finer, source=self)
+      finer%rings = get_ring_count(self, level)
+      finer%highest_frequency = get_frequency(self, ball, level)
+      refinement = 2**level
+      contact_steps = coarse%contact_time*sampling%sample_rate*sampling%substeps
+      ! Sticking rings converge slowly; without them few steps suffice.
+      if (contact_steps > 0.0_wp .and. self%floor_friction /= 'stick') then
+         refinement = min(2*refinement, max(refinement/2, ceiling(min_steps/contact_steps)))
+      end if
+      sampling%substeps = sampling%substeps*refinement
+      few_modes = has_few_modes(self, ball)
+      ! A ball with few modes may have a larger contact than one with more.
+      if (self%rings == 0 .and. allocated(coarse%model_history) .and. .not. few_modes) finer%outermost_angle = &
+         min(greatest_angle, margin*asin(maxval(coarse%model_history(:, 1))/ball%outer_radius) &
+         + added_rings*greatest_angle/(coarse_rings - 1))
+      resolution = resolution_type(lowers_error=level <= 1 .or. level <= highest_level .and. .not. few_modes &
+         .and. (self%rings == 0 .or. .not. self%highest_frequency > 0.0_wp), reference=level - 1)
+      call move_alloc(finer, refined)
+   end subroutine refine
+
+   !> Number of rings: that of the user, fewer at level 0, or that of the level of resolution.
+   pure function get_ring_count(self, level) result(n_ring)
+      type(modal_ball_type), intent(in) :: self
+      integer, intent(in) :: level
+      integer :: n_ring
+
+      n_ring = nint(merge(coarse_rings, default_rings*ratio**(level - 1), level == 0))
+      if (self%rings > 0) n_ring = max(2, nint(self%rings*ratio**(level - 1)))
+   end function get_ring_count
+
+   !> Highest frequency of oscillating modes at a level of resolution, Hz: automatic, or that of the user at level 1, lower
+   !> at level 0. If the user leaves out modes that matter, the other levels have them, so that the error is known.
+   pure function get_frequency(self, ball, level) result(frequency)
+      type(modal_ball_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      integer, intent(in) :: level
+      real(wp) :: frequency
+
+      if (self%highest_frequency > 0.0_wp .and. (level == 1 .or. .not. has_few_modes(self, ball))) then
+         frequency = self%highest_frequency*ratio**(level - 1)
+      else
+         frequency = get_automatic_frequency(self, ball)*ratio**level
+      end if
+   end function get_frequency
+
+   !> Highest frequency of oscillating modes at level 0 where the user leaves it open, Hz.
+   pure function get_automatic_frequency(self, ball) result(frequency)
+      type(modal_ball_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      real(wp) :: frequency
+
+      frequency = max(min_frequency, min_relative_frequency*sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio) &
+         *get_density(ball)))/ball%outer_radius)
+      ! Rings that are released lose the energy of modes without inertia.
+      if (self%floor_friction == 'stick') frequency = 2*frequency
+   end function get_automatic_frequency
+
+   !> Whether the user's highest frequency is so low that even level 0 has more modes where it is automatic.
+   pure function has_few_modes(self, ball) result(yes)
+      type(modal_ball_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      logical :: yes
+
+      yes = self%highest_frequency > 0.0_wp .and. self%highest_frequency*ratio < get_automatic_frequency(self, ball)
+   end function has_few_modes
+
+   !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
+   !> (docs/modal_ball.md).
+   pure function get_error_ratio(ball, history) result(ratio)
+      type(ball_type), intent(in) :: ball
+      !> The result.
+      type(force_history_type), intent(in) :: history
+      real(wp) :: ratio
+
+      ! Wide contacts and compressible walls converge more slowly.
+      ratio = usual_ratio + 25*max(0.0_wp, history%max_deflection/ball%outer_radius - wide_contact)
+      if (ball%poisson_ratio < compressible) ratio = max(ratio, 2.5_wp)
+   end function get_error_ratio
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
    !> modulus.
@@ -67,15 +274,22 @@ contains
       if (.not. self%contact_gravity) limits = [limits, get_gravity_limit(drop, history)]
    end function get_validity_limits
 
-   !> Force on each of two plates in a quasi-static compression.
+   !> Force on each of two plates in a quasi-static compression, with the long-term modulus.
    subroutine compress(self, ball, deflection, force, error)
       class(modal_ball_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       real(wp), intent(in) :: deflection(:)
       real(wp), intent(out) :: force(:)
       type(error_type), allocatable, intent(out) :: error
+      type(ball_type) :: relaxed
+      type(damping_type) :: damping
 
-      call compress_modal_ball(ball, self, deflection, force, error)
+      call new_damping(self%damping_law, self%loss_factor, self%loss_frequency, self%fractional_order, &
+         get_frequency(self, ball, 1), damping)
+      relaxed = ball
+      relaxed%youngs_modulus = damping%equilibrium_ratio*ball%youngs_modulus
+      call compress_modal_ball(relaxed, self%cavity_gas, new_surface_rings(get_ring_count(self, 1), greatest_angle, &
+         self%floor_friction == 'stick'), deflection, force, error)
    end subroutine compress
 
    !> Force history of one drop.
@@ -87,370 +301,102 @@ contains
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type), intent(in), optional :: receiver
-      type(mode_step_type) :: modes
-      type(static_step_type) :: static
-      type(ring_contact_type) :: contact
-      type(surface_rings_type) :: rings
-      type(receiver_type) :: floor
-      type(ball_motion_type) :: state
-      real(wp) :: interval
-      integer :: n_sample, i
+      type(modal_run_type) :: run
 
-      if (present(receiver)) floor = receiver
-
-      n_sample = get_sample_count(sampling)
-      interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
-      history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
-      history%has_means = .true.
-      history%impact_velocity = get_impact_velocity(drop)
-      if (self%level > 0) then
-         history%model_history_name = [character(len=24) :: 'contact_radius_m', &
-            ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']
-      else
-         history%model_history_name = [character(len=24) :: 'contact_radius_m']
-      end if
-      allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
-      rings = new_surface_rings(self%get_ring_count(), self%outermost_angle, self%floor_friction == 'stick')
-      call prepare(self, ball, rings, floor, interval, modes, static, contact, error)
-      if (.not. allocated(error)) then
-         state = new_ball_motion(modes, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
-            merge(drop%gravity, 0.0_wp, self%contact_gravity))
-         if (state%floor_moves) then
-            allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
-         end if
-         call march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
-         history%error_ratio = get_error_ratio(ball, history)
-         call add_model_quantity(history, 'rings', '', real(size(rings%radius), wp))
-         call add_model_quantity(history, 'highest_frequency', 'Hz', &
-            min(self%get_highest_frequency(), max_phase/(2*pi*interval)))
-         call add_model_quantity(history, 'substeps', '', real(sampling%substeps, wp))
-      end if
+      if (present(receiver)) run%floor = receiver
+      run%ball = ball
+      run%interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
+      call prepare(self, run, error)
+      if (allocated(error)) return
+      call start_run(run, get_impact_velocity(drop), merge(drop%gravity, 0.0_wp, self%contact_gravity))
+      history = new_history(run, sampling)
+      call march(run, sampling, history, error)
+      history%error_ratio = get_error_ratio(ball, history)
+      call add_model_quantity(history, 'rings', '', real(size(run%rings%radius), wp))
+      call add_model_quantity(history, 'highest_frequency', 'Hz', &
+         min(get_frequency(self, ball, 1), max_phase/(2*pi*run%interval)))
+      call add_model_quantity(history, 'substeps', '', real(sampling%substeps, wp))
    end subroutine solve
 
-   !> Sets the modes, the factors of their time steps, and the response of the rings.
-   subroutine prepare(self, ball, rings, floor, interval, modes, static, contact, error)
-      !> Modes and damping.
-      class(modal_ball_options_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(surface_rings_type), intent(in) :: rings
-      !> The floor under the ball.
-      type(receiver_type), intent(in) :: floor
-      !> Length of a step, s.
-      real(wp), intent(in) :: interval
-      type(mode_step_type), intent(out) :: modes
-      type(static_step_type), intent(out) :: static
-      type(ring_contact_type), intent(out) :: contact
+   !> Sets the steps of the modes, and the contact of the rings.
+   subroutine prepare(self, run, error)
+      type(modal_ball_type), intent(in) :: self
+      !> The run; ball, floor and length of a step are set.
+      type(modal_run_type), intent(inout) :: run
       !> Set if the modes cannot be computed, or if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       type(family_type), allocatable :: families(:)
-      type(receiver_step_type) :: floor_step
-      real(wp), allocatable :: response(:, :), flexibility(:, :)
-      real(wp), allocatable :: zeta(:)
-      real(wp) :: highest_omega, own_response
+      real(wp), allocatable :: flexibility(:, :, :), gain(:, :, :), response(:, :)
+      real(wp) :: highest_omega, omega
       logical :: failed
+      integer :: i, n
 
-      highest_omega = min(2*pi*self%get_highest_frequency(), max_phase/interval)
+      highest_omega = min(2*pi*get_frequency(self, run%ball, 1), max_phase/run%interval)
       if (allocated(self%families)) then
          families = self%families
       else
-         call get_families(ball, self%cavity_gas, highest_omega, families, error)
+         call get_families(run%ball, self%cavity_gas, highest_omega, families, error)
          if (allocated(error)) return
       end if
-      call set_modes(self, rings, highest_omega, families, modes)
-      allocate (zeta, mold=modes%omega)
-      call set_damping(self, modes, zeta)
-      call set_factors(modes, zeta, interval)
-      call get_response(self, ball, rings, families, modes, flexibility, response, error)
+      do n = 0, ubound(families, 1)
+         omega = highest_omega
+         if (any(nint(self%static_families%values(:self%static_families%count)) == n)) omega = 0.0_wp
+         call limit_family(omega, families(n))
+      end do
+      run%rings = new_surface_rings(get_ring_count(self, 1), self%outermost_angle, self%floor_friction == 'stick')
+      run%modes = new_modes(families, run%rings)
+      call new_damping(self%damping_law, self%loss_factor, self%loss_frequency, self%fractional_order, &
+         get_frequency(self, run%ball, 1), run%modes%damping)
+      call set_factors(run%modes, run%interval)
+      call get_flexibilities(self, run, families, flexibility, error)
       if (allocated(error)) return
-      static = new_static_step(modes, interval, flexibility)
-      ! Response of the rigid ball and of the floor.
-      floor_step = new_receiver_step(floor, interval)
-      own_response = interval**2/(2*ball%mass) + floor_step%compliance
-      response = static%gain(1)*flexibility + response
-      response(::rings%n_dof, ::rings%n_dof) = response(::rings%n_dof, ::rings%n_dof) + own_response
-      call new_ring_contact(response, rings%n_dof, contact, failed)
-      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(rings%radius)) &
+      run%static_modes = new_static_step(run%modes%damping, run%interval, get_ring_response(run%rings, flexibility))
+      ! Response of the oscillating modes after one step, of those without inertia, of the rigid ball and of the floor.
+      allocate (gain(2, 2, 0:ubound(run%modes%first, 1) - 1), source=0.0_wp)
+      do i = 1, size(run%modes%omega)
+         associate (g => gain(:, :, run%modes%harmonic(i)), surface => run%modes%surface(i, :))
+            g = g + run%modes%gain(i, index_amplitude)*spread(surface, 1, 2)*spread(surface, 2, 2)
+         end associate
+      end do
+      response = run%static_modes%gain(1)*run%static_modes%flexibility + get_ring_response(run%rings, gain)
+      run%floor_step = new_receiver_step(run%floor, run%interval)
+      associate (own => response(::run%rings%n_dof, ::run%rings%n_dof))
+         own = own + (run%interval**2/(2*run%ball%mass) + run%floor_step%compliance)
+      end associate
+      call new_ring_contact(response, run%rings%n_dof, run%contact, failed)
+      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(run%rings%radius)) &
          //' cannot be distinguished; allowed: fewer rings, or more substeps')
    end subroutine prepare
 
-   !> Sets the modes that oscillate.
-   subroutine set_modes(self, rings, highest_omega, families, modes)
-      !> Harmonics treated as quasi-static.
-      class(modal_ball_options_type), intent(in) :: self
-      type(surface_rings_type), intent(in) :: rings
-      !> Highest angular frequency of modes that oscillate, rad/s.
-      real(wp), intent(in) :: highest_omega
-      !> All modes; only those that oscillate remain, and the flexibility of the others: [0:highest].
-      type(family_type), intent(inout) :: families(0:)
-      !> The modes; their frequencies, harmonics and shapes are set here.
-      type(mode_step_type), intent(inout) :: modes
-      integer :: n, n_mode, highest
-
-      do n = 0, ubound(families, 1)
-         associate (chosen => self%static_families)
-            call limit_family(merge(0.0_wp, highest_omega, any(nint(chosen%values(:chosen%count)) == n)), families(n))
-         end associate
-      end do
-      highest = min(ubound(families, 1), ubound(rings%shape_at_ring, 3))
-      n_mode = sum([(size(families(n)%omega), n=0, highest)])
-      allocate (modes%omega(n_mode), modes%harmonic(n_mode), modes%surface(n_mode, 2))
-      allocate (modes%first(0:highest + 1))
-      modes%first(0) = 1
-      do n = 0, highest
-         modes%first(n + 1) = modes%first(n) + size(families(n)%omega)
-         associate (first => modes%first(n), last => modes%first(n + 1) - 1)
-            modes%omega(first:last) = families(n)%omega
-            modes%harmonic(first:last) = n
-            modes%surface(first:last, :) = transpose(families(n)%surface)
-         end associate
-      end do
-      modes%shape_at_ring = reshape(rings%shape_at_ring(:, :, :highest), [size(rings%shape_at_ring, 1), 2*(highest + 1)])
-      modes%ring_load = transpose(modes%shape_at_ring)
-   end subroutine set_modes
-
-   !> Displacements of the rings due to unit forces on them.
-   subroutine get_response(self, ball, rings, families, modes, flexibility, response, error)
-      class(modal_ball_options_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(surface_rings_type), intent(in) :: rings
-      !> Families that have modes: [0:highest].
+   !> Flexibilities of all harmonics of the rings, without the modes that oscillate.
+   subroutine get_flexibilities(self, run, families, flexibility, error)
+      type(modal_ball_type), intent(in) :: self
+      !> The run; its rings are set.
+      type(modal_run_type), intent(in) :: run
+      !> Harmonics that have modes: [0:highest].
       type(family_type), intent(in) :: families(0:)
-      !> The modes and their gains.
-      type(mode_step_type), intent(in) :: modes
-      !> Due to the modes without inertia, m/N: [n_gap, n_gap].
-      real(wp), allocatable, intent(out) :: flexibility(:, :)
-      !> Due to the oscillating modes after one step, m/N: [n_gap, n_gap].
-      real(wp), allocatable, intent(out) :: response(:, :)
+      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2, 0:highest].
+      real(wp), allocatable, intent(out) :: flexibility(:, :, :)
       !> Set if a flexibility cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
-      type(family_type) :: family
-      real(wp), allocatable :: displacement(:, :, :)
-      real(wp) :: gain(2, 2, 0:ubound(families, 1))
       logical :: failed
-      integer :: n, i, highest
+      integer :: n
 
-      highest = ubound(rings%shape_at_ring, 3)
-      basis = new_basis(ball, 0, self%cavity_gas)
-      associate (n_gap => size(rings%shape_at_ring, 1))
-         allocate (displacement(n_gap, 2, 0:highest), flexibility(n_gap, n_gap), response(n_gap, n_gap))
-      end associate
-      do n = 0, highest
+      basis = new_basis(run%ball, 0, self%cavity_gas)
+      allocate (flexibility(2, 2, 0:ubound(run%rings%shape_at_ring, 3)))
+      do n = 0, ubound(flexibility, 3)
          if (n <= ubound(families, 1)) then
-            displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), families(n)%flexibility)
+            flexibility(:, :, n) = families(n)%flexibility
             cycle
          end if
-         call get_static_family(basis, n, family, failed)
+         call get_flexibility(basis, n, flexibility(:, :, n), failed)
          if (failed) then
             error = numerical_error('&modal_ball: rings: the flexibility of harmonic '//to_text(n) &
                //' cannot be computed; allowed: fewer rings, or a thinner wall')
             return
          end if
-         displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), family%flexibility)
       end do
-      call multiply(displacement, flexibility)
-      gain = 0.0_wp
-      do i = 1, size(modes%omega)
-         associate (g => gain(:, :, modes%harmonic(i)), surface => modes%surface(i, :))
-            g = g + modes%gain(i, index_amplitude)*spread(surface, 1, 2)*spread(surface, 2, 2)
-         end associate
-      end do
-      highest = size(modes%shape_at_ring, 2)/2 - 1
-      do n = 0, highest
-         displacement(:, :, n) = product_of(rings%shape_at_ring(:, :, n), gain(:, :, n))
-      end do
-      call multiply(displacement(:, :, :highest), response)
-
-   contains
-
-      !> The shapes at the rings of one harmonic, times a matrix: [n_gap, 2].
-      pure function product_of(shape_at_ring, matrix) result(product)
-         real(wp), intent(in) :: shape_at_ring(:, :)
-         real(wp), intent(in) :: matrix(2, 2)
-         real(wp) :: product(size(shape_at_ring, 1), 2)
-         integer :: j
-
-         do j = 1, 2
-            product(:, j) = shape_at_ring(:, 1)*matrix(1, j) + shape_at_ring(:, 2)*matrix(2, j)
-         end do
-      end function product_of
-
-      !> Sum over harmonics of displacements times the shapes at the rings.
-      subroutine multiply(displacement, sum_of_products)
-         real(wp), intent(in), contiguous :: displacement(:, :, 0:)
-         real(wp), intent(out), contiguous :: sum_of_products(:, :)
-
-         associate (n_gap => size(displacement, 1), n_column => 2*size(displacement, 3))
-            call dgemm('N', 'T', n_gap, n_gap, n_column, 1.0_wp, displacement, n_gap, rings%shape_at_ring, n_gap, 0.0_wp, &
-               sum_of_products, n_gap)
-         end associate
-      end subroutine multiply
-
-   end subroutine get_response
-
-   !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
-   subroutine march(ball, sampling, interval, rings, modes, static, contact, state, history, error)
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      real(wp), intent(in) :: interval
-      type(surface_rings_type), intent(in) :: rings
-      type(mode_step_type), intent(in) :: modes
-      type(static_step_type), intent(in) :: static
-      type(ring_contact_type), intent(inout) :: contact
-      !> Motion of ball and floor.
-      type(ball_motion_type), intent(inout) :: state
-      type(force_history_type), intent(inout) :: history
-      !> Set if the contact outlasts the record, or if too much energy is lost in the contact.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: settling_time, before, fraction, clearance, last_clearance
-      integer :: i, j, n_step, last_contact, nearest
-      logical :: has_separated
-
-      ! The surface may touch again while the slowest mode swings back, half a period later.
-      settling_time = 0.0_wp
-      if (size(modes%omega) > 0) settling_time = pi/(sqrt(modes%equilibrium_ratio)*minval(modes%omega))
-      last_contact = 0
-      clearance = 0.0_wp
-      has_separated = .false.
-      samples: do i = 1, size(history%floor_force)
-         call record_motion(ball, modes, state, i, history)
-         do j = 1, sampling%substeps
-            n_step = (i - 1)*sampling%substeps + j
-            fraction = min(1.0_wp, max(0.0_wp, j - sampling%substeps/2.0_wp))
-            before = state%floor_motion%displacement
-            call take_step(modes, static, interval, ball%mass, state, contact, error)
-            call check_interrupt(error)
-            if (allocated(error)) return
-            last_clearance = clearance
-            clearance = minval(state%gap(::contact%n_dof))
-            if (contact%outermost > 0) then
-               last_contact = n_step
-               history%impulse = history%impulse + state%force*interval
-               history%step_peak_force = max(history%step_peak_force, state%force)
-               call add_to_means(state%force*interval, 1/sampling%sample_rate, i, fraction, history%component(:, 1))
-               nearest = min(i + nint(fraction), size(history%floor_force))
-               history%model_history(nearest, 1) = max(history%model_history(nearest, 1), &
-                  ball%outer_radius*rings%radius(contact%outermost))
-            else if (n_step == last_contact + 1) then
-               ! Forces are means over a step that close the gaps at its end.
-               history%exact_contact_time = (n_step - 0.5_wp - clearance/(clearance - last_clearance))*interval
-            end if
-            if (contact%outermost == size(rings%radius)) then
-               error = numerical_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low for this ' &
-                  //'drop: '//significant(1.0e3_wp*n_step*interval, 3)//' ms after first touch the ball lies on its ' &
-                  //'outermost ring, its center lowered by ' &
-                  //significant(1.0e3_wp*(ball%outer_radius - state%height), 3)//' mm; allowed: a stiffer ball, or a ' &
-                  //'lower height')
-               return
-            end if
-            if (state%floor_moves) call add_to_means(state%floor_motion%displacement - before, 1/sampling%sample_rate, i, &
-               fraction, history%floor_velocity)
-            has_separated = state%velocity > 0.0_wp .and. (n_step - last_contact)*interval > settling_time
-            if (has_separated .and. .not. state%floor_moves) exit samples
-         end do
-         if (contact%outermost == 0 .and. .not. state%floor_moves) then
-            ! Without gravity the end is often certain sooner.
-            has_separated = stays_clear(modes, contact%n_dof, state)
-            if (has_separated) exit samples
-         end if
-      end do samples
-      if (state%floor_moves) history%velocity = history%velocity - history%floor_velocity
-      call check_end(sampling, settling_time, has_separated, contact, state, error)
-      if (allocated(error)) return
-      history%contact_time = last_contact*interval
-      call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(ball, n_step*interval, modes, state, history, error)
-   end subroutine march
-
-   !> Returns an error if the record ends too early.
-   subroutine check_end(sampling, settling_time, has_separated, contact, state, error)
-      type(sampling_type), intent(in) :: sampling
-      !> Time without contact after which the surface no longer touches, s.
-      real(wp), intent(in) :: settling_time
-      !> Whether this time has passed and the ball rises.
-      logical, intent(in) :: has_separated
-      type(ring_contact_type), intent(in) :: contact
-      !> Motion of ball and floor.
-      type(ball_motion_type), intent(in) :: state
-      !> Set if the ball touches the floor or may touch it again.
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: cause, allowed
-
-      if (.not. has_separated) then
-         cause = ''
-         allowed = 'longer than that'
-         if (state%floor_moves) then
-            cause = ', probably because the floor is so soft that the ball sinks into it instead of rebounding'
-            allowed = 'a stiffer floor, covering or floating plate, or a longer duration'
-         end if
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact'//cause//'; allowed: '//allowed)
-      else if (state%floor_moves) then
-         if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_dof)), state%velocity)) then
-            error = input_error('&sampling: duration = '//to_text(sampling%duration) &
-               //' s ends while the floor may strike the ball again; allowed: longer')
-         end if
-      end if
-   end subroutine check_end
-
-   !> Sets the scalars of the impact, and checks the balances.
-   subroutine finish(ball, time, modes, state, history, error)
-      type(ball_type), intent(in) :: ball
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
-      type(mode_step_type), intent(in) :: modes
-      !> Motion of the ball after the contact.
-      type(ball_motion_type), intent(in) :: state
-      !> The history; its samples are complete.
-      type(force_history_type), intent(inout) :: history
-      !> Set if the balance of energy does not close.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: energy, gain, initial
-
-      history%elastic_force = history%component(:, 1)
-      history%floor_force = history%component(:, 1)
-      history%peak_force = maxval(history%floor_force)
-      history%peak_elastic_force = history%peak_force
-      history%max_deflection = maxval(history%deflection, mask=history%floor_force > 0.0_wp)
-      ! Extrapolated back to the end of the contact.
-      history%restitution = (state%velocity + state%gravity*(time - history%contact_time))/history%impact_velocity
-      gain = ball%mass*(history%impact_velocity + state%velocity + state%gravity*time)
-      history%impulse_residual = abs(history%impulse - gain)/gain
-      history%floor_work = state%floor_work
-      call add_model_quantity(history, 'contact_loss', 'J', state%contact_loss)
-      initial = ball%mass/2*history%impact_velocity**2
-      energy = ball%mass*(state%velocity**2/2 + state%gravity*(state%height - ball%outer_radius)) &
-         + state%loss + state%contact_loss + state%floor_work
-      history%energy_residual = abs(energy - initial)/initial
-      ! Written so that NaN fails too.
-      if (.not. history%energy_residual <= max_residual) error = numerical_error('&sampling: substeps is too low: the ' &
-         //'balance of energy misses by '//to_text(history%energy_residual)//'; allowed: up to '//to_text(max_residual))
-   end subroutine finish
-
-   !> Writes motion and energies of one sample into the history.
-   pure subroutine record_motion(ball, modes, state, i, history)
-      type(ball_type), intent(in) :: ball
-      type(mode_step_type), intent(in) :: modes
-      !> Motion of the ball.
-      type(ball_motion_type), intent(in) :: state
-      !> Index of the sample.
-      integer, intent(in) :: i
-      type(force_history_type), intent(inout) :: history
-      real(wp) :: energy(size(modes%omega))
-      integer :: n
-
-      history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
-      history%velocity(i) = -state%velocity
-      if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
-      ! A level without an own result has no energies.
-      if (size(history%model_history, 2) == 1) return
-      energy = get_energies(modes, state%motion)
-      associate (n_harmonic => ubound(modes%first, 1))
-         do n = 0, min(n_family, n_harmonic) - 1
-            history%model_history(i, 2 + n) = sum(energy(modes%first(n):modes%first(n + 1) - 1))
-         end do
-         history%model_history(i, 2 + n_family) = sum(energy(modes%first(min(n_family, n_harmonic)):))
-      end associate
-   end subroutine record_motion
+   end subroutine get_flexibilities
 
 end module thud_modal_ball

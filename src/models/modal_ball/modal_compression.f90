@@ -5,12 +5,9 @@ module thud_modal_compression
    use thud_error, only: error_type, numerical_error
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_modal_ball_options, only: modal_ball_options_type
-   use thud_modal_damping, only: set_damping
-   use thud_mode_step, only: mode_step_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact, update_sticking
-   use thud_sphere_modes, only: basis_type, family_type, get_static_family, new_basis
-   use thud_surface_rings, only: greatest_angle, new_surface_rings, surface_rings_type
+   use thud_sphere_modes, only: basis_type, get_flexibility, new_basis
+   use thud_surface_rings, only: get_ring_response, surface_rings_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -23,25 +20,25 @@ module thud_modal_compression
 contains
 
    !> Force on each of two plates as a function of their approach.
-   subroutine compress_modal_ball(ball, options, deflection, force, error)
+   subroutine compress_modal_ball(ball, with_gas, rings, deflection, force, error)
+      !> The ball, with the long-term modulus.
       type(ball_type), intent(in) :: ball
-      !> Harmonics and rings.
-      class(modal_ball_options_type), intent(in) :: options
+      !> Whether the enclosed gas resists changes of its volume.
+      logical, intent(in) :: with_gas
+      type(surface_rings_type), intent(in) :: rings
       !> Approach of the plates, ascending, m: [n].
       real(wp), intent(in) :: deflection(:)
       !> The force, N: [n].
       real(wp), intent(out) :: force(:)
       !> Set if the rings cannot be distinguished, or if the ball lies on the outermost one.
       type(error_type), allocatable, intent(out) :: error
-      type(surface_rings_type) :: rings
       type(ring_contact_type) :: contact
       real(wp), allocatable :: reference_gap(:), gap(:)
       real(wp) :: before, now
       integer :: i, k, n_step
 
       force = 0.0_wp
-      rings = new_surface_rings(options%get_ring_count(), greatest_angle, options%floor_friction == 'stick')
-      call new_press(ball, options, rings, contact, error)
+      call new_press(ball, with_gas, rings, contact, error)
       if (allocated(error)) return
       allocate (reference_gap(size(contact%force)), gap(size(contact%force)), source=0.0_wp)
       reference_gap(::rings%n_dof) = ball%outer_radius*(1 - rings%height)
@@ -71,40 +68,29 @@ contains
    end subroutine compress_modal_ball
 
    !> Contact of the rings.
-   subroutine new_press(ball, options, rings, contact, error)
+   subroutine new_press(ball, with_gas, rings, contact, error)
+      !> The ball, with the long-term modulus.
       type(ball_type), intent(in) :: ball
-      !> Harmonics and rings.
-      class(modal_ball_options_type), intent(in) :: options
+      !> Whether the enclosed gas resists changes of its volume.
+      logical, intent(in) :: with_gas
       type(surface_rings_type), intent(in) :: rings
       !> The contact.
       type(ring_contact_type), intent(out) :: contact
       !> Set if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
-      type(family_type) :: family
-      real(wp) :: response(size(rings%shape_at_ring, 1), size(rings%shape_at_ring, 1))
-      type(ball_type) :: relaxed
-      type(mode_step_type) :: no_modes
-      real(wp) :: no_damping(0)
+      real(wp) :: flexibility(2, 2, 0:ubound(rings%shape_at_ring, 3))
       logical :: failed
       integer :: n
 
-      ! Only for the ratio of long-term modulus to storage modulus.
-      allocate (no_modes%omega(0))
-      call set_damping(options, no_modes, no_damping)
-      relaxed = ball
-      relaxed%youngs_modulus = no_modes%equilibrium_ratio*ball%youngs_modulus
-      basis = new_basis(relaxed, ubound(rings%shape_at_ring, 3), options%cavity_gas)
-      response = 0.0_wp
+      basis = new_basis(ball, 0, with_gas)
+      flexibility = 0.0_wp
       ! Equal forces on both poles double the response of even harmonics and cancel that of odd ones.
-      do n = 0, ubound(rings%shape_at_ring, 3), 2
-         call get_static_family(basis, n, family, failed)
+      do n = 0, ubound(flexibility, 3), 2
+         call get_flexibility(basis, n, flexibility(:, :, n), failed)
          if (failed) exit
-         associate (shape_at_ring => rings%shape_at_ring(:, :, n))
-            response = response + 2*matmul(shape_at_ring, matmul(family%flexibility, transpose(shape_at_ring)))
-         end associate
       end do
-      if (.not. failed) call new_ring_contact(response, rings%n_dof, contact, failed)
+      if (.not. failed) call new_ring_contact(2*get_ring_response(rings, flexibility), rings%n_dof, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(rings%radius)) &
          //' cannot be distinguished; allowed: fewer rings')
    end subroutine new_press

@@ -17,7 +17,7 @@ module thud_sphere_modes
    implicit none (type, external)
    private
 
-   public :: basis_type, family_type, get_displacements, get_families, get_family, get_modes, get_static_family
+   public :: basis_type, family_type, get_displacements, get_families, get_family, get_flexibility, get_modes
    public :: limit_family, new_basis
 
    !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. The modes differ from those of
@@ -54,8 +54,6 @@ module thud_sphere_modes
       real(wp), allocatable :: polynomial(:, :, :)
       !> Degree beyond that which the contact needs.
       integer :: extra_degree = 0
-      !> Highest harmonic of the basis.
-      integer :: highest_harmonic = 0
       !> Wavenumbers of shear and of compression waves at the highest frequency, 1/m.
       real(wp) :: shear_wavenumber = 0.0_wp, compression_wavenumber = 0.0_wp
       !> Terms of the energies by their power of n (n + 1), see `set_gram`: [n_unknown, n_unknown, 5].
@@ -64,8 +62,6 @@ module thud_sphere_modes
 
    !> Modes of one harmonic, as far as the contact needs them.
    type :: family_type
-      !> Harmonic n.
-      integer :: harmonic = 0
       !> Angular frequencies, ascending, without the rigid mode, rad/s: [n_mode].
       real(wp), allocatable :: omega(:)
       !> U and V at the outer surface for modes of unit modal mass, 1/sqrt(kg): [2, n_mode].
@@ -104,7 +100,6 @@ contains
       if (with_gas) basis%gas_stiffness = ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
          /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
 
-      basis%highest_harmonic = highest_harmonic
       if (present(extra_degree)) basis%extra_degree = extra_degree
       if (present(highest_omega)) then
          basis%shear_wavenumber = highest_omega*sqrt(basis%density/basis%shear_modulus)
@@ -239,23 +234,19 @@ contains
          return
       end if
       ! Surface waves of this frequency; bending waves of thin walls are slower.
-      basis = new_basis(ball, 0, with_gas, highest_omega)
-      highest = 4 + ceiling(1.1_wp*basis%shear_wavenumber*ball%outer_radius)
+      highest = 4 + ceiling(1.1_wp*wavenumber*ball%outer_radius)
+      basis = new_basis(ball, highest, with_gas, highest_omega)
       allocate (all(0:highest))
       n = 0
       do
          call check_interrupt(error)
          if (allocated(error)) return
          if (n > ubound(all, 1)) then
-            highest = 2*highest
-            block
-               type(family_type), allocatable :: more(:)
-               allocate (more(0:highest))
-               more(:n - 1) = all
-               call move_alloc(more, all)
-            end block
+            allocate (families(0:2*n))
+            families(:n - 1) = all
+            call move_alloc(families, all)
+            basis = new_basis(ball, 2*n, with_gas, highest_omega)
          end if
-         if (basis%highest_harmonic < highest) basis = new_basis(ball, highest, with_gas, highest_omega)
          call get_family(basis, n, highest_omega, all(n), failed)
          if (failed) then
             error = numerical_error('&modal_ball: the modes of harmonic '//to_text(n) &
@@ -297,10 +288,10 @@ contains
       real(wp), allocatable :: coefficient(:, :)
       integer :: k
 
-      call get_static_family(basis, harmonic, family, failed)
+      call get_flexibility(basis, harmonic, family%flexibility, failed)
       if (.not. failed) call get_modes(basis, harmonic, highest_omega, family%omega, coefficient, failed)
       if (failed) return
-      family%surface = matmul(get_surface(basis, harmonic), coefficient)
+      family%surface = matmul(sum(get_displacements(basis, harmonic, [1.0_wp]), dim=2), coefficient)
       do k = 1, size(family%omega)
          family%flexibility = family%flexibility - outer(family%surface(:, k))/family%omega(k)**2
       end do
@@ -324,13 +315,7 @@ contains
       integer, allocatable :: iwork(:), unconverged(:)
       integer :: n, n_mode, info
 
-      call assemble(basis, harmonic, stiffness, mass)
-      if (harmonic == 1) then
-         ! The rigid mode, U = 1 and W = 0, is the first function; the others keep their elastic part, without momentum.
-         momentum = mass(2:, 1)/mass(1, 1)
-         mass = mass(2:, 2:) - mass(1, 1)*outer(momentum)
-         stiffness = stiffness(2:, 2:)
-      end if
+      call assemble(basis, harmonic, stiffness, mass, momentum)
       n = size(stiffness, 1)
       allocate (inverse(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
       call dsygvx(1, 'V', 'V', 'L', n, mass, n, stiffness, n, 1/highest_omega**2, huge(1.0_wp), 0, 0, 0.0_wp, n_mode, &
@@ -348,33 +333,15 @@ contains
       end if
    end subroutine get_modes
 
-   !> Flexibility of a harmonic, without its modes; for n = 1 without the rigid mode.
-   subroutine get_static_family(basis, harmonic, family, failed)
-      type(basis_type), intent(in) :: basis
-      !> Harmonic n.
-      integer, intent(in) :: harmonic
-      !> The flexibility; no modes.
-      type(family_type), intent(out) :: family
-      !> Whether the stiffness is singular.
-      logical, intent(out) :: failed
-
-      family%harmonic = harmonic
-      allocate (family%omega(0), family%surface(2, 0))
-      if (harmonic < 2) then
-         call get_low_flexibility(basis, harmonic, family%flexibility, failed)
-      else
-         call get_flexibility(basis, harmonic, family%flexibility, failed)
-      end if
-   end subroutine get_static_family
-
-   !> Flexibility of a harmonic from n = 2 up, in closed form (Lur'e, Theory of Elasticity, Springer 2005, section 5.1): four
-   !> solutions of the static equations with U = a r^m, V = b r^m, and the tractions 2 mu c r^(m-1), 2 mu d r^(m-1).
-   pure subroutine get_flexibility(basis, harmonic, flexibility, failed)
+   !> Flexibility of a harmonic, without the rigid mode of n = 1; from n = 2 up in closed form (Lur'e, Theory of Elasticity,
+   !> Springer 2005, section 5.1): four solutions of the static equations with U = a r^m, V = b r^m, and the tractions
+   !> 2 mu c r^(m-1), 2 mu d r^(m-1).
+   subroutine get_flexibility(basis, harmonic, flexibility, failed)
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
       !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2].
       real(wp), intent(out) :: flexibility(2, 2)
-      !> Whether the solutions cannot be distinguished.
+      !> Whether the stiffness is singular, or the solutions cannot be distinguished.
       logical, intent(out) :: failed
       real(wp), dimension(4) :: a, b, c, d, inner, at_outer
       real(wp) :: matrix(4, 4), right(4, 2)
@@ -382,6 +349,10 @@ contains
       integer :: pivot(4)
       integer :: info
 
+      if (harmonic < 2) then
+         call get_low_flexibility(basis, harmonic, flexibility, failed)
+         return
+      end if
       n = real(harmonic, wp)
       nu = 0.5_wp
       if (.not. basis%incompressible) nu = basis%lame/(2*(basis%lame + basis%shear_modulus))
@@ -422,50 +393,47 @@ contains
       !> Whether the stiffness is singular.
       logical, intent(out) :: failed
       real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :), momentum(:)
-      real(wp) :: raised
       integer :: n, info
 
-      call assemble(basis, harmonic, stiffness, mass)
+      call assemble(basis, harmonic, stiffness, mass, momentum)
       n = size(stiffness, 1)
-      raised = 0.0_wp
-      if (harmonic == 1) then
-         ! Raises the frequency of the rigid mode, U = 1 and W = 0, from zero; its flexibility is subtracted below.
-         momentum = mass(:, 1)/sqrt(mass(1, 1))
-         raised = basis%shear_modulus/(basis%density*basis%outer_radius**2)
-         stiffness = stiffness + raised*outer(momentum)
-      end if
-      surface = get_surface(basis, harmonic)
+      surface = sum(get_displacements(basis, harmonic, [1.0_wp]), dim=2)
+      if (harmonic == 1) surface = surface(:, 2:) - spread(surface(:, 1), 2, n)*spread(momentum, 1, 2)
       solution = transpose(surface)
       call dposv('L', n, 2, stiffness, n, solution, n, info)
       failed = info /= 0
       flexibility = matmul(surface, solution)
-      if (harmonic == 1) flexibility = flexibility - outer(surface(:, 1))/(mass(1, 1)*raised)
    end subroutine get_low_flexibility
 
-   !> Stiffness and mass of one harmonic in the basis.
-   subroutine assemble(basis, harmonic, stiffness, mass)
+   !> Stiffness and mass of one harmonic in the basis. For n = 1 its first function, U = 1 and W = 0, is the rigid mode; the
+   !> others keep their elastic part, without momentum.
+   subroutine assemble(basis, harmonic, stiffness, mass, momentum)
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
-      !> Stiffness matrix, N/m: [n, n].
-      real(wp), allocatable, intent(out) :: stiffness(:, :)
-      !> Mass matrix, kg: [n, n].
-      real(wp), allocatable, intent(out) :: mass(:, :)
+      !> Stiffness matrix, N/m, and mass matrix, kg: [n, n].
+      real(wp), allocatable, intent(out) :: stiffness(:, :), mass(:, :)
+      !> For n = 1 the rigid motion that was taken from each function, otherwise none: [n].
+      real(wp), allocatable, intent(out) :: momentum(:)
       real(wp) :: l, area
       integer, allocatable :: used(:)
       integer :: counts(2)
       integer :: i
 
-      ! Integral of P_n^2 over the unit sphere.
-      area = 4*pi/(2*harmonic + 1)
       if (harmonic == 0) then
          call assemble_breathing(basis, stiffness, mass)
          return
       end if
+      ! Integral of P_n^2 over the unit sphere.
+      area = 4*pi/(2*harmonic + 1)
       l = real(harmonic*(harmonic + 1), wp)
       counts = get_counts(basis, harmonic)
       used = [(i, i=1, counts(1)), (size(basis%polynomial, 2) + i, i=1, counts(2))]
       stiffness = area*(basis%gram(used, used, 1) + l*basis%gram(used, used, 2) + basis%gram(used, used, 3)/l)
       mass = area*(basis%gram(used, used, 4) + basis%gram(used, used, 5)/l)
+      if (harmonic > 1) return
+      momentum = mass(2:, 1)/mass(1, 1)
+      mass = mass(2:, 2:) - mass(1, 1)*outer(momentum)
+      stiffness = stiffness(2:, 2:)
    end subroutine assemble
 
    !> Numbers of polynomials of U and of W; W belongs to compression waves, which are longer. For n = 0 that of S alone.
@@ -481,17 +449,6 @@ contains
          counts(2) = get_degree(basis, harmonic, basis%compression_wavenumber) + 1
       end if
    end function get_counts
-
-   !> U and V of the functions of one harmonic at the outer surface: [2, n].
-   pure function get_surface(basis, harmonic) result(surface)
-      type(basis_type), intent(in) :: basis
-      integer, intent(in) :: harmonic
-      real(wp), allocatable :: surface(:, :)
-
-      associate (displacement => get_displacements(basis, harmonic, [1.0_wp]))
-         surface = displacement(:, 1, :)
-      end associate
-   end function get_surface
 
    !> U and V of the functions of one harmonic at positions in the wall.
    pure function get_displacements(basis, harmonic, position) result(displacement)

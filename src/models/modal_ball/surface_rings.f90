@@ -8,11 +8,12 @@
 module thud_surface_rings
    use thud_constants, only: pi
    use thud_kinds, only: wp
+   use thud_lapack, only: dgemm
    use thud_legendre, only: get_gauss_legendre
    implicit none (type, external)
    private
 
-   public :: greatest_angle, new_surface_rings, surface_rings_type
+   public :: get_ring_response, greatest_angle, new_surface_rings, surface_rings_type
 
    !> Greatest angle of the outermost ring from the lowest point, rad.
    real(wp), parameter :: greatest_angle = pi/3
@@ -142,5 +143,27 @@ contains
       end subroutine add
 
    end subroutine add_nodes
+
+   !> Displacements of the rings due to unit forces on them.
+   function get_ring_response(rings, flexibility) result(response)
+      type(surface_rings_type), intent(in) :: rings
+      !> U and V of each harmonic at the outer surface due to unit generalized forces on U and V, m/N: [2, 2, 0:highest].
+      real(wp), intent(in) :: flexibility(:, :, 0:)
+      !> The displacements, m/N: [n_gap, n_gap].
+      real(wp), allocatable :: response(:, :)
+      real(wp), allocatable :: displacement(:, :, :)
+      integer :: j, n
+
+      associate (shapes => rings%shape_at_ring, n_gap => size(rings%shape_at_ring, 1))
+         allocate (displacement(n_gap, 2, 0:ubound(flexibility, 3)), response(n_gap, n_gap))
+         do n = 0, ubound(flexibility, 3)
+            do j = 1, 2
+               displacement(:, j, n) = shapes(:, 1, n)*flexibility(1, j, n) + shapes(:, 2, n)*flexibility(2, j, n)
+            end do
+         end do
+         call dgemm('N', 'T', n_gap, n_gap, 2*size(flexibility, 3), 1.0_wp, displacement, n_gap, shapes, n_gap, 0.0_wp, &
+            response, n_gap)
+      end associate
+   end function get_ring_response
 
 end module thud_surface_rings
