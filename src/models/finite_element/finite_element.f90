@@ -3,33 +3,69 @@
 !> Each sampling interval holds as many equal steps as stability requires. The force of a sample is the mean over one
 !> sampling interval around it, so that the record has the impulse of the run.
 module thud_finite_element
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, get_density
+   use thud_band, only: octave_count
+   use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
-   use thud_elastic_body, only: cavity_closed, no_failure
+   use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error, numerical_failure
-   use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
+   use thud_field, only: field_type
+   use thud_floor_contact, only: contact_options_type, get_contact_fields, new_floor_contact
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
-   use thud_impact_record, only: continue_flight, finish_record, max_energy_residual, new_impact_record, record_sample
-   use thud_impact_run, only: get_energy, get_mean_height, get_mean_velocity, get_stable_interval, impact_run_type, &
-      new_impact_run, update_position, update_velocity
-   use thud_interrupt, only: check_interrupt
+   use thud_impact_record, only: check_interval, check_run, contacts_type, continue_flight, finish_record, follow_contact, &
+      get_duration_error, max_energy_residual, new_impact_record, record_sample
+   use thud_impact_run, only: get_energy, get_stable_interval, impact_run_type, new_impact_run, update_position, &
+      update_velocity
    use thud_kinds, only: wp
-   use thud_material, only: get_material_loss_factor, material_type, new_material
-   use thud_mesh, only: get_nodal_areas, new_mesh
+   use thud_material, only: check_material, get_material_fields, get_material_loss_factor, material_options_type, &
+      material_type, new_material
+   use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, get_nodal_areas, mesh_options_type, mesh_type, &
+      min_radial, new_mesh
    use thud_motion, only: start_motion, take_snapshot
+   use thud_new_field, only: in_group, integer_field, real_field
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
-   use thud_receiver, only: can_strike, get_pole_count, receiver_type
-   use thud_sampling, only: sampling_type
-   use thud_text, only: fixed, significant, to_text
+   use thud_receiver, only: receiver_type
+   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_source_model, only: resolution_type, source_model_type
+   use thud_text, only: significant, to_text
    use thud_validity_limit, only: get_wave_limit, validity_limit_type
    implicit none (type, external)
    private
 
    public :: finite_element_type
 
-   !> Energy residual at which a run is stopped as unstable.
-   real(wp), parameter :: unstable_residual = 0.05_wp
+   !> Maximum memory for snapshots, bytes.
+   real(wp), parameter :: max_motion_bytes = 4.0e8_wp
+
+   !> Minimum sampling rate, Hz: the mean over an interval then lowers the highest octave by 0.03 dB.
+   real(wp), parameter :: min_rate = 16000.0_wp
+
+   !> Ratio of the numbers of elements of a level of resolution to those of the next coarser one, above level 1.
+   real(wp), parameter :: refinement_ratio = sqrt(2.0_wp)
+
+   !> Number of elements along a contact radius.
+   real(wp), parameter :: contact_elements = 4.5_wp
+
+   !> Maximum ratio of the number of elements for the contact to the number for the wall.
+   real(wp), parameter :: max_contact_ratio = 2.0_wp
+
+   !> Highest level of resolution, and maximum number of steps times elements of its drop.
+   integer, parameter :: highest_level = 3
+   real(wp), parameter :: max_level_work = 5.05e7_wp
+
+   !> Typical simulated duration of a drop, s, for the number of steps.
+   real(wp), parameter :: typical_contact = 0.025_wp
+
+   !> Coefficients of friction between which a mesh may be too coarse for the stick and slip of the surface, which then
+   !> changes the levels of a finer one only (docs/finite_elements.md): smaller friction is too weak, larger friction sticks.
+   !> The viscosity of Kelvin and Voigt prevents it.
+   real(wp), parameter :: slip_friction(2) = [0.33_wp, 0.95_wp]
+
+   !> Largest changes by it from the default elements to finer ones among eight balls, dB, at the octaves that the velocity
+   !> of shear waves per radius makes those of `slip_ball`; the change is taken as proportional to the element size.
+   real(wp), parameter :: slip_error(octave_count) = [0.05_wp, 0.2_wp, 0.4_wp, 2.0_wp, 2.0_wp]
+   type(ball_type), parameter :: slip_ball = ball_type(youngs_modulus=2.08e6_wp)
 
    !> Maximum number of runs of a drop; each next one has half of the step.
    integer, parameter :: max_attempts = 4
@@ -37,46 +73,231 @@ module thud_finite_element
    !> Maximum number of steps in a sampling interval.
    integer, parameter :: max_steps = 100000
 
-   !> Maximum penetration into the layer on the floor, as a fraction of the wall thickness: the layer is thin.
-   real(wp), parameter :: max_penetration = 0.1_wp
-
    !> Maximum number of steps times nodes in a run, which takes about twenty minutes.
    real(wp), parameter :: max_work = 2.0e10_wp
-
-   !> Ratio of the required to the given length of a record from which on it is too short at any resolution.
-   real(wp), parameter :: short_record = 1.05_wp
 
    !> Factor with which a number of three digits is never rounded down.
    real(wp), parameter :: rounded_up = 1.005_wp
 
-   !> Time between two reports of progress, or checks of a mobile floor after a contact, s.
-   real(wp), parameter :: check_interval = 0.5e-3_wp
-
-   !> The contacts of a run.
-   type :: contacts_type
-      !> Time without touch after which a contact is over, s: shear waves have crossed the ball.
-      real(wp) :: settling_time = 0.0_wp
-      !> Instant from which on the contact is over if a mobile floor cannot strike again, s.
-      real(wp) :: next_check = 0.0_wp
-      !> First and latest instant of the present contact, s.
-      real(wp) :: first = 0.0_wp, latest = 0.0_wp
-      !> Whether there is a contact, or was one that is not over.
-      logical :: active = .false.
-      !> Number of contacts that are over.
-      integer :: n_over = 0
-   end type contacts_type
-
-   !> The model.
-   type, extends(finite_element_options_type) :: finite_element_type
+   !> The model with its options.
+   type, extends(source_model_type) :: finite_element_type
+      !> Number of contacts to follow.
+      integer :: bounces = 1
+      !> Free flight before first touch, s.
+      real(wp) :: flight_before = 0.0_wp
+      !> Free flight after the last contact, s.
+      real(wp) :: flight_after = 0.0_wp
+      !> Time step divided by a bound on stable steps.
+      real(wp) :: step_safety = 0.85_wp
+      !> Time between snapshots of the deformed ball, s; 0 for none.
+      real(wp) :: snapshot_interval = 0.0_wp
+      type(mesh_options_type) :: mesh
+      type(material_options_type) :: material
+      type(contact_options_type) :: contact
    contains
+      procedure :: get_fields
+      procedure :: check
+      procedure :: refine
       procedure :: solve
+      procedure :: compress
+      procedure :: get_snapshot_shape
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: get_loss_factors
-      procedure :: compress
    end type finite_element_type
 
 contains
+
+   !> Keys and allowed ranges; some belong to groups of their own.
+   function get_fields(self) result(fields)
+      class(finite_element_type), intent(in), target :: self
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         integer_field('bounces', self%bounces, 'number of contacts to compute', '[1, 100]'), &
+         real_field('flight_before', self%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
+         is_numerical=.true.), &
+         real_field('flight_after', self%flight_after, 's', 'duration of free flight after the last contact', &
+         '[0, 10]', is_numerical=.true.), &
+         real_field('step_safety', self%step_safety, '', 'time step divided by a bound on stable steps', &
+         '[0.01, 0.98]', is_numerical=.true.), &
+         in_group('mesh', get_mesh_fields(self%mesh)), &
+         in_group('material', get_material_fields(self%material)), &
+         in_group('contact', get_contact_fields(self%contact)), &
+         in_group('output', [real_field('snapshot_interval', self%snapshot_interval, 's', &
+         'time between snapshots of the deformed ball; 0: none', '[0, 10]', is_numerical=.true.)])]
+   end function get_fields
+
+   !> Returns an error if options do not fit each other, the ball or the memory.
+   subroutine check(self, ball, sampling, error)
+      class(finite_element_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      type(sampling_type), intent(in) :: sampling
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: bytes
+
+      call check_material(self%material, ball, error)
+      if (allocated(error)) return
+      call check_mesh(self%mesh, error)
+      if (allocated(error)) return
+      if (sampling%sample_rate < min_rate) then
+         error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate) &
+            //' Hz is not allowed with finite_element; allowed: from '//to_text(min_rate)//' Hz')
+         return
+      end if
+      ! Positions and velocities of each node.
+      bytes = 32.0_wp*product(real(self%get_snapshot_shape(ball, sampling), wp))
+      if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
+         //to_text(self%snapshot_interval)//' s makes '//to_text(get_frame_count(self, sampling)) &
+         //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
+   end subroutine check
+
+   !> The model at a level of resolution: at level 0 elements of twice the size, without snapshots; above level 1 smaller
+   !> ones. Automatic elements are short enough for the contact radius of the coarser drop. The error follows from the level
+   !> with elements of twice the size, if there is one, for errors proportional to the square of the element size; with
+   !> elements of twice the size more, since these are often outside of that order.
+   subroutine refine(self, ball, level, coarse, sampling, refined, resolution)
+      class(finite_element_type), intent(inout) :: self
+      type(ball_type), intent(in) :: ball
+      integer, intent(in) :: level
+      type(force_history_type), intent(in) :: coarse
+      type(sampling_type), intent(inout) :: sampling
+      class(source_model_type), allocatable, intent(out) :: refined
+      type(resolution_type), intent(out) :: resolution
+      class(finite_element_type), allocatable :: finer
+      real(wp) :: refinement
+      logical :: resolves_contact
+
+      refinement = merge(0.5_wp, refinement_ratio**(level - 1), level == 0)
+      resolves_contact = chooses_resolution(self) .and. allocated(coarse%model_history)
+      allocate (finer, source=self)
+      associate (mesh => finer%mesh)
+         mesh = get_element_counts(ball, mesh)
+         if (resolves_contact) mesh%polar_elements = nint(mesh%polar_elements*max(1.0_wp, min(max_contact_ratio, &
+            contact_elements*pi*ball%outer_radius/mesh%polar_elements/maxval(coarse%model_history(:, 1)))))
+         mesh%radial_elements = max(min_radial, nint(mesh%radial_elements*refinement))
+         mesh%polar_elements = nint(mesh%polar_elements*refinement)
+      end associate
+      if (level == 0) finer%snapshot_interval = 0.0_wp
+      resolution = resolution_type(reference=merge(level - 2, level - 1, level > 2), &
+         ratio=merge(1/(refinement_ratio**2 - 1), 0.5_wp, level == 2), min_error=get_min_error(finer, ball))
+      ! Nodes that stick and slip converge more slowly.
+      if (self%contact%friction > 0.0_wp) resolution%ratio = 2*resolution%ratio
+      if (level > 1) resolution%lowers_error = chooses_resolution(self) .and. level <= highest_level
+      if (level > 1 .and. resolution%lowers_error) resolution%lowers_error = &
+         count_work(self, ball, sampling)*refinement_ratio**(3*(level - 1)) < max_level_work
+      call move_alloc(finer, refined)
+   end subroutine refine
+
+   !> Number of steps times elements of a drop at level 1, without the finer elements of the contact.
+   function count_work(self, ball, sampling) result(work)
+      class(finite_element_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      type(sampling_type), intent(in) :: sampling
+      real(wp) :: work
+      type(mesh_type) :: mesh
+      type(material_type) :: material
+      type(error_type), allocatable :: error
+      real(wp) :: interval, time
+
+      mesh = new_mesh(ball, self%mesh)
+      ! The run reports a material that cannot be.
+      call new_material(self%material, ball, material, error)
+      interval = 1/sampling%sample_rate
+      if (.not. allocated(error)) interval = self%step_safety*get_stable_interval(mesh, material, &
+         new_floor_contact(self%contact, ball, mesh))
+      time = typical_contact + self%flight_before + self%flight_after
+      if (self%bounces > 1) time = sampling%duration
+      time = min(time, sampling%duration)
+      ! Elements with the lanes that are left empty.
+      work = max(time*sampling%sample_rate*sampling%substeps, time/interval) &
+         *(mesh%n_radial*n_element*ceiling(mesh%n_polar/real(n_element, wp)))
+   end function count_work
+
+   !> Whether the resolution may be chosen: the user's keys do not grow.
+   pure function chooses_resolution(self) result(yes)
+      class(finite_element_type), intent(in) :: self
+      logical :: yes
+
+      yes = self%mesh%radial_elements == 0 .and. self%mesh%polar_elements == 0
+   end function chooses_resolution
+
+   !> Minimum error with friction at which a sliding surface may begin to stick and slip on its own (`slip_friction`).
+   function get_min_error(self, ball) result(error)
+      class(finite_element_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      real(wp) :: error(octave_count)
+      type(mesh_options_type) :: automatic, mesh
+      real(wp) :: octave, scale
+      integer :: i, below
+      logical :: slips
+
+      error = 0.0_wp
+      slips = self%contact%friction > slip_friction(1) .and. self%contact%friction < slip_friction(2)
+      if (.not. slips .or. is_viscous(self%material)) return
+      automatic = get_element_counts(ball, mesh_options_type())
+      mesh = get_element_counts(ball, self%mesh)
+      scale = get_shear_rate(ball)/get_shear_rate(slip_ball)
+      do i = 1, octave_count
+         ! The octave of `slip_ball` that corresponds to this one; octaves are 10**0.3 apart.
+         octave = min(real(octave_count, wp), max(1.0_wp, i - log10(scale)/0.3_wp))
+         below = min(int(octave), octave_count - 1)
+         error(i) = slip_error(below) + (octave - below)*(slip_error(below + 1) - slip_error(below))
+      end do
+      error = error*automatic%polar_elements/mesh%polar_elements
+   end function get_min_error
+
+   !> Velocity of shear waves per outer radius, 1/s.
+   pure function get_shear_rate(ball) result(rate)
+      type(ball_type), intent(in) :: ball
+      real(wp) :: rate
+
+      rate = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))/ball%outer_radius
+   end function get_shear_rate
+
+   !> Whether the viscosity of the material is that of Kelvin and Voigt.
+   pure function is_viscous(material) result(yes)
+      type(material_options_type), intent(in) :: material
+      logical :: yes
+
+      yes = material%viscosity == 'kelvin_voigt' .or. &
+         (material%viscosity == 'fractional' .and. .not. material%fractional_order < 1.0_wp)
+   end function is_viscous
+
+   !> Size of the snapshots; of automatic elements the largest that the levels of resolution can have.
+   function get_snapshot_shape(self, ball, sampling) result(extents)
+      class(finite_element_type), intent(in) :: self
+      type(ball_type), intent(in) :: ball
+      type(sampling_type), intent(in) :: sampling
+      integer :: extents(3)
+      integer :: factor(2)
+
+      factor = 1
+      if (chooses_resolution(self)) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
+      associate (counts => get_element_counts(ball, self%mesh))
+         extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(self, sampling)]
+      end associate
+   end function get_snapshot_shape
+
+   !> Maximum number of snapshots of a run.
+   pure function get_frame_count(self, sampling) result(n_frame)
+      class(finite_element_type), intent(in) :: self
+      type(sampling_type), intent(in) :: sampling
+      integer :: n_frame
+
+      n_frame = 0
+      if (self%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(self, sampling)
+   end function get_frame_count
+
+   !> Number of samples between two snapshots, at least 1.
+   pure function get_stride(self, sampling) result(stride)
+      !> Options that ask for snapshots.
+      class(finite_element_type), intent(in) :: self
+      type(sampling_type), intent(in) :: sampling
+      integer :: stride
+
+      stride = max(1, nint(self%snapshot_interval*sampling%sample_rate))
+   end function get_stride
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
    function get_standard_modulus(self) result(modulus)
@@ -167,7 +388,7 @@ contains
 
    !> Force history of one drop with the step as it is.
    subroutine solve_once(self, ball, drop, sampling, history, error, receiver)
-      class(finite_element_options_type), intent(in) :: self
+      class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       type(sampling_type), intent(in) :: sampling
@@ -178,15 +399,14 @@ contains
       type(impact_run_type) :: run
       type(material_type) :: material
       type(contacts_type) :: contacts
-      real(wp) :: speed, gap
+      real(wp) :: impact_velocity, speed, gap
 
-      history = new_impact_record(sampling, get_impact_velocity(drop), receiver)
-      history%touch_time = self%flight_before
-      speed = history%impact_velocity - drop%gravity*self%flight_before
+      impact_velocity = get_impact_velocity(drop)
+      speed = impact_velocity - drop%gravity*self%flight_before
       gap = speed*self%flight_before + drop%gravity*self%flight_before**2/2
       if (speed < 0.0_wp) then
          error = input_error('&finite_element: flight_before = '//to_text(self%flight_before) &
-            //' s is longer than the fall; allowed: up to '//to_text(history%impact_velocity/drop%gravity)//' s')
+            //' s is longer than the fall; allowed: up to '//to_text(impact_velocity/drop%gravity)//' s')
          return
       end if
       call new_material(self%material, ball, material, error)
@@ -204,61 +424,75 @@ contains
          return
       end if
       run = new_impact_run(ball, new_mesh(ball, self%mesh), material, self%contact, drop%gravity, gap, speed, receiver)
+      history = new_impact_record(run, sampling, impact_velocity)
+      history%touch_time = self%flight_before
       if (self%snapshot_interval > 0.0_wp) then
          allocate (history%motion)
          call start_motion(run%position, get_frame_count(self, sampling), history%motion)
       end if
-      call march(self, run, get_mean_height(run) - gap, contacts, sampling, history, error)
+      call march(self, run, contacts, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
    end subroutine solve_once
 
    !> Integrates in time until the ball has left for good.
-   subroutine march(self, run, touch_height, contacts, sampling, history, error)
+   subroutine march(self, run, contacts, sampling, history, error)
       !> Number of bounces, times of flight, step.
-      class(finite_element_options_type), intent(in) :: self
+      class(finite_element_type), intent(in) :: self
       type(impact_run_type), intent(inout) :: run
-      !> Height of the center of mass at first touch, m.
-      real(wp), intent(in) :: touch_height
       type(contacts_type), intent(inout) :: contacts
       type(sampling_type), intent(in) :: sampling
       !> Gets its samples, its snapshots, and contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
       !> Set if the ball cannot be computed or the record is too short.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: interval, time, first_energy
-      integer :: i, k, n_step, n_sample, stride, check_stride, latest
+      real(wp) :: interval, step, time, first_energy
+      integer :: i, k, n_step, stride, check_stride, last, latest
 
-      n_sample = size(history%floor_force)
+      last = run%body%mesh%n_radial
       interval = 1/sampling%sample_rate
-      call choose_steps(self, run, sampling, n_sample, n_step, error)
-      if (allocated(error)) return
+      step = self%step_safety*get_stable_interval(run%body%mesh, run%body%material, run%contact)
+      n_step = max(sampling%substeps, ceiling(min(interval/step, 2.0_wp*max_steps)))
+      step = interval/n_step
+      associate (n_node => size(run%body%mass), n_sample => size(history%floor_force))
+         if (n_step > max_steps .or. real(n_step, wp)*n_sample*n_node > max_work) then
+            error = numerical_error('&finite_element: stability asks for steps below '//to_text(step)//' s, too many for ' &
+               //to_text(sampling%duration)//' s of '//to_text(n_node) &
+               //' nodes; allowed: a shorter duration, fewer elements, a lower bulk_ratio, less viscosity')
+            return
+         end if
+      end associate
       check_stride = max(1, nint(check_interval*sampling%sample_rate))
       stride = get_stride(self, sampling)
-      samples: do i = 1, n_sample
+      samples: do i = 1, size(history%floor_force)
          time = (i - 1)*interval
          if (mod(i - 1, check_stride) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
          do k = 0, n_step - 1
-            time = (i - 1)*interval + k*(interval/n_step)
-            ! No further contact is wanted.
-            if (contacts%n_over >= self%bounces .and. will_touch(run, interval/n_step)) exit samples
-            call update_velocity(run, interval/n_step)
+            time = (i - 1)*interval + k*step
+            ! No further contact is wanted: a node may reach the floor in the next step.
+            if (contacts%n_over >= self%bounces) then
+               if (minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity) &
+                  - run%contact%edge_height) + run%floor%stop + step*run%floor%velocity < 0.0_wp) exit samples
+            end if
+            call update_velocity(run, step)
             if (i + k == 1) first_energy = get_energy(run)
             call check_run(run, time, first_energy, history, error)
             if (allocated(error)) return
             if (k == 0) then
-               call record_sample(run, i, touch_height, history)
+               call record_sample(run, i, history)
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
-               if (allocated(history%motion) .and. mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, &
-                  run%position, run%velocity, get_contact_stress(run, interval), run%state%gas_pressure, &
-                  run%floor%displacement)
+               associate (r => run%position(:, last, 1), z => run%position(:, last, 2))
+                  if (allocated(history%motion) .and. mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, &
+                     run%position, run%velocity, run%node_impulse/interval/spread(get_nodal_areas(r, z), 2, 2), &
+                     run%state%gas_pressure, run%floor%displacement)
+               end associate
                run%node_impulse = 0.0_wp
             end if
             call add_to_means(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), &
                history%floor_force)
             history%impulse = history%impulse + run%impulse
             call follow_contact(run, contacts, time, interval/n_step, history)
-            call update_position(run, interval/n_step)
+            call update_position(run, step)
          end do
          if (contacts%n_over < self%bounces) cycle samples
          if (time > contacts%latest + max(contacts%settling_time, self%flight_after)) exit samples
@@ -269,174 +503,7 @@ contains
       else if (contacts%n_over < self%bounces) then
          error = get_duration_error(run, contacts, self%bounces, sampling%duration)
       end if
-      if (.not. allocated(error)) call continue_flight(run, latest, touch_height, history)
+      if (.not. allocated(error)) call continue_flight(run, latest, history)
    end subroutine march
-
-   !> The error of a record that ends before the last wanted contact is over.
-   function get_duration_error(run, contacts, bounces, duration) result(error)
-      type(impact_run_type), intent(in) :: run
-      type(contacts_type), intent(in) :: contacts
-      !> Number of wanted contacts.
-      integer, intent(in) :: bounces
-      !> Length of the record, s.
-      real(wp), intent(in) :: duration
-      type(error_type) :: error
-      real(wp) :: required
-
-      error = input_error('&sampling: duration = '//to_text(duration)//' s ends before contact '//to_text(bounces) &
-         //' is over')
-      if (run%floor%moves .and. run%time > contacts%latest + contacts%settling_time) then
-         error = input_error('&sampling: duration = '//to_text(duration) &
-            //' s ends while the floor may strike the ball again; allowed: longer')
-         error%has_short_record = .true.
-      else if (contacts%active .and. contacts%n_over + 1 == bounces) then
-         required = contacts%latest + contacts%settling_time
-         ! The end of a contact that lasts is not known.
-         if (run%impulse > 0.0_wp) required = required + contacts%latest - contacts%first
-         required = ceiling(1.0e3_wp*required)/1.0e3_wp
-         error%message = error%message//'; set duration to at least '//fixed(required, 3)//' s'
-         error%has_short_record = required > short_record*duration
-      else
-         error%message = error%message//'; allowed: a longer one'
-      end if
-   end function get_duration_error
-
-   !> Number of steps in a sampling interval; returns an error if the run would take too long.
-   subroutine choose_steps(self, run, sampling, n_sample, n_step, error)
-      !> Options; `step_safety` is the ratio of the step to the bound.
-      class(finite_element_options_type), intent(in) :: self
-      type(impact_run_type), intent(in) :: run
-      type(sampling_type), intent(in) :: sampling
-      !> Number of samples of the record.
-      integer, intent(in) :: n_sample
-      !> The number.
-      integer, intent(out) :: n_step
-      !> Set if there would be too many steps.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: interval, wanted
-
-      interval = 1/sampling%sample_rate
-      wanted = interval/(self%step_safety*get_stable_interval(run%body%mesh, run%body%material, run%contact))
-      n_step = max(sampling%substeps, ceiling(min(wanted, 2.0_wp*max_steps)))
-      associate (n_node => size(run%position)/2)
-         if (n_step <= max_steps .and. real(n_step, wp)*n_sample*n_node <= max_work) return
-         error = numerical_error('&finite_element: stability asks for steps below '//to_text(interval/n_step) &
-            //' s, too many for '//to_text(sampling%duration)//' s of '//to_text(n_node) &
-            //' nodes; allowed: a shorter duration, fewer elements, a lower bulk_ratio, less viscosity')
-      end associate
-   end subroutine choose_steps
-
-   !> Whether a node may reach the floor in the next step.
-   pure function will_touch(run, step) result(touches)
-      type(impact_run_type), intent(in) :: run
-      !> Length of the step, s.
-      real(wp), intent(in) :: step
-      logical :: touches
-
-      ! `stop` is the displacement of the floor at the next instant, downwards.
-      associate (last => ubound(run%position, 2))
-         touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity) &
-            - run%contact%edge_height) + run%floor%stop + step*run%floor%velocity < 0.0_wp
-      end associate
-   end function will_touch
-
-   !> Minimum gap between ball and floor, m.
-   pure function get_gap(run) result(gap)
-      type(impact_run_type), intent(in) :: run
-      real(wp) :: gap
-
-      gap = minval(run%position(:, ubound(run%position, 2), 2) - run%contact%edge_height) + run%floor%displacement
-   end function get_gap
-
-   !> Mean stress of the floor on the deformed surface since the latest sample.
-   pure function get_contact_stress(run, interval) result(stress)
-      type(impact_run_type), intent(in) :: run
-      !> Sampling interval, s.
-      real(wp), intent(in) :: interval
-      !> Outwards and upwards, Pa: [0:n_polar, 2].
-      real(wp) :: stress(0:ubound(run%position, 1), 2)
-
-      associate (surface => run%position(:, ubound(run%position, 2), :))
-         stress = run%node_impulse/interval/spread(get_nodal_areas(surface(:, 1), surface(:, 2)), 2, 2)
-      end associate
-   end function get_contact_stress
-
-   !> Beginning of a message with the time of an event.
-   function event_prefix(time) result(text)
-      real(wp), intent(in) :: time
-      character(len=64) :: text
-
-      text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
-   end function event_prefix
-
-   !> Tracks beginning and end of the contacts, and the restitution of the first.
-   subroutine follow_contact(run, contacts, time, step, history)
-      type(impact_run_type), intent(in) :: run
-      type(contacts_type), intent(inout) :: contacts
-      !> Time since the record began, s; length of the step, s.
-      real(wp), intent(in) :: time, step
-      !> Gets contact time and restitution of the first contact.
-      type(force_history_type), intent(inout) :: history
-      real(wp) :: speed
-
-      if (run%impulse > 0.0_wp) then
-         if (.not. contacts%active) contacts%first = time - step/2
-         contacts%active = .true.
-         contacts%latest = time + step/2
-         contacts%next_check = contacts%latest + contacts%settling_time
-      else if (contacts%active .and. time > contacts%next_check) then
-         if (run%floor%moves) then
-            contacts%next_check = time + check_interval
-            if (can_strike(run%floor%receiver, run%floor%motion, get_gap(run), get_mean_velocity(run))) return
-         end if
-         contacts%active = .false.
-         contacts%n_over = contacts%n_over + 1
-         if (contacts%n_over > 1) return
-         history%contact_time = contacts%latest - contacts%first
-         ! Extrapolated back to the end of the contact.
-         speed = get_mean_velocity(run) + run%gravity*(time + step/2 - contacts%latest)
-         history%restitution = speed/history%impact_velocity
-      end if
-   end subroutine follow_contact
-
-   !> Returns an error if the ball cannot be computed any further.
-   subroutine check_run(run, time, first_energy, history, error)
-      type(impact_run_type), intent(in) :: run
-      !> Time since the record began, s; energy of the first sample, J.
-      real(wp), intent(in) :: time, first_energy
-      !> Gets the maximum energy residual, relative to the kinetic energy at first touch.
-      type(force_history_type), intent(inout) :: history
-      !> States what happened, when and why.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: residual
-
-      call check_interrupt(error)
-      if (allocated(error)) return
-      if (run%state%failure == cavity_closed) then
-         error = numerical_error(trim(event_prefix(time))//' the cavity has no volume left; ' &
-            //'allowed: a lower height, a stiffer ball')
-      else if (run%state%failure /= no_failure) then
-         error = numerical_error(trim(event_prefix(time))//' an element is turned inside out (ratio of volumes ' &
-            //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
-      else if (run%contact%layer_stiffness > 0.0_wp &
-         .and. run%penetration > max_penetration*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
-         error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
-            //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to ' &
-            //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
-      else if (run%dissipated + run%contact_loss + run%friction_loss &
-         > run%total_mass/2*history%impact_velocity**2) then
-         error = numerical_error(trim(event_prefix(time))//' the ball has lost the energy of the drop and stays on the ' &
-            //'floor; allowed: less viscosity, or a higher drop')
-         error%has_short_record = .true.
-      else
-         residual = abs(get_energy(run) - first_energy)/(run%total_mass/2*history%impact_velocity**2)
-         history%energy_residual = max(history%energy_residual, residual)
-         if (.not. residual < unstable_residual) then
-            history%energy_residual = huge(residual)
-            error = numerical_error(trim(event_prefix(time))//' the run is unstable (energy off by '//to_text(residual) &
-               //' of that at first touch); allowed: a smaller step_safety')
-         end if
-      end if
-   end subroutine check_run
 
 end module thud_finite_element

@@ -34,8 +34,8 @@ module thud_impact_run
       real(wp), allocatable :: velocity(:, :, :)
       !> Inverse masses of the nodes, 1/kg: [0:n_polar, 0:n_radial].
       real(wp), allocatable :: inverse_mass(:, :)
-      !> Mass of the ball, kg.
-      real(wp) :: total_mass = 0.0_wp
+      !> Mass of the ball, kg; height of its center of mass at first touch, m.
+      real(wp) :: total_mass = 0.0_wp, touch_height = 0.0_wp
       !> Forces of stress and gas in the latest step, N.
       real(wp), allocatable :: force(:, :, :)
       !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar, 2].
@@ -89,6 +89,7 @@ contains
       run%velocity(:, :, 2) = -speed
       allocate (run%inverse_mass, source=1/run%body%mass)
       run%total_mass = sum(run%body%mass)
+      run%touch_height = get_mean_height(run) - gap
       allocate (run%floor_force(0:mesh%n_polar, 2), run%node_impulse(0:mesh%n_polar, 2), source=0.0_wp)
    end function new_impact_run
 

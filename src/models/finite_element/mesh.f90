@@ -70,9 +70,13 @@ contains
       type(mesh_options_type), intent(in) :: options
       type(error_type), allocatable, intent(out) :: error
 
-      if (options%polar_elements > 0 .and. options%polar_elements < min_polar) error = input_error( &
-         '&mesh: polar_elements = '//to_text(options%polar_elements)//' is not allowed; allowed: from ' &
-         //to_text(min_polar)//', or 0 for automatic')
+      if (options%polar_elements > 0 .and. options%polar_elements < min_polar) then
+         error = input_error('&mesh: polar_elements = '//to_text(options%polar_elements)//' is not allowed; allowed: from ' &
+            //to_text(min_polar)//', or 0 for automatic')
+      else if (options%radial_elements > 0 .and. options%radial_elements < min_radial) then
+         error = input_error('&mesh: radial_elements = '//to_text(options%radial_elements) &
+            //' is not allowed with finite_element; allowed: from '//to_text(min_radial)//', or 0 for automatic')
+      end if
    end subroutine check_mesh
 
    !> Numbers of elements with those that are automatic: of a thinner wall the elements are shorter, since it bends.
