@@ -234,7 +234,11 @@ contains
 
       error = 0.0_wp
       slips = self%contact%friction > slip_friction(1) .and. self%contact%friction < slip_friction(2)
-      if (.not. slips .or. is_viscous(self%material)) return
+      associate (material => self%material)
+         slips = slips .and. material%viscosity /= 'kelvin_voigt' &
+            .and. (material%viscosity /= 'fractional' .or. material%fractional_order < 1.0_wp)
+      end associate
+      if (.not. slips) return
       automatic = get_element_counts(ball, mesh_options_type())
       mesh = get_element_counts(ball, self%mesh)
       scale = get_shear_rate(ball)/get_shear_rate(slip_ball)
@@ -254,15 +258,6 @@ contains
 
       rate = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))/ball%outer_radius
    end function get_shear_rate
-
-   !> Whether the viscosity of the material is that of Kelvin and Voigt.
-   pure function is_viscous(material) result(yes)
-      type(material_options_type), intent(in) :: material
-      logical :: yes
-
-      yes = material%viscosity == 'kelvin_voigt' .or. &
-         (material%viscosity == 'fractional' .and. .not. material%fractional_order < 1.0_wp)
-   end function is_viscous
 
    !> Size of the snapshots; of automatic elements the largest that the levels of resolution can have.
    function get_snapshot_shape(self, ball, sampling) result(extents)
@@ -349,7 +344,7 @@ contains
       force = 0.0_wp
       call new_material(self%material, ball, material, error)
       if (allocated(error)) return
-      pressed = new_pressed_ball(ball, new_mesh(ball, self%mesh), material)
+      pressed = new_pressed_ball(ball, new_mesh(ball, self%mesh, between_plates=.true.), material)
       do i = 1, size(deflection)
          call press(pressed, deflection(i), error)
          if (allocated(error)) return

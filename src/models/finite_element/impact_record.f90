@@ -63,18 +63,15 @@ contains
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       type(force_history_type) :: history
+      character(len=24), parameter :: names(11) = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', &
+         'kinetic_energy_J', 'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', &
+         'friction_energy_J', 'dissipated_energy_J', 'minimum_volume_ratio', 'floor_energy_J']
 
-      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'], &
+         names(:merge(at_floor, at_floor - 1, run%floor%moves)))
       history%has_means = .true.
       history%impact_velocity = impact_velocity
-      history%model_history_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
-         'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'friction_energy_J', &
-         'dissipated_energy_J', 'minimum_volume_ratio']
-      if (run%floor%moves) then
-         history%model_history_name = [history%model_history_name, [character(len=24) :: 'floor_energy_J']]
-         allocate (history%floor_displacement, history%floor_velocity, mold=history%floor_force)
-      end if
-      allocate (history%model_history(size(history%floor_force), size(history%model_history_name)), source=0.0_wp)
+      if (run%floor%moves) allocate (history%floor_displacement, history%floor_velocity, mold=history%floor_force)
    end function new_impact_record
 
    !> Writes all quantities of one sample except the force.

@@ -17,6 +17,9 @@ module thud_mesh
    !> surface. Elements are larger at the outer surface and reduced more there, since the smallest ones limit the step.
    real(wp), parameter :: grading(2) = [0.15_wp, 0.45_wp]
 
+   !> The same around both poles of a ball between plates.
+   real(wp), parameter :: press_grading = 0.4_wp
+
    !> Automatic numbers of elements through and along a wall with this ratio of thickness to outer radius or a larger one.
    integer, parameter :: typical_radial = 8
    real(wp), parameter :: typical_polar = 64, typical_wall = 0.36_wp
@@ -92,14 +95,19 @@ contains
    end function get_element_counts
 
    !> Mesh of the undeformed ball around the origin, graded for the contact.
-   pure function new_mesh(ball, options) result(mesh)
+   pure function new_mesh(ball, options, between_plates) result(mesh)
       type(ball_type), intent(in) :: ball
       !> Numbers of elements.
       type(mesh_options_type), intent(in) :: options
+      !> Whether contacts are at both poles (default: at the lowest point).
+      logical, intent(in), optional :: between_plates
       type(mesh_type) :: mesh
       real(wp) :: radius, angle, depth
       integer :: i, j
+      logical :: pressed
 
+      pressed = .false.
+      if (present(between_plates)) pressed = between_plates
       associate (counts => get_element_counts(ball, options))
          mesh%n_radial = counts%radial_elements
          mesh%n_polar = counts%polar_elements
@@ -110,7 +118,11 @@ contains
          radius = ball%outer_radius - ball%wall_thickness*depth
          do j = 0, mesh%n_polar
             angle = pi*real(j, wp)/real(mesh%n_polar, wp)
-            angle = angle - (grading(1)*depth + grading(2)*(1 - depth))*sin(angle)
+            if (pressed) then
+               angle = angle - press_grading*sin(2*angle)/2
+            else
+               angle = angle - (grading(1)*depth + grading(2)*(1 - depth))*sin(angle)
+            end if
             mesh%r(j, i) = radius*sin(angle)
             mesh%z(j, i) = -radius*cos(angle)
          end do

@@ -6,7 +6,6 @@
 !> mesh, since nodes three apart share no element.
 module thud_pressed_ball
    use thud_ball, only: ball_type
-   use thud_constants, only: pi
    use thud_elastic_body, only: add_gas_forces, body_state_type, cavity_type, elastic_body_type, get_gas_pressure, &
       get_internal_forces, get_volume, new_elastic_body, no_failure
    use thud_error, only: error_type, numerical_error
@@ -29,9 +28,6 @@ module thud_pressed_ball
 
    !> Displacement for the differences, as a fraction of the thickness of an element.
    real(wp), parameter :: trial = 1.0e-7_wp
-
-   !> Relative reduction of the element size around the poles, where the contacts are.
-   real(wp), parameter :: grading = 0.4_wp
 
    !> Maximum approach in a step, as a fraction of the wall thickness.
    real(wp), parameter :: max_step = 0.05_wp
@@ -58,7 +54,7 @@ contains
    !> The ball at rest between plates that just touch it. The material has its long-term modulus.
    pure function new_pressed_ball(ball, mesh, material) result(pressed)
       type(ball_type), intent(in) :: ball
-      !> Mesh, whose nodes are moved along the meridians.
+      !> Mesh, graded for contacts at both poles.
       type(mesh_type), intent(in) :: mesh
       type(material_type), intent(in) :: material
       type(pressed_ball_type) :: pressed
@@ -70,7 +66,7 @@ contains
       relaxed%viscosity = 0.0_wp
       relaxed%branch_modulus = material%branch_modulus(:0)
       relaxed%branch_time = material%branch_time(:0)
-      pressed%body = new_elastic_body(ball, get_symmetric_mesh(mesh), relaxed)
+      pressed%body = new_elastic_body(ball, mesh, relaxed)
       pressed%diameter = 2*ball%outer_radius
       pressed%tolerance = balanced*material%shear_modulus*ball%wall_thickness**2
       pressed%wall = ball%wall_thickness
@@ -82,23 +78,6 @@ contains
       pressed%touches(0, 1) = .true.
       pressed%touches(n, 2) = .true.
    end function new_pressed_ball
-
-   !> The mesh with nodes as dense around the highest point as around the lowest.
-   pure function get_symmetric_mesh(mesh) result(symmetric)
-      type(mesh_type), intent(in) :: mesh
-      type(mesh_type) :: symmetric
-      real(wp) :: angle
-      integer :: j
-
-      symmetric = mesh
-      do j = 0, mesh%n_polar
-         angle = pi*real(j, wp)/real(mesh%n_polar, wp)
-         angle = angle - grading*sin(2*angle)/2
-         symmetric%r(j, :) = hypot(mesh%r(j, :), mesh%z(j, :))*sin(angle)
-         symmetric%z(j, :) = -hypot(mesh%r(j, :), mesh%z(j, :))*cos(angle)
-      end do
-      symmetric%r([0, mesh%n_polar], :) = 0.0_wp
-   end function get_symmetric_mesh
 
    !> Moves the plates to an approach.
    subroutine press(pressed, deflection, error)
@@ -125,7 +104,9 @@ contains
          else
             halvings = halvings + 1
          end if
-         if (has_met(pressed)) then
+         ! A node of the lower half of the cavity has reached mid-height.
+         if (any(pressed%body%mesh%z(:, 0) < -pressed%element_thickness .and. pressed%position(:, 0, 2) &
+            >= (pressed%diameter - pressed%deflection)/2)) then
             error = numerical_error('&compression: max_deflection: at '//significant(pressed%deflection, 3) &
                //' m the walls of the cavity meet; allowed: less')
             return
@@ -137,17 +118,6 @@ contains
          end if
       end do
    end subroutine press
-
-   !> Whether the cavity has closed somewhere between the plates.
-   pure function has_met(pressed) result(met)
-      type(pressed_ball_type), intent(in) :: pressed
-      !> Whether a node of its lower half has reached mid-height.
-      logical :: met
-
-      associate (middle => (pressed%diameter - pressed%deflection)/2)
-         met = any(pressed%body%mesh%z(:, 0) < -pressed%element_thickness .and. pressed%position(:, 0, 2) >= middle)
-      end associate
-   end function has_met
 
    !> Newton's method at one approach of the plates.
    subroutine find_rest(pressed, converged, error)

@@ -155,13 +155,23 @@ contains
       !> The modes, ascending: [n_mode].
       type(mode_type), intent(in) :: lowest(:)
       type(free_modes_type), intent(out) :: modes
-      real(wp), allocatable :: displacement(:, :, :), u(:), v(:)
-      integer :: i, j
+      real(wp), allocatable :: angle(:), displacement(:, :, :), u(:), v(:)
+      real(wp) :: radius
+      integer :: i, j, n
 
       modes%frequency = lowest%omega/(2*pi)
       modes%harmonic = lowest%harmonic
       allocate (modes%participation(size(lowest)))
-      call set_nodes(ball, max(n_line, lines_per_harmonic*maxval(modes%harmonic)), modes)
+      n = max(n_line, lines_per_harmonic*maxval(modes%harmonic))
+      allocate (modes%r(0:n, 0:n_ring), modes%z(0:n, 0:n_ring), modes%shape(2, 0:n, 0:n_ring, size(lowest)))
+      angle = [(pi*real(j, wp)/n, j=0, n)]
+      do i = 0, n_ring
+         radius = ball%outer_radius - ball%wall_thickness*real(n_ring - i, wp)/n_ring
+         modes%r(:, i) = radius*sin(angle)
+         modes%z(:, i) = -radius*cos(angle)
+      end do
+      ! The sine of pi is not quite zero.
+      modes%r(n, :) = 0.0_wp
       do i = 1, size(lowest)
          displacement = get_displacements(basis, lowest(i)%harmonic, [(2*real(j, wp)/n_ring - 1, j=0, n_ring)])
          u = matmul(displacement(1, :, :), lowest(i)%coefficient)
@@ -170,28 +180,6 @@ contains
          modes%shape(:, :, :, i) = get_shape(lowest(i)%harmonic, u, v, size(modes%r, 1))
       end do
    end subroutine describe
-
-   !> Sets the positions of the nodes and allocates the shapes.
-   pure subroutine set_nodes(ball, n, modes)
-      type(ball_type), intent(in) :: ball
-      !> Number of intervals from pole to pole.
-      integer, intent(in) :: n
-      !> Modes with their frequencies.
-      type(free_modes_type), intent(inout) :: modes
-      integer :: i, j
-
-      allocate (modes%r(0:n, 0:n_ring), modes%z(0:n, 0:n_ring), modes%shape(2, 0:n, 0:n_ring, size(modes%frequency)))
-      do i = 0, n_ring
-         associate (radius => ball%outer_radius - ball%wall_thickness*real(n_ring - i, wp)/n_ring)
-            do j = 0, n
-               modes%r(j, i) = radius*sin(pi*real(j, wp)/n)
-               modes%z(j, i) = -radius*cos(pi*real(j, wp)/n)
-            end do
-         end associate
-      end do
-      ! The sine of pi is not quite zero.
-      modes%r(n, :) = 0.0_wp
-   end subroutine set_nodes
 
    !> Displacements U P_n(cos t) along the radius and V dP_n/dt along the meridian, of maximum length 1, the lowest point
    !> moving upwards.

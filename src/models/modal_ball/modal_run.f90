@@ -103,16 +103,13 @@ contains
       type(modal_run_type), intent(in) :: run
       type(sampling_type), intent(in) :: sampling
       type(force_history_type) :: history
-      integer :: i, n_sample
+      integer :: i
 
-      n_sample = get_sample_count(sampling)
-      history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'], &
+         [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J'])
       history%has_means = .true.
       history%impact_velocity = -run%velocity
-      history%model_history_name = [character(len=24) :: 'contact_radius_m', &
-         ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J']
-      allocate (history%model_history(n_sample, size(history%model_history_name)), source=0.0_wp)
-      if (run%floor_moves) allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
+      if (run%floor_moves) allocate (history%floor_displacement, history%floor_velocity, source=history%floor_force)
    end function new_history
 
    !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
@@ -158,8 +155,8 @@ contains
             end if
             if (run%contact%outermost == size(run%rings%radius)) then
                error = numerical_error('&ball: youngs_modulus = '//to_text(run%ball%youngs_modulus)//' Pa is too low for ' &
-                  //'this drop: '//significant(1.0e3_wp*n_step*run%interval, 3)//' ms after first touch the ball lies on its ' &
-                  //'outermost ring, its center lowered by ' &
+                  //'this drop: '//significant(1.0e3_wp*n_step*run%interval, 3)//' ms after first touch the ball lies ' &
+                  //'on its outermost ring, its center lowered by ' &
                   //significant(1.0e3_wp*(run%ball%outer_radius - run%height), 3)//' mm; allowed: a stiffer ball, or a ' &
                   //'lower height')
                return

@@ -83,28 +83,17 @@ contains
       real(wp), intent(in), contiguous :: gap(:)
       !> Set if the touching rings were not found.
       type(error_type), allocatable, intent(out) :: error
-      integer :: i, round, first_wrong
+      integer :: round, first_wrong
       logical :: failed
 
-      if (.not. any(contact%touches)) then
-         do i = 1, size(contact%touches)
-            contact%touches(i) = gap(contact%n_dof*(i - 1) + 1) < 0.0_wp
-         end do
-      end if
+      if (.not. any(contact%touches)) contact%touches = gap(::contact%n_dof) < 0.0_wp
       do round = 1, max_rounds
          call close_gaps(contact, gap, failed)
          if (failed) exit
          contact%gap = gap
          call add_product(contact%response(:, :contact%last_closed_gap), contact%force, contact%gap)
-         do i = 1, size(contact%touches)
-            associate (k => contact%n_dof*(i - 1) + 1)
-               if (contact%touches(i)) then
-                  contact%wrong(i) = contact%force(k) < 0.0_wp
-               else
-                  contact%wrong(i) = contact%gap(k) < -penetration_tolerance
-               end if
-            end associate
-         end do
+         contact%wrong = merge(contact%force(::contact%n_dof) < 0.0_wp, &
+            contact%gap(::contact%n_dof) < -penetration_tolerance, contact%touches)
          if (.not. any(contact%wrong)) return
          if (round < max_rounds/2) then
             contact%touches = contact%touches .neqv. contact%wrong

@@ -32,10 +32,8 @@ module thud_sphere_modes
 
    !> Gram matrices of the basis, the same for every harmonic.
    type :: basis_type
-      !> Outer radius, m.
-      real(wp) :: outer_radius
-      !> Inner radius, m.
-      real(wp) :: inner_radius
+      !> Outer and inner radius, m.
+      real(wp) :: outer_radius, inner_radius
       !> Density, kg/m3.
       real(wp) :: density
       !> Shear modulus, Pa.
@@ -46,10 +44,8 @@ module thud_sphere_modes
       logical :: incompressible
       !> Stiffness of the enclosed gas against its change of volume, Pa/m3.
       real(wp) :: gas_stiffness
-      !> Radii of the quadrature, m: [n_node].
-      real(wp), allocatable :: radius(:)
-      !> Weights of the quadrature, m: [n_node].
-      real(wp), allocatable :: weight(:)
+      !> Radii and weights of the quadrature, m: [n_node].
+      real(wp), allocatable :: radius(:), weight(:)
       !> Polynomials and two derivatives at the radii: [n_node, degree + 1, 3].
       real(wp), allocatable :: polynomial(:, :, :)
       !> Degree beyond that which the contact needs.
@@ -170,9 +166,7 @@ contains
       !> Integrals over the wall of products of columns: [n_unknown, n_unknown].
       function product_of(a, b) result(matrix)
          !> Values at the radii: [n_node, n_unknown].
-         real(wp), intent(in) :: a(:, :)
-         !> Values at the radii: [n_node, n_unknown].
-         real(wp), intent(in) :: b(:, :)
+         real(wp), intent(in) :: a(:, :), b(:, :)
          real(wp) :: matrix(size(a, 2), size(b, 2))
 
          associate (n_node => size(a, 1), weighted => spread(basis%weight, 2, size(b, 2))*b)
