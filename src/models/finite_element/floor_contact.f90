@@ -5,14 +5,9 @@
 !> and Katona 1991, Int. J. Numer. Methods Eng. 32, 103-128); they do not penetrate, and their energy is lost. With a layer:
 !> linear springs on the floor (Winkler), lossless and massless, that push normal to the surface of the ball.
 !>
-!> The edge of the contact lies between two nodes, and the outer one carries part of the pressure before it touches;
-!> otherwise the force would jump from ring to ring. Near the edge, at the radius a, a smooth frictionless contact has the
-!> pressure p = C sqrt(s) at the distance s inside and the gap 4/3 C/E* s**(3/2) at the distance s outside (Johnson 1985,
-!> Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R) by Hertz. With the edge at the distance e from the inner
-!> node, a linear shape function of width h gives the outer node the force per area 4/15 C e**(5/2)/h**2 at the
-!> gap 4/3 C/E* (h - e)**(3/2). A parabola replaces this relation between force and gap. It has the same force at zero gap,
-!> 4/15 C sqrt(h), and the same work, 0.1840 times this force times the gap at e = 0; the radius a is that of the middle of
-!> the element. Force and gap vanish as the mesh is refined.
+!> The edge of the contact lies between two nodes, and the outer one carries part of the pressure before it touches, by a
+!> parabola with the force and the work of Hertz's contact; otherwise the force would jump from ring to ring
+!> (docs/finite_elements.md). Force and gap vanish as the mesh is refined.
 module thud_floor_contact
    use thud_ball, only: ball_type
    use thud_constants, only: pi

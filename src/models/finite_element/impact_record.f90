@@ -158,7 +158,7 @@ contains
       call add_model_quantity(history, 'shear_modulus', 'Pa', run%body%material%shear_modulus)
       call add_model_quantity(history, 'bulk_modulus', 'Pa', run%body%material%bulk_modulus)
       call add_model_quantity(history, 'simulated_time', 's', run%time)
-      call add_model_quantity(history, 'minimum_step', 's', run%shortest_interval)
+      call add_model_quantity(history, 'minimum_step', 's', run%last_interval)
       call add_model_quantity(history, 'maximum_penetration', 'm', run%penetration)
       call add_model_quantity(history, 'radial_elements', '', real(run%body%mesh%n_radial, wp))
       call add_model_quantity(history, 'polar_elements', '', real(run%body%mesh%n_polar, wp))

@@ -56,8 +56,6 @@ module thud_impact_run
       real(wp), allocatable :: node_impulse(:, :)
       !> Length of the previous step, s; 0 at the start.
       real(wp) :: last_interval = 0.0_wp
-      !> Shortest step, s.
-      real(wp) :: shortest_interval = huge(1.0_wp)
       !> Maximum penetration of a node into the floor, m.
       real(wp) :: penetration = 0.0_wp
    end type impact_run_type
@@ -265,7 +263,6 @@ contains
 
       run%position = run%position + interval*run%velocity
       run%last_interval = interval
-      run%shortest_interval = min(run%shortest_interval, interval)
    end subroutine update_position
 
    !> Energy of the latest step, including all losses, J; it should stay constant.

@@ -43,7 +43,7 @@ module thud_sphere_modes
       !> Whether the material is incompressible: W = 0.
       logical :: incompressible
       !> Stiffness of the enclosed gas against its change of volume, Pa/m3.
-      real(wp) :: gas_stiffness
+      real(wp) :: gas_stiffness = 0.0_wp
       !> Radii and weights of the quadrature, m: [n_node].
       real(wp), allocatable :: radius(:), weight(:)
       !> Polynomials and two derivatives at the radii: [n_node, degree + 1, 3].
@@ -92,10 +92,8 @@ contains
       if (.not. basis%incompressible) then
          basis%lame = 2*basis%shear_modulus*ball%poisson_ratio/(1 - 2*ball%poisson_ratio)
       end if
-      basis%gas_stiffness = 0.0_wp
       if (with_gas) basis%gas_stiffness = ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
          /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
-
       if (present(extra_degree)) basis%extra_degree = extra_degree
       if (present(highest_omega)) then
          basis%shear_wavenumber = highest_omega*sqrt(basis%density/basis%shear_modulus)
@@ -114,7 +112,6 @@ contains
       do i = 2, 3
          basis%polynomial(:, :, i) = basis%polynomial(:, :, i)*(2/ball%wall_thickness)**(i - 1)
       end do
-
       call set_gram(basis, n)
    end function new_basis
 
@@ -327,9 +324,9 @@ contains
       end if
    end subroutine get_modes
 
-   !> Flexibility of a harmonic, without the rigid mode of n = 1; from n = 2 up in closed form (Lur'e, Theory of Elasticity,
-   !> Springer 2005, section 5.1): four solutions of the static equations with U = a r^m, V = b r^m, and the tractions
-   !> 2 mu c r^(m-1), 2 mu d r^(m-1).
+   !> Flexibility of a harmonic, without the rigid mode of n = 1; below n = 2 by the basis, from there in closed form (Lur'e,
+   !> Theory of Elasticity, Springer 2005, section 5.1): four solutions of the static equations with U = a r^m, V = b r^m,
+   !> and the tractions 2 mu c r^(m-1), 2 mu d r^(m-1).
    subroutine get_flexibility(basis, harmonic, flexibility, failed)
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
@@ -339,12 +336,21 @@ contains
       logical, intent(out) :: failed
       real(wp), dimension(4) :: a, b, c, d, inner, at_outer
       real(wp) :: matrix(4, 4), right(4, 2)
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :), momentum(:)
       real(wp) :: n, nu
       integer :: pivot(4)
       integer :: info
 
       if (harmonic < 2) then
-         call get_low_flexibility(basis, harmonic, flexibility, failed)
+         call assemble(basis, harmonic, stiffness, mass, momentum)
+         associate (n_function => size(stiffness, 1))
+            surface = sum(get_displacements(basis, harmonic, [1.0_wp]), dim=2)
+            if (harmonic == 1) surface = surface(:, 2:) - spread(surface(:, 1), 2, n_function)*spread(momentum, 1, 2)
+            solution = transpose(surface)
+            call dposv('L', n_function, 2, stiffness, n_function, solution, n_function, info)
+         end associate
+         failed = info /= 0
+         flexibility = matmul(surface, solution)
          return
       end if
       n = real(harmonic, wp)
@@ -377,27 +383,6 @@ contains
       flexibility(1, :) = matmul(a*at_outer, right)
       flexibility(2, :) = matmul(b*at_outer, right)
    end subroutine get_flexibility
-
-   !> Flexibility of the harmonics 0 and 1, by the basis.
-   subroutine get_low_flexibility(basis, harmonic, flexibility, failed)
-      type(basis_type), intent(in) :: basis
-      integer, intent(in) :: harmonic
-      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2].
-      real(wp), intent(out) :: flexibility(2, 2)
-      !> Whether the stiffness is singular.
-      logical, intent(out) :: failed
-      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :), momentum(:)
-      integer :: n, info
-
-      call assemble(basis, harmonic, stiffness, mass, momentum)
-      n = size(stiffness, 1)
-      surface = sum(get_displacements(basis, harmonic, [1.0_wp]), dim=2)
-      if (harmonic == 1) surface = surface(:, 2:) - spread(surface(:, 1), 2, n)*spread(momentum, 1, 2)
-      solution = transpose(surface)
-      call dposv('L', n, 2, stiffness, n, solution, n, info)
-      failed = info /= 0
-      flexibility = matmul(surface, solution)
-   end subroutine get_low_flexibility
 
    !> Stiffness and mass of one harmonic in the basis. For n = 1 its first function, U = 1 and W = 0, is the rigid mode; the
    !> others keep their elastic part, without momentum.
