@@ -210,6 +210,9 @@ def compute_samples(study: SampleStudy, folder: Path | None, options: RunOptions
         refuse(
             f"{study.count} samples do not fit in memory", "fewer samples, or a directory for them"
         )
+    if study.design not in {"grid", "list"}:
+        # Raises InputError for a design that does not fit in memory.
+        study.parameter_columns(0, 1)
     size = study.block_size
     blocks = Blocks(folder, study, size) if folder else None
     memory: dict[int, Columns] = {}
