@@ -13,10 +13,22 @@ module thud_contact_source
    implicit none (type, external)
    private
 
-   public :: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_source_type
+   public :: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_law_type, contact_source_type
+   public :: get_contact_force
 
    !> Indices in the state of a single mass: deflection (m), velocity (m/s), impulse on the floor (N s), energy lost (J).
    integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4
+
+   !> Contact law: a linear and a power-law spring in parallel, damped in proportion to their force (Hunt and Crossley 1975),
+   !> F = (k d + c d^n)(1 + a d'), never tensile.
+   type :: contact_law_type
+      !> Stiffness k of the linear spring, N/m.
+      real(wp) :: stiffness = 0.0_wp
+      !> Factor c of the power law, N/m^exponent, and its exponent n.
+      real(wp) :: factor = 0.0_wp, exponent = 1.5_wp
+      !> Damping a, s/m.
+      real(wp) :: damping = 0.0_wp
+   end type contact_law_type
 
    !> Equations of motion of the source.
    type, abstract, extends(ode_type) :: contact_source_type
@@ -113,5 +125,18 @@ contains
          //'; allowed: more substeps, a higher sample_rate, or a softer or heavier source')
       error%has_coarse_steps = .true.
    end function coarse_step_error
+
+   !> Components of the force. They stay smooth beyond the end of a contact, where the search for it evaluates them.
+   pure function get_contact_force(law, deflection, velocity) result(components)
+      type(contact_law_type), intent(in) :: law
+      !> Deflection d, m, and its rate, m/s.
+      real(wp), intent(in) :: deflection, velocity
+      !> Linear spring, power law, damping, N: [3].
+      real(wp) :: components(3)
+
+      components(1) = law%stiffness*deflection
+      components(2) = law%factor*sign(abs(deflection)**law%exponent, deflection)
+      components(3) = max(-1.0_wp, law%damping*velocity)*sum(components(1:2))
+   end function get_contact_force
 
 end module thud_contact_source

@@ -4,8 +4,7 @@
 module thud_two_mass
    use thud_ball, only: ball_type
    use thud_constants, only: pi
-   use thud_contact_law, only: contact_law_type, get_contact_force
-   use thud_contact_source, only: contact_source_type
+   use thud_contact_source, only: contact_law_type, contact_source_type, get_contact_force
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
