@@ -9,11 +9,11 @@ module thud_function_set
    private
 
    public :: cosines, function_set_type, get_functions, get_highest_wavenumber
-   public :: get_overlap, get_quadrature, new_polynomials, new_splines, sines
+   public :: get_overlap, get_quadrature, new_polynomials, new_splines, point_values, sines
 
    !> Kinds of functions: sqrt(2/length) sin(i pi x/length) and cos(i pi x/length), i = 1 to count, the deflections and
-   !> rotations of simply supported plates, polynomials, and splines.
-   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, splines = 4
+   !> rotations of simply supported plates, polynomials, splines, and values at points, which have no other values.
+   integer, parameter :: sines = 1, cosines = 2, polynomials = 3, splines = 4, point_values = 5
 
    !> Minimum number of nodes of a spline.
    integer, parameter, public :: min_nodes = 4
@@ -27,7 +27,7 @@ module thud_function_set
       !> Number of functions.
       integer :: count = 0
       !> Polynomials as sums of orthonormal Legendre polynomials: [0:degree, count]. Splines as sums of those that are 1 at
-      !> one node and 0 at the others: [count, count].
+      !> one node and 0 at the others: [count, count]. Values at points: [count, count].
       real(wp), allocatable :: coefficient(:, :)
       !> Nodes of splines, m: [count], and second derivatives there of the splines that are 1 at one node, 1/m2:
       !> [count, count].
@@ -218,6 +218,10 @@ contains
       real(wp), allocatable :: legendre(:, :, :)
       integer :: i, j
 
+      if (set%kind == point_values) then
+         value = set%coefficient
+         return
+      end if
       if (set%kind == splines) then
          value = get_spline_values(set, position, order)
          return

@@ -1,9 +1,10 @@
-!> Modes by the Ritz method: displacements are sums of products of functions of x and of y, energies are sums of products
-!> of matrices in x and in y.
+!> Modes by the Ritz method: displacements are sums of products of functions of x and of y, and an energy is a product of two
+!> derivatives, integrated over x and y: a product of a matrix in x and one in y.
 !>
 !> The matrices couple only some functions (of the same number for simply supported plates, of the same symmetry for
 !> symmetric ones). The system falls into blocks of functions that are coupled, which are solved one by one.
 module thud_ritz_system
+   use thud_function_set, only: function_set_type, get_functions, get_overlap
    use thud_kinds, only: wp
    use thud_lapack, only: dposv, dsygvd
    use thud_matrix_product, only: get_product, get_transposed_product
@@ -11,10 +12,23 @@ module thud_ritz_system
    implicit none (type, external)
    private
 
-   public :: add_displacement, add_mass, add_stiffness, ritz_system_type, solve_ritz_system
+   public :: add_energies, add_stiffness, energy_type, ritz_system_type, solve_ritz_system
 
    !> A matrix entry below this fraction of the largest one in its row or column is rounding.
    real(wp), parameter :: rounding = 1.0e-11_wp
+
+   !> The integral of half the product of two derivatives. Between different displacements, the transposed product is
+   !> included.
+   type :: energy_type
+      !> Factor of the product: the energy is in J.
+      real(wp) :: factor = 0.0_wp
+      !> Indices of the displacements.
+      integer :: row = 0, column = 0
+      !> Orders of their derivatives in x and y.
+      integer :: row_order(2) = 0, column_order(2) = 0
+      !> A kinetic energy, of velocities.
+      logical :: is_mass = .false.
+   end type energy_type
 
    !> A part of the energy: half the double sum of coefficients times x times y.
    type :: term_type
@@ -36,50 +50,85 @@ module thud_ritz_system
       logical :: is_bearing = .false.
    end type ritz_system_type
 
-   !> Numbers of the functions of one displacement in one group.
+   !> Indices of the functions of one displacement in one group.
    type :: members_type
-      integer, allocatable :: number(:)
+      integer, allocatable :: index(:)
    end type members_type
 
 contains
 
-   !> Adds a displacement and returns its number.
-   subroutine add_displacement(system, displacement, number)
+   !> Adds energies that are integrated over x and y, or over one of them and summed over positions in the other one.
+   subroutine add_energies(system, energies, loss_factor, direction, at)
+      !> The system with its displacements.
       type(ritz_system_type), intent(inout) :: system
-      type(product_type), intent(in) :: displacement
-      integer, intent(out) :: number
+      type(energy_type), intent(in) :: energies(:)
+      !> Loss factor of the stiffnesses.
+      real(wp), intent(in) :: loss_factor
+      !> Direction of the sum (1: x, 2: y; default: none), and positions, m.
+      integer, intent(in), optional :: direction
+      real(wp), intent(in), optional :: at(:)
+      real(wp), allocatable :: x(:, :), y(:, :)
+      integer :: i, summed
 
-      if (.not. allocated(system%displacement)) allocate (system%displacement(0))
-      system%displacement = [system%displacement, displacement]
-      number = size(system%displacement)
-   end subroutine add_displacement
+      summed = 0
+      if (present(direction)) summed = direction
+      do i = 1, size(energies)
+         associate (e => energies(i))
+            if (.not. abs(e%factor) > 0.0_wp) cycle
+            associate (row => system%displacement(e%row), column => system%displacement(e%column))
+               x = get_products(row%x, e%row_order(1), column%x, e%column_order(1), 1)
+               y = get_products(row%y, e%row_order(2), column%y, e%column_order(2), 2)
+            end associate
+            if (e%is_mass) then
+               call add_term(system%mass, term_type(e%row, e%column, e%factor*x, y))
+            else
+               call add_stiffness(system, e%row, e%factor*x, y, loss_factor, e%column)
+            end if
+         end associate
+      end do
+   contains
 
-   !> Adds a stiffness: an energy of half the double sum over the coefficients of two displacements. Between different
-   !> displacements, the transposed stiffness is included.
-   subroutine add_stiffness(system, row, column, stiffness, x, y, loss_factor)
+      !> Integrals or sums of products of derivatives.
+      function get_products(first, first_order, second, second_order, along) result(products)
+         type(function_set_type), intent(in) :: first, second
+         integer, intent(in) :: first_order, second_order
+         !> Direction of the functions.
+         integer, intent(in) :: along
+         real(wp) :: products(first%count, second%count)
+
+         if (along == summed) then
+            products = matmul(transpose(get_functions(first, at, first_order)), get_functions(second, at, second_order))
+         else
+            products = get_overlap(first, first_order, second, second_order)
+         end if
+      end function get_products
+   end subroutine add_energies
+
+   !> Adds a stiffness by its matrices.
+   subroutine add_stiffness(system, row, x, y, loss_factor, column)
       type(ritz_system_type), intent(inout) :: system
-      integer, intent(in) :: row, column
-      !> Factor of the matrices: the energy is in J.
-      real(wp), intent(in) :: stiffness
+      !> Index of the displacement.
+      integer, intent(in) :: row
+      !> Matrices over its functions of x and y.
       real(wp), intent(in) :: x(:, :), y(:, :)
       real(wp), intent(in) :: loss_factor
+      !> Index of the other displacement (default: the same).
+      integer, intent(in), optional :: column
+      integer :: other
 
-      if (.not. allocated(system%stiffness)) allocate (system%stiffness(0))
-      if (.not. abs(stiffness) > 0.0_wp) return
-      system%stiffness = [system%stiffness, term_type(row, column, stiffness*x, y, loss_factor, system%is_bearing)]
+      other = row
+      if (present(column)) other = column
+      call add_term(system%stiffness, term_type(row, other, x, y, loss_factor, system%is_bearing))
    end subroutine add_stiffness
 
-   !> Adds a mass; as `add_stiffness`.
-   subroutine add_mass(system, row, column, mass, x, y)
-      type(ritz_system_type), intent(inout) :: system
-      integer, intent(in) :: row, column
-      real(wp), intent(in) :: mass
-      real(wp), intent(in) :: x(:, :), y(:, :)
+   !> Adds a term.
+   subroutine add_term(terms, term)
+      type(term_type), allocatable, intent(inout) :: terms(:)
+      type(term_type), intent(in) :: term
 
-      if (.not. allocated(system%mass)) allocate (system%mass(0))
-      if (.not. abs(mass) > 0.0_wp) return
-      system%mass = [system%mass, term_type(row, column, mass*x, y)]
-   end subroutine add_mass
+      if (.not. allocated(terms)) allocate (terms(0))
+      terms = [terms, term]
+   end subroutine add_term
 
    !> Solves a system for all its modes.
    subroutine solve_ritz_system(system, modes, failed, lower_limit)
@@ -89,15 +138,12 @@ contains
       logical, intent(out) :: failed
       !> Angular frequency of the highest of the lower modes, rad/s.
       real(wp), intent(in) :: lower_limit
-      integer, allocatable :: group_x(:), group_y(:)
       type(members_type), allocatable :: x(:, :), y(:, :)
       integer :: i, j, n
 
       failed = .false.
-      call find_groups(system, .true., group_x)
-      call find_groups(system, .false., group_y)
-      x = get_members(group_x, system%displacement%x%count)
-      y = get_members(group_y, system%displacement%y%count)
+      x = get_members(get_groups(system, 1), system%displacement%x%count)
+      y = get_members(get_groups(system, 2), system%displacement%y%count)
       allocate (modes%displacement, source=system%displacement)
       allocate (modes%block(count([((has_mass(x(:, i), y(:, j)), i=1, size(x, 2)), j=1, size(y, 2))])))
       n = 0
@@ -117,91 +163,67 @@ contains
          logical :: yes
          integer :: i
 
-         yes = any([(size(x(i)%number)*size(y(i)%number) > 0, i=1, size(x))] .and. .not. system%displacement%is_static)
+         yes = any([(size(x(i)%index)*size(y(i)%index) > 0, i=1, size(x))] .and. .not. system%displacement%is_static)
       end function has_mass
    end subroutine solve_ritz_system
 
-   !> Number of the group of each function of one coordinate; functions of different groups are not coupled.
-   subroutine find_groups(system, along_x, group)
+   !> Index of the group of each function of one coordinate, in the order of displacements and their functions. Functions of
+   !> different groups are not coupled.
+   function get_groups(system, direction) result(group)
       type(ritz_system_type), intent(in) :: system
-      !> Functions of x, otherwise of y.
-      logical, intent(in) :: along_x
-      !> Numbers from 1, in the order of displacements and their functions.
-      integer, allocatable, intent(out) :: group(:)
-      integer, allocatable :: first(:), root(:)
-      integer :: i, n
+      !> 1: functions of x, 2: of y.
+      integer, intent(in) :: direction
+      integer, allocatable :: group(:)
+      integer, allocatable :: first(:), before(:)
+      logical, allocatable :: is_coupled(:, :)
+      integer :: i, k, n
 
-      associate (displacement => system%displacement)
-         if (along_x) then
-            first = get_first(displacement%x%count)
-         else
-            first = get_first(displacement%y%count)
-         end if
-      end associate
+      if (direction == 1) first = get_first(system%displacement%x%count)
+      if (direction == 2) first = get_first(system%displacement%y%count)
       n = first(size(first)) - 1
-      root = [(i, i=1, n)]
+      allocate (is_coupled(n, n), source=.false.)
       do i = 1, size(system%stiffness)
-         call merge_terms(system%stiffness(i))
+         call couple(system%stiffness(i))
       end do
       do i = 1, size(system%mass)
-         call merge_terms(system%mass(i))
+         call couple(system%mass(i))
       end do
-      allocate (group(n), source=0)
-      n = 0
-      do i = 1, size(group)
-         if (root(i) == i) then
-            n = n + 1
-            group(i) = n
-         end if
+      ! Each group takes the index of its first function; then without gaps.
+      group = [(i, i=1, n)]
+      do
+         before = group
+         do i = 1, n
+            where (is_coupled(:, i)) group = min(group, group(i))
+            group(i) = minval(group, mask=is_coupled(:, i))
+         end do
+         if (all(group == before)) exit
       end do
-      do i = 1, size(group)
-         group(i) = group(get_root(i))
+      before = group
+      do i = 1, n
+         group(i) = count([(before(k) == k, k=1, before(i))])
       end do
    contains
 
-      !> Merges the groups of functions that a term couples.
-      subroutine merge_terms(term)
+      !> Marks the functions that a term couples.
+      subroutine couple(term)
          type(term_type), intent(in) :: term
-         real(wp), allocatable :: matrix(:, :), row_scale(:), column_scale(:)
+         real(wp) :: matrix(merge(size(term%x, 1), size(term%y, 1), direction == 1), &
+            merge(size(term%x, 2), size(term%y, 2), direction == 1))
          integer :: k, l
 
-         if (along_x) then
-            allocate (matrix, source=abs(term%x))
-         else
-            allocate (matrix, source=abs(term%y))
-         end if
-         row_scale = maxval(matrix, dim=2)
-         column_scale = maxval(matrix, dim=1)
-         do l = 1, size(matrix, 2)
-            do k = 1, size(matrix, 1)
-               if (matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) then
-                 call merge_functions(first(term%row) + k - 1, first(term%column) + l - 1)
-               end if
+         if (direction == 1) matrix = abs(term%x)
+         if (direction == 2) matrix = abs(term%y)
+         associate (row_scale => maxval(matrix, dim=2), column_scale => maxval(matrix, dim=1))
+            do l = 1, size(matrix, 2)
+               do k = 1, size(matrix, 1)
+                  if (.not. matrix(k, l) > rounding*max(row_scale(k), column_scale(l))) cycle
+                  is_coupled(first(term%row) + k - 1, first(term%column) + l - 1) = .true.
+                  is_coupled(first(term%column) + l - 1, first(term%row) + k - 1) = .true.
+               end do
             end do
-         end do
-      end subroutine merge_terms
-
-      !> Merges the groups of two functions.
-      subroutine merge_functions(one, other)
-         integer, intent(in) :: one, other
-         integer :: roots(2)
-
-         roots = [get_root(one), get_root(other)]
-         root(maxval(roots)) = minval(roots)
-      end subroutine merge_functions
-
-      !> First function of the group of a function.
-      function get_root(number) result(found)
-         integer, intent(in) :: number
-         integer :: found
-
-         found = number
-         do while (root(found) /= found)
-            root(found) = root(root(found))
-            found = root(found)
-         end do
-      end function get_root
-   end subroutine find_groups
+         end associate
+      end subroutine couple
+   end function get_groups
 
    !> Functions of each displacement in each group: [n_displacement, n_group].
    pure function get_members(group, count) result(members)
@@ -210,17 +232,14 @@ contains
       !> Number of functions of each displacement.
       integer, intent(in) :: count(:)
       type(members_type) :: members(size(count), maxval(group))
+      integer :: first(size(count) + 1)
       integer :: i, k, p
 
-      i = 0
-      do p = 1, size(count)
-         do k = 1, size(members, 2)
-            allocate (members(p, k)%number(0))
+      first = get_first(count)
+      do k = 1, size(members, 2)
+         do p = 1, size(count)
+            members(p, k)%index = pack([(i, i=1, count(p))], group(first(p):first(p + 1) - 1) == k)
          end do
-         do k = 1, count(p)
-            members(p, group(i + k))%number = [members(p, group(i + k))%number, k]
-         end do
-         i = i + count(p)
       end do
    end function get_members
 
@@ -255,8 +274,8 @@ contains
          n = size(displacement)
          allocate (block%shape(n))
          do p = 1, n
-            block%shape(p)%x = x(p)%number
-            block%shape(p)%y = y(p)%number
+            block%shape(p)%x = x(p)%index
+            block%shape(p)%y = y(p)%index
          end do
          first = get_first([(size(block%shape(p)%x)*size(block%shape(p)%y), p=1, n)])
          allocate (dynamic(0), static(0))
@@ -277,7 +296,7 @@ contains
          if (failed) return
          ! The forces on the static coefficients vanish.
          stiffness = get_product(stiffness(dynamic, :), transformation)
-         call condense(mass)
+         mass = get_condensed(mass)
       end if
       call get_eigenmodes(stiffness, mass, omega, failed)
       if (failed) return
@@ -297,12 +316,13 @@ contains
       end do
    contains
 
-      !> Replaces a matrix of all coefficients by that of the dynamic ones.
-      subroutine condense(matrix)
-         real(wp), allocatable, intent(inout) :: matrix(:, :)
+      !> Matrix of the dynamic coefficients from that of all.
+      function get_condensed(matrix) result(condensed)
+         real(wp), intent(in) :: matrix(:, :)
+         real(wp) :: condensed(size(dynamic), size(dynamic))
 
-         matrix = get_transposed_product(transformation, get_product(matrix, transformation))
-      end subroutine condense
+         condensed = get_transposed_product(transformation, get_product(matrix, transformation))
+      end function get_condensed
 
       !> Weighted sum of the stiffnesses.
       subroutine get_part(weight, share, part)
@@ -318,7 +338,7 @@ contains
          share = spread(weight(1), 1, size(omega))
          if (any(abs(weight - weight(1)) > 0.0_wp)) then
             call assemble(system%stiffness, weight, block, first, matrix)
-            if (size(static) > 0) call condense(matrix)
+            if (size(static) > 0) matrix = get_condensed(matrix)
             matrix = get_product(matrix, stiffness)
             share = sum(stiffness*matrix, dim=1)/max(omega**2, tiny(omega))
             n = count(omega < lower_limit)

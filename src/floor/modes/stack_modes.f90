@@ -3,23 +3,17 @@
 module thud_stack_modes
    use thud_constants, only: pi
    use thud_function_set, only: cosines, function_set_type, get_functions, get_highest_wavenumber, get_overlap, &
-      new_polynomials, sines
+      new_polynomials, point_values, sines
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
    use thud_modes, only: modes_type, product_type
    use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, has_sines, &
       layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
-   use thud_ritz_system, only: add_displacement, add_mass, add_stiffness, ritz_system_type, solve_ritz_system
+   use thud_ritz_system, only: add_energies, add_stiffness, energy_type, ritz_system_type, solve_ritz_system
    implicit none (type, external)
    private
 
    public :: get_stack_modes
-
-   !> Displacement and rotations of a plate, and numbers of these in the system; 0: no rotations.
-   type :: plate_motion_type
-      type(product_type) :: deflection, rotation_x, rotation_y
-      integer :: w = 0, a = 0, b = 0
-   end type plate_motion_type
 
 contains
 
@@ -38,35 +32,48 @@ contains
       real(wp), intent(in), optional :: lower_limit
       real(wp) :: limit
       type(ritz_system_type) :: system
-      type(plate_motion_type) :: motion(size(stack%plate))
+      type(product_type) :: products(3, size(stack%plate))
+      integer :: index(3)
       integer :: i
 
       resolved = get_resolved_frequency(stack, max_frequency)
       failed = .not. resolved > 0.0_wp
       if (failed) return
       do i = 1, size(stack%plate)
-         motion(i) = new_motion(stack, stack%plate(i), resolved)
-         call add_displacement(system, motion(i)%deflection, motion(i)%w)
+         products(:, i) = get_products(stack, stack%plate(i), resolved)
       end do
+      system%displacement = products(1, :)
       do i = 1, size(stack%plate)
          system%is_bearing = i == stack%bearing
+         index = [i, 0, 0]
          if (maxval(stack%plate(i)%shear) > 0.0_wp) then
-            call add_displacement(system, motion(i)%rotation_x, motion(i)%a)
-            call add_displacement(system, motion(i)%rotation_y, motion(i)%b)
-            call add_shear_plate(system, stack%plate(i), motion(i))
-         else
-            call add_thin_plate(system, stack%plate(i), motion(i))
+            index(2:) = size(system%displacement) + [1, 2]
+            system%displacement = [system%displacement, products(2:, i)]
          end if
-         call add_edges(system, stack%plate(i), motion(i))
-         call add_ribs(system, stack%plate(i), motion(i))
+         call add_plate(system, stack%plate(i), index)
+         if (allocated(stack%plate(i)%ribs)) call add_ribs(system, stack%plate(i), stack%plate(i)%ribs, i, products(2, i)%x)
       end do
       system%is_bearing = .false.
       do i = 1, size(stack%plate) - 1
-         call add_layer(system, stack%layer(i), motion(i), motion(i + 1))
+         associate (layer => stack%layer(i))
+            call add_energies(system, get_springs(layer%stiffness), layer%loss_factor)
+            if (allocated(layer%line_y)) call add_energies(system, get_springs(layer%line_stiffness), &
+               layer%line_loss_factor, 2, layer%line_y)
+         end associate
       end do
       limit = 0.0_wp
       if (present(lower_limit)) limit = 2*pi*lower_limit
       call solve_ritz_system(system, modes, failed, limit)
+   contains
+
+      !> Energies of springs between a plate and the next one.
+      function get_springs(stiffness) result(energies)
+         real(wp), intent(in) :: stiffness
+         type(energy_type) :: energies(3)
+
+         energies = [energy_type(stiffness, i, i), energy_type(stiffness, i + 1, i + 1), &
+            energy_type(-stiffness, i, i + 1)]
+      end function get_springs
    end subroutine get_stack_modes
 
    !> Sums and differences of loads at positions that are symmetric about the middle, so that functions remain even or odd:
@@ -85,13 +92,13 @@ contains
       if (mod(n, 2) == 1) matrix((n + 1)/2, (n + 1)/2) = 1.0_wp
    end function get_even_and_odd
 
-   !> Functions of the deflection and the rotations of a plate.
-   function new_motion(stack, plate, frequency) result(motion)
+   !> Functions of the deflection of a plate and of its rotations along x and y.
+   function get_products(stack, plate, frequency) result(products)
       type(plate_stack_type), intent(in) :: stack
       type(orthotropic_type), intent(in) :: plate
       !> Frequency up to which waves are resolved, Hz.
       real(wp), intent(in) :: frequency
-      type(plate_motion_type) :: motion
+      type(product_type) :: products(3)
       type(function_set_type) :: deflection(2), rotation(2)
       real(wp), allocatable :: lines(:)
       real(wp) :: sides(2)
@@ -123,10 +130,10 @@ contains
             if (is_thin) call keep_beam_modes(deflection(i), edge, merge(plate%along, plate%across, i == 1), n(i))
          end associate
       end do
-      motion%deflection = product_type(deflection(1), deflection(2))
-      motion%rotation_x = product_type(rotation(1), deflection(2), is_static=.true.)
-      motion%rotation_y = product_type(deflection(1), rotation(2), is_static=.true.)
-   end function new_motion
+      products(1) = product_type(deflection(1), deflection(2))
+      products(2) = product_type(rotation(1), deflection(2), is_static=.true.)
+      products(3) = product_type(deflection(1), rotation(2), is_static=.true.)
+   end function get_products
 
    !> Replaces polynomials by the lowest modes of a beam, which are far fewer for the same waves.
    !>
@@ -140,22 +147,20 @@ contains
       real(wp), intent(in) :: bending
       !> Number of modes.
       integer, intent(in) :: n
-      real(wp), parameter :: unit(1, 1) = 1.0_wp
       type(ritz_system_type) :: system
       type(modes_type) :: modes
       real(wp), allocatable :: shape(:, :), omega(:), added(:, :)
       logical, allocatable :: kept(:)
       integer, allocatable :: chosen(:)
       logical :: failed
-      integer :: i, j, number, order
+      integer :: i, j, order
 
-      call add_displacement(system, product_type(set, function_set_type(cosines, 1.0_wp, 1)), number)
+      system%displacement = [product_type(set, function_set_type(cosines, 1.0_wp, 1))]
       ! With the mass B per length, angular frequencies are squared wavenumbers.
-      call add_stiffness(system, 1, 1, bending, get_overlap(set, 2, set, 2), unit, 0.0_wp)
-      call add_mass(system, 1, 1, bending, get_overlap(set, 0, set, 0), unit)
-      do order = 0, 1
-         call add_ends(system, 1, 1, system%displacement(1), order, merge(edge%deflection, edge%rotation, order == 0))
-      end do
+      call add_energies(system, [energy_type(bending, 1, 1, [2, 0], [2, 0]), energy_type(bending, 1, 1, is_mass=.true.)], &
+         0.0_wp)
+      call add_ends(system, 1, 1, 0, edge%deflection)
+      call add_ends(system, 1, 1, 1, edge%rotation)
       call solve_ritz_system(system, modes, failed, 0.0_wp)
       if (failed) return
       allocate (shape(set%count, set%count), source=0.0_wp)
@@ -209,151 +214,106 @@ contains
       end subroutine add_deflections
    end subroutine keep_beam_modes
 
-   !> Stiffness and mass of a plate that is rigid in shear (Kirchhoff).
-   subroutine add_thin_plate(system, plate, motion)
+   !> Energies of a plate and of the springs along its edges. Of a plate with shear (Mindlin), the energy of bending is that
+   !> of the rotations, the energy of shear that of slope minus rotation; otherwise (Kirchhoff) rotations are slopes.
+   subroutine add_plate(system, plate, index)
       type(ritz_system_type), intent(inout) :: system
       type(orthotropic_type), intent(in) :: plate
-      type(plate_motion_type), intent(in) :: motion
+      !> Indices of the deflection and the rotations, 0 for a plate that is rigid in shear.
+      integer, intent(in) :: index(3)
+      integer :: i, w, a, b
 
-      associate (x => motion%deflection%x, y => motion%deflection%y, w => motion%w, eta => plate%loss_factor)
-         call add_stiffness(system, w, w, plate%along, get_overlap(x, 2, x, 2), get_overlap(y, 0, y, 0), eta)
-         call add_stiffness(system, w, w, plate%across, get_overlap(x, 0, x, 0), get_overlap(y, 2, y, 2), eta)
-         call add_stiffness(system, w, w, plate%coupling, get_overlap(x, 0, x, 2), get_overlap(y, 2, y, 0), eta)
-         call add_stiffness(system, w, w, plate%coupling, get_overlap(x, 2, x, 0), get_overlap(y, 0, y, 2), eta)
-         call add_stiffness(system, w, w, 4*plate%torsion, get_overlap(x, 1, x, 1), get_overlap(y, 1, y, 1), eta)
-         call add_mass(system, w, w, plate%mass, get_overlap(x, 0, x, 0), get_overlap(y, 0, y, 0))
-         call add_mass(system, w, w, plate%inertia, get_overlap(x, 1, x, 1), get_overlap(y, 0, y, 0))
-         call add_mass(system, w, w, plate%inertia, get_overlap(x, 0, x, 0), get_overlap(y, 1, y, 1))
+      w = index(1)
+      a = index(2)
+      b = index(3)
+      associate (along => plate%along, across => plate%across, coupling => plate%coupling, torsion => plate%torsion, &
+         inertia => plate%inertia, s => plate%shear)
+         call add_energies(system, [energy_type(plate%mass, w, w, is_mass=.true.)], 0.0_wp)
+         if (a == 0) then
+            call add_energies(system, [ &
+               energy_type(along, w, w, [2, 0], [2, 0]), energy_type(across, w, w, [0, 2], [0, 2]), &
+               energy_type(coupling, w, w, [0, 2], [2, 0]), energy_type(coupling, w, w, [2, 0], [0, 2]), &
+               energy_type(4*torsion, w, w, [1, 1], [1, 1]), &
+               energy_type(inertia, w, w, [1, 0], [1, 0], is_mass=.true.), &
+               energy_type(inertia, w, w, [0, 1], [0, 1], is_mass=.true.)], plate%loss_factor)
+         else
+            call add_energies(system, [ &
+               energy_type(along, a, a, [1, 0], [1, 0]), energy_type(across, b, b, [0, 1], [0, 1]), &
+               energy_type(coupling, a, b, [1, 0], [0, 1]), &
+               energy_type(torsion, a, a, [0, 1], [0, 1]), energy_type(torsion, b, b, [1, 0], [1, 0]), &
+               energy_type(torsion, a, b, [0, 1], [1, 0]), &
+               energy_type(s(1), w, w, [1, 0], [1, 0]), energy_type(s(1), a, a), energy_type(-s(1), w, a, [1, 0]), &
+               energy_type(s(2), w, w, [0, 1], [0, 1]), energy_type(s(2), b, b), energy_type(-s(2), w, b, [0, 1]), &
+               energy_type(inertia, a, a, is_mass=.true.), energy_type(inertia, b, b, is_mass=.true.)], plate%loss_factor)
+         end if
       end associate
-   end subroutine add_thin_plate
-
-   !> Stiffness and mass of a plate with shear (Mindlin): the energy of bending is that of the rotations, the energy of
-   !> shear that of slope minus rotation.
-   subroutine add_shear_plate(system, plate, motion)
-      type(ritz_system_type), intent(inout) :: system
-      type(orthotropic_type), intent(in) :: plate
-      type(plate_motion_type), intent(in) :: motion
-
-      associate (x => motion%deflection%x, y => motion%deflection%y, turn_x => motion%rotation_x%x, &
-         turn_y => motion%rotation_y%y, w => motion%w, a => motion%a, b => motion%b, eta => plate%loss_factor)
-         call add_stiffness(system, a, a, plate%along, get_overlap(turn_x, 1, turn_x, 1), get_overlap(y, 0, y, 0), eta)
-         call add_stiffness(system, b, b, plate%across, get_overlap(x, 0, x, 0), get_overlap(turn_y, 1, turn_y, 1), eta)
-         call add_stiffness(system, a, b, plate%coupling, get_overlap(turn_x, 1, x, 0), get_overlap(y, 0, turn_y, 1), eta)
-         call add_stiffness(system, a, a, plate%torsion, get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 1, y, 1), eta)
-         call add_stiffness(system, b, b, plate%torsion, get_overlap(x, 1, x, 1), get_overlap(turn_y, 0, turn_y, 0), eta)
-         call add_stiffness(system, a, b, plate%torsion, get_overlap(turn_x, 0, x, 1), get_overlap(y, 1, turn_y, 0), eta)
-         associate (s => plate%shear)
-            call add_stiffness(system, w, w, s(1), get_overlap(x, 1, x, 1), get_overlap(y, 0, y, 0), eta)
-            call add_stiffness(system, a, a, s(1), get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 0, y, 0), eta)
-            call add_stiffness(system, w, a, -s(1), get_overlap(x, 1, turn_x, 0), get_overlap(y, 0, y, 0), eta)
-            call add_stiffness(system, w, w, s(2), get_overlap(x, 0, x, 0), get_overlap(y, 1, y, 1), eta)
-            call add_stiffness(system, b, b, s(2), get_overlap(x, 0, x, 0), get_overlap(turn_y, 0, turn_y, 0), eta)
-            call add_stiffness(system, w, b, -s(2), get_overlap(x, 0, x, 0), get_overlap(y, 1, turn_y, 0), eta)
-         end associate
-         call add_mass(system, w, w, plate%mass, get_overlap(x, 0, x, 0), get_overlap(y, 0, y, 0))
-         call add_mass(system, a, a, plate%inertia, get_overlap(turn_x, 0, turn_x, 0), get_overlap(y, 0, y, 0))
-         call add_mass(system, b, b, plate%inertia, get_overlap(x, 0, x, 0), get_overlap(turn_y, 0, turn_y, 0))
-      end associate
-   end subroutine add_shear_plate
-
-   !> Springs along the edges of a plate that are not rigid. Equal edges are one term, which keeps the symmetry.
-   subroutine add_edges(system, plate, motion)
-      type(ritz_system_type), intent(inout) :: system
-      type(orthotropic_type), intent(in) :: plate
-      type(plate_motion_type), intent(in) :: motion
-      integer :: i
-
       do i = 1, 2
-         associate (rotation => plate%edge(2*i - 1:2*i)%rotation)
-            call add_ends(system, i, motion%w, motion%deflection, 0, plate%edge(2*i - 1:2*i)%deflection)
-            if (motion%a == 0) then
-               call add_ends(system, i, motion%w, motion%deflection, 1, rotation)
-            else if (i == 1) then
-               call add_ends(system, i, motion%a, motion%rotation_x, 0, rotation)
-            else
-               call add_ends(system, i, motion%b, motion%rotation_y, 0, rotation)
-            end if
+         associate (edges => plate%edge(2*i - 1:2*i))
+            call add_ends(system, i, w, 0, edges%deflection)
+            call add_ends(system, i, merge(w, index(i + 1), a == 0), merge(1, 0, a == 0), edges%rotation)
          end associate
       end do
-   end subroutine add_edges
+   end subroutine add_plate
 
-   !> Springs along both edges across one direction.
-   subroutine add_ends(system, direction, number, shape, order, spring)
+   !> Springs along both edges across one direction that are not rigid. Equal edges are one term, which keeps the symmetry.
+   subroutine add_ends(system, direction, index, order, spring)
       type(ritz_system_type), intent(inout) :: system
       !> 1: edges x = constant, 2: edges y = constant.
       integer, intent(in) :: direction
-      !> Number of the displacement and its functions.
-      integer, intent(in) :: number
-      type(product_type), intent(in) :: shape
-      !> Order of the derivative that the springs resist.
-      integer, intent(in) :: order
+      !> Index of the displacement, and order of the derivative that the springs resist.
+      integer, intent(in) :: index, order
       !> Stiffness per length.
       real(wp), intent(in) :: spring(2)
       real(wp) :: ends(2)
+      integer :: orders(2)
       integer :: i, n
 
-      ends = [0.0_wp, merge(shape%x%length, shape%y%length, direction == 1)]
+      associate (displacement => system%displacement(index))
+         ends = [0.0_wp, merge(displacement%x%length, displacement%y%length, direction == 1)]
+      end associate
+      orders = 0
+      orders(direction) = order
       n = merge(2, 1, abs(spring(1) - spring(2)) <= 0.0_wp)
       do i = 1, 3 - n
-         if (.not. spring(i) < rigid_support) cycle
-         associate (at => ends(i:i + n - 1))
-            if (direction == 1) then
-               call add_stiffness(system, number, number, spring(i), get_point_matrix(shape%x, at, order), &
-                  get_overlap(shape%y, 0, shape%y, 0), 0.0_wp)
-            else
-               call add_stiffness(system, number, number, spring(i), get_overlap(shape%x, 0, shape%x, 0), &
-                  get_point_matrix(shape%y, at, order), 0.0_wp)
-            end if
-         end associate
+         if (spring(i) < rigid_support) call add_energies(system, &
+            [energy_type(spring(i), index, index, orders, orders)], 0.0_wp, direction, ends(i:i + n - 1))
       end do
    end subroutine add_ends
 
-   !> Sum over positions of products of derivatives of functions: [count, count].
-   pure function get_point_matrix(set, position, order) result(matrix)
-      type(function_set_type), intent(in) :: set
-      !> Positions, m: [n_position].
-      real(wp), intent(in) :: position(:)
-      !> Order of the derivatives.
-      integer, intent(in) :: order
-      real(wp) :: matrix(set%count, set%count)
-
-      associate (value => get_functions(set, position, order))
-         matrix = matmul(transpose(value), value)
-      end associate
-   end function get_point_matrix
-
-   !> Stiffness and mass of the ribs of a plate. They turn with torsion and warping, joined to the slope of the deflection by
-   !> the static stiffness pi B k of the waves shorter than those of the functions, which end at the wavenumber k: their
-   !> curvature jumps at ribs, which the functions approach slowly.
-   subroutine add_ribs(system, plate, motion)
+   !> Energies of the ribs of a plate. They turn with torsion and warping, joined to the slope of the deflection by the static
+   !> stiffness pi B k of the waves shorter than those of the functions, which end at the wavenumber k: their curvature jumps
+   !> at ribs, which the functions approach slowly.
+   subroutine add_ribs(system, plate, ribs, w, rotation)
       type(ritz_system_type), intent(inout) :: system
       type(orthotropic_type), intent(in) :: plate
-      type(plate_motion_type), intent(in) :: motion
-      real(wp), allocatable :: slope(:, :), unit(:, :)
+      type(ribs_type), intent(in) :: ribs
+      !> Index of the deflection.
+      integer, intent(in) :: w
+      !> Functions of the rotation along the ribs.
+      type(function_set_type), intent(in) :: rotation
+      type(function_set_type) :: x, y
       real(wp) :: joint
-      integer :: turn
+      integer :: n, turn
 
-      if (.not. allocated(plate%ribs)) return
-      associate (ribs => plate%ribs, w => motion%w, x => motion%deflection%x, y => motion%deflection%y)
-         associate (at_ribs => get_point_matrix(y, ribs%position, 0), n => size(ribs%position), eta => ribs%loss_factor)
-            call add_stiffness(system, w, w, 1.0_wp, get_beam_stiffness(ribs, x, motion%rotation_x%x), at_ribs, eta)
-            call add_mass(system, w, w, ribs%mass, get_overlap(x, 0, x, 0), at_ribs)
-            if (.not. ribs%inertia > 0.0_wp) return
-            slope = matmul(transpose(get_functions(y, ribs%position, 1)), get_even_and_odd(n))
-            unit = matmul(transpose(get_even_and_odd(n)), get_even_and_odd(n))
-            joint = pi*plate%across*get_highest_wavenumber(y)
-            ! One function for the rotation of each rib.
-            call add_displacement(system, product_type(x, function_set_type(cosines, y%length, n)), turn)
-            call add_stiffness(system, turn, turn, ribs%torsion, get_overlap(x, 1, x, 1), unit, eta)
-            call add_stiffness(system, turn, turn, ribs%warping, get_overlap(x, 2, x, 2), unit, eta)
-            call add_mass(system, turn, turn, ribs%inertia, get_overlap(x, 0, x, 0), unit)
-            associate (one => get_overlap(x, 0, x, 0), loss => plate%loss_factor)
-               call add_stiffness(system, turn, turn, joint, one, unit, loss)
-               call add_stiffness(system, w, w, joint, one, matmul(slope, transpose(slope)), loss)
-               call add_stiffness(system, w, turn, -joint, one, slope, loss)
-            end associate
-         end associate
+      x = system%displacement(w)%x
+      y = system%displacement(w)%y
+      associate (at_ribs => get_functions(y, ribs%position, 0))
+         call add_stiffness(system, w, get_beam_stiffness(ribs, x, rotation), matmul(transpose(at_ribs), at_ribs), &
+            ribs%loss_factor)
       end associate
+      call add_energies(system, [energy_type(ribs%mass, w, w, is_mass=.true.)], 0.0_wp, 2, ribs%position)
+      if (.not. ribs%inertia > 0.0_wp) return
+      ! One function for the rotation of each rib.
+      n = size(ribs%position)
+      system%displacement = [system%displacement, &
+         product_type(x, function_set_type(point_values, y%length, n, get_even_and_odd(n)))]
+      turn = size(system%displacement)
+      call add_energies(system, [energy_type(ribs%torsion, turn, turn, [1, 0], [1, 0]), &
+         energy_type(ribs%warping, turn, turn, [2, 0], [2, 0]), energy_type(ribs%inertia, turn, turn, is_mass=.true.)], &
+         ribs%loss_factor, 2, ribs%position)
+      joint = pi*plate%across*get_highest_wavenumber(y)
+      call add_energies(system, [energy_type(joint, turn, turn), energy_type(joint, w, w, [0, 1], [0, 1]), &
+         energy_type(-joint, w, turn, [0, 1])], plate%loss_factor, 2, ribs%position)
    end subroutine add_ribs
 
    !> Stiffness of a rib over the functions of its deflection. Its rotation (Timoshenko) and the slip of the flange take the
@@ -380,54 +340,5 @@ contains
       call dposv('U', rotation%count, deflection%count, rotated, rotation%count, followed, rotation%count, info)
       stiffness = ribs%shear*get_overlap(deflection, 1, deflection, 1) - matmul(transpose(coupling), followed)
    end function get_beam_stiffness
-
-   !> Springs between two plates.
-   subroutine add_layer(system, layer, upper, lower)
-      type(ritz_system_type), intent(inout) :: system
-      type(layer_type), intent(in) :: layer
-      type(plate_motion_type), intent(in) :: upper, lower
-
-      if (layer%stiffness > 0.0_wp) call add_between(layer%stiffness, layer%loss_factor)
-      if (allocated(layer%line_y)) call add_between(layer%line_stiffness, layer%line_loss_factor, y=layer%line_y)
-   contains
-
-      !> Adds springs at all positions, or along lines y.
-      subroutine add_between(stiffness, loss_factor, y)
-         real(wp), intent(in) :: stiffness, loss_factor
-         real(wp), intent(in), optional :: y(:)
-
-         call add_pair(system, upper, upper, stiffness, loss_factor, y)
-         call add_pair(system, lower, lower, stiffness, loss_factor, y)
-         call add_pair(system, upper, lower, -stiffness, loss_factor, y)
-      end subroutine add_between
-   end subroutine add_layer
-
-   !> Stiffness of springs between the deflections of two plates, or of one plate with itself.
-   subroutine add_pair(system, first, second, stiffness, loss_factor, y)
-      type(ritz_system_type), intent(inout) :: system
-      type(plate_motion_type), intent(in) :: first, second
-      !> Stiffness per area or per length, and loss factor.
-      real(wp), intent(in) :: stiffness, loss_factor
-      !> Positions of lines of springs, m (default: everywhere).
-      real(wp), intent(in), optional :: y(:)
-
-      call add_stiffness(system, first%w, second%w, stiffness, &
-         get_overlap(first%deflection%x, 0, second%deflection%x, 0), &
-         get_product(first%deflection%y, second%deflection%y, y), loss_factor)
-   end subroutine add_pair
-
-   !> Products of two sets, summed over positions or, without these, integrated: [first%count, second%count].
-   pure function get_product(first, second, position) result(matrix)
-      type(function_set_type), intent(in) :: first, second
-      !> Positions, m.
-      real(wp), intent(in), optional :: position(:)
-      real(wp) :: matrix(first%count, second%count)
-
-      if (present(position)) then
-         matrix = matmul(transpose(get_functions(first, position, 0)), get_functions(second, position, 0))
-      else
-         matrix = get_overlap(first, 0, second, 0)
-      end if
-   end function get_product
 
 end module thud_stack_modes
