@@ -358,23 +358,24 @@ contains
       complex(wp), intent(in) :: gain(:, :), response(:, :)
       real(wp), allocatable :: flow(:, :)
       complex(wp) :: velocity(size(group%mode))
-      real(wp), allocatable :: part(:, :, :, :)
-      integer :: i, j, n, rows
+      real(wp), allocatable :: part(:, :)
+      integer :: i, j, n, rows, at
 
       n = size(group%mode)
       rows = size(group%coupling, 1)
-      allocate (part(rows, size(gain, 2), 2, size(response, 2)))
+      allocate (part(rows, 2*size(gain, 2)*size(response, 2)))
       do i = 1, size(response, 2)
          do j = 1, size(gain, 2)
             velocity = gain(group%mode, j)*response(group%mode, i)
-            part(:n, j, 1, i) = velocity%re
-            part(:n, j, 2, i) = velocity%im
+            at = 2*size(gain, 2)*(i - 1) + j
+            part(:n, at) = velocity%re
+            part(:n, at + size(gain, 2)) = velocity%im
             ! Of a complex coupling.
-            part(n + 1:, j, 1, i) = velocity(:rows - n)%im
-            part(n + 1:, j, 2, i) = -velocity(:rows - n)%re
+            part(n + 1:, at) = velocity(:rows - n)%im
+            part(n + 1:, at + size(gain, 2)) = -velocity(:rows - n)%re
          end do
       end do
-      flow = get_transposed_product(group%coupling, reshape(part, [rows, size(gain, 2)*2*size(response, 2)]))
+      flow = get_transposed_product(group%coupling, part)
    end function get_flow
 
    !> Sums over frequencies of the powers into the floor and lost by it per mean-square force, J s: [n_ball, 2].
