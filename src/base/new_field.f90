@@ -1,13 +1,13 @@
 !> Constructors of key descriptions, one per kind of value. Ranges are intervals such as `(0, 10]`, see
-!> `thud_interval`; `in_group` and `owned_by` set the group and the owner of keys, `only_with` the choice that they need.
+!> `thud_interval`; `in_group` sets the group and the owner of keys, `only_with` the choice that they need.
 module thud_new_field
    use thud_field, only: field_type, list_type, name_length, text_list_type
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: choice_field, in_group, integer_field, list_field, logical_field, only_with, owned_by, path_field, real_field, &
-      text_field, text_list_field
+   public :: choice_field, in_group, integer_field, list_field, logical_field, only_with, real_field, text_field, &
+      text_list_field
 
 contains
 
@@ -67,26 +67,18 @@ contains
    end function list_field
 
    !> Describes a key with free text.
-   function text_field(key, variable, meaning) result(field)
+   function text_field(key, variable, meaning, is_path) result(field)
       character(len=*), intent(in) :: key
       character(len=name_length), intent(in), target :: variable
       character(len=*), intent(in) :: meaning
+      !> See `field_type` (default: false).
+      logical, intent(in), optional :: is_path
       type(field_type) :: field
 
       field = field_type(kind='text', key=key, meaning=meaning)
+      if (present(is_path)) field%is_path = is_path
       field%value => variable
    end function text_field
-
-   !> Describes a key with the path of a file.
-   function path_field(key, variable, meaning) result(field)
-      character(len=*), intent(in) :: key
-      character(len=name_length), intent(in), target :: variable
-      character(len=*), intent(in) :: meaning
-      type(field_type) :: field
-
-      field = text_field(key, variable, meaning)
-      field%is_path = .true.
-   end function path_field
 
    !> Describes a key with a list of free texts.
    function text_list_field(key, variable, meaning) result(field)
@@ -114,28 +106,19 @@ contains
       field%choices(:size(choices)) = choices
    end function choice_field
 
-   !> Puts keys into a namelist group, except keys that have one already: [n_field].
-   function in_group(group, fields) result(placed)
+   !> Puts keys into a namelist group, except keys that have one already, and sets their owner: [n_field].
+   function in_group(group, fields, owner) result(placed)
       character(len=*), intent(in) :: group
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
+      !> A source model, a floor, `modes`, `compression`, `unknowns`, `floor` or `room` (default: the present one).
+      character(len=*), intent(in), optional :: owner
       type(field_type) :: placed(size(fields))
 
       placed = fields
       where (placed%group == '') placed%group = group
+      if (present(owner)) placed%owner = owner
    end function in_group
-
-   !> Sets the owner of keys: [n_field].
-   function owned_by(owner, fields) result(owned)
-      !> A source model, a floor, `modes`, `compression`, `unknowns`, `floor` or `room`.
-      character(len=*), intent(in) :: owner
-      !> The keys: [n_field].
-      type(field_type), intent(in) :: fields(:)
-      type(field_type) :: owned(size(fields))
-
-      owned = fields
-      owned%owner = owner
-   end function owned_by
 
    !> Keys that have an effect only with some values of a choice.
    function only_with(choice, values, fields) result(needing)

@@ -9,7 +9,7 @@ module thud_case
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, in_group, owned_by, text_field
+   use thud_new_field, only: choice_field, in_group, text_field
    use thud_plate, only: plate_type
    use thud_registry, only: floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
    use thud_room, only: check_below_subceiling, check_room, get_room_bands, get_room_fields, room_type
@@ -21,7 +21,7 @@ module thud_case
    private
 
    public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
-   public :: get_full_key, get_modes_ball, get_unstated_fields, is_stated, is_used, keep_impact_only, modes_model
+   public :: get_full_key, get_modes_ball, get_unstated_fields, is_stated, is_used, keep_impact_only
    public :: new_case, set_floor_air, set_standard_modulus
 
    !> Model whose modulus the free modes have.
@@ -186,13 +186,13 @@ contains
       fields = [ &
          in_group('case', [text_field('name', case%name, 'name of the case and of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
-         owned_by('modes', get_modes_fields(case%modes)), &
-         owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
+         in_group('modes', get_modes_fields(case%modes), owner='modes'), &
+         in_group('compression', get_compression_fields(case%compression), owner='compression'), &
          in_group('drop', get_drop_fields(case%drop)), &
          in_group('model', [ &
          choice_field('name', case%model, 'source model', model_names)])]
       do i = 1, size(case%models)
-         fields = [fields, owned_by(model_names(i), in_group(model_names(i), case%models(i)%model%get_fields()))]
+         fields = [fields, in_group(model_names(i), case%models(i)%model%get_fields(), owner=model_names(i))]
       end do
       fields = [fields, &
          in_group('sampling', get_sampling_fields(case%sampling)), &
@@ -202,12 +202,12 @@ contains
          choice_field('force', case%level_force, 'assessed force, for which levels, peak force and verdict are reported', &
          [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
-         owned_by('unknowns', in_group('unknowns', get_unknowns_fields(case%unknowns))), &
-         owned_by('floor', in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)]))]
+         in_group('unknowns', get_unknowns_fields(case%unknowns), owner='unknowns'), &
+         in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)], owner='floor')]
       do i = 1, size(case%floors)
-         fields = [fields, owned_by(floor_names(i), in_group(floor_names(i), case%floors(i)%model%get_fields()))]
+         fields = [fields, in_group(floor_names(i), case%floors(i)%model%get_fields(), owner=floor_names(i))]
       end do
-      fields = [fields, owned_by('room', in_group('room', get_room_fields(case%room)))]
+      fields = [fields, in_group('room', get_room_fields(case%room), owner='room')]
    end function get_fields
 
    !> Whether a case uses a key, for the impact, its model, the free modes, the compression, the unknowns, the floor or the
@@ -217,22 +217,21 @@ contains
       type(field_type), intent(in) :: field
       logical :: used
 
-      if (field%owner == 'modes') then
+      select case (field%owner)
+      case ('')
+         used = case%has_impact .or. field%group == 'case' .or. field%group == 'ball'
+      case ('modes')
          used = case%has_modes
-      else if (field%owner == 'room') then
+      case ('compression')
+         used = case%has_impact .and. case%has_compression
+      case ('unknowns')
+         used = case%has_impact .and. case%has_unknowns
+      case ('room')
          used = case%has_impact .and. case%has_room
-      else if (field%owner == 'floor' .or. any(floor_names == field%owner)) then
-         used = case%has_impact .and. case%has_floor .and. any(field%owner == [character(len=name_length) :: 'floor', &
-            case%floor])
-      else if (field%owner == 'compression') then
-         used = case%has_compression .and. case%has_impact
-      else if (field%owner == 'unknowns') then
-         used = case%has_unknowns .and. case%has_impact
-      else if (case%has_impact) then
-         used = field%owner == '' .or. field%owner == case%model
-      else
-         used = field%group == 'case' .or. field%group == 'ball'
-      end if
+      case default
+         used = case%has_impact .and. (field%owner == case%model .or. case%has_floor &
+            .and. any(field%owner == [character(len=name_length) :: 'floor', case%floor]))
+      end select
    end function is_used
 
    !> The keys that a case uses, without empty lists: [n_field].

@@ -232,50 +232,35 @@ contains
       type(assessment_type), intent(out) :: assessment
       !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
+      type(source_limits_type) :: limits
+      real(wp), allocatable :: force(:)
+      integer :: i
 
       call get_level_bands(case%bands, assessment%bands, assessment%first_band)
       allocate (assessment%level(size(assessment%bands), force_count))
-      call assess_force(case, history, history%elastic_force, assessment%bands, assessment%level(:, 1), &
-         assessment%criteria(:, 1), error)
-      if (allocated(error)) return
-      ! In most models both forces are equal.
-      if (any(abs(history%floor_force - history%elastic_force) > 0.0_wp)) then
-         call assess_force(case, history, history%floor_force, assessment%bands, assessment%level(:, 2), &
-            assessment%criteria(:, 2), error)
-      else
-         assessment%level(:, 2) = assessment%level(:, 1)
-         assessment%criteria(:, 2) = assessment%criteria(:, 1)
-      end if
-   end subroutine assess
-
-   !> Levels and criteria of one force.
-   subroutine assess_force(case, history, force, bands, level, criteria, error)
-      type(case_type), intent(in) :: case
-      type(force_history_type), intent(in) :: history
-      !> The force, N: [n_sample].
-      real(wp), intent(in) :: force(:)
-      !> The bands, octaves first: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> Levels, dB: [n_band].
-      real(wp), intent(out) :: level(:)
-      !> The criteria: [criterion_count].
-      type(criterion_type), intent(out) :: criteria(:)
-      !> Set if a level cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
-      type(source_limits_type) :: limits
-
       call get_source_limits(case%source, limits, error)
-      if (allocated(error)) return
-      call get_force_exposure_levels(force, history%sample_rate, bands, trim(case%level_method), level, error)
-      if (allocated(error)) return
-      criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
-         get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
-      associate (computed => criteria(:octave_count + 2))
-         computed%error = ieee_value(1.0_wp, ieee_quiet_nan)
-         if (history%numerical_error%known) computed%error = [history%numerical_error%octave, &
-            history%numerical_error%contact_time, history%numerical_error%restitution]
-      end associate
-   end subroutine assess_force
+      do i = 1, force_count
+         if (allocated(error)) return
+         associate (level => assessment%level(:, i), criteria => assessment%criteria(:, i))
+            force = history%elastic_force
+            if (force_names(i) == 'floor') force = history%floor_force
+            ! In most models both forces are equal.
+            if (i > 1 .and. .not. any(abs(force - history%elastic_force) > 0.0_wp)) then
+               level = assessment%level(:, 1)
+               criteria = assessment%criteria(:, 1)
+               cycle
+            end if
+            call get_force_exposure_levels(force, history%sample_rate, assessment%bands, trim(case%level_method), level, &
+               error)
+            if (allocated(error)) return
+            criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
+               get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
+            criteria(:octave_count + 2)%error = ieee_value(1.0_wp, ieee_quiet_nan)
+            if (history%numerical_error%known) criteria(:octave_count + 2)%error = [history%numerical_error%octave, &
+               history%numerical_error%contact_time, history%numerical_error%restitution]
+         end associate
+      end do
+   end subroutine assess
 
    !> Index of the assessed force.
    pure function get_assessed_force(case) result(index)

@@ -1,7 +1,7 @@
 !> What is not known of a source: keys of the case, and the distributions of their values.
 module thud_unknowns
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, get_interval, list_type, text_list_type
+   use thud_field, only: field_type, get_interval, key_length, list_type, text_list_type
    use thud_interval, only: interval_type
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, text_list_field
@@ -88,6 +88,7 @@ contains
       type(field_type), intent(in) :: fields(:)
       type(error_type), allocatable, intent(out) :: error
       type(interval_type) :: interval
+      character(len=key_length), allocatable :: known(:)
       character(len=:), allocatable :: allowed, label, suggestion
       real(wp) :: low, high, value
       integer :: field
@@ -95,13 +96,12 @@ contains
       associate (key => unknowns%key%values(i))
          label = '&unknowns: '
          field = findloc(fields%key == key, .true., dim=1)
-         if (field == 0) then
-            call get_suggestion(trim(key), pack(fields%key, .not. fields%is_numerical), suggestion)
-            error = input_error(label//'key = '//quoted(key)//' is not allowed'//suggestion//'; allowed: ' &
-               //join_quoted(pack(fields%key, .not. fields%is_numerical)))
-         else if (fields(field)%is_numerical) then
-            error = input_error(label//'key = '//quoted(key)//' belongs to the computation, not to the source: its effect ' &
-               //'is the numerical error; allowed: '//join_quoted(pack(fields%key, .not. fields%is_numerical)))
+         known = pack(fields%key, .not. fields%is_numerical)
+         if (.not. any(known == key)) then
+            call get_suggestion(trim(key), known, suggestion)
+            suggestion = ' is not allowed'//suggestion
+            if (field > 0) suggestion = ' belongs to the computation, and its effect is the numerical error'
+            error = input_error(label//'key = '//quoted(key)//suggestion//'; allowed: '//join_quoted(known))
          else if (any(unknowns%key%values(:i - 1) == key)) then
             error = input_error(label//'key = '//quoted(key)//' is given twice; allowed: once')
          end if

@@ -1,9 +1,8 @@
 !> Warnings on cases that are allowed but implausible: a ball unlike rubber, a force that no real source has.
 module thud_warnings
-   use thud_ball, only: get_density
+   use thud_ball, only: ball_type, get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, get_active_fields, get_floor_number, get_model_number, get_unstated_fields, &
-      modes_model
+   use thud_case, only: case_type, get_active_fields, get_floor_number, get_model_number, get_unstated_fields
    use thud_error, only: error_type
    use thud_field, only: field_type, key_length
    use thud_floor_model, only: floor_state_type, reason_length
@@ -12,7 +11,7 @@ module thud_warnings
    use thud_kinds, only: wp
    use thud_plate, only: plate_type
    use thud_refined_drop, only: finer_quantities, get_resolution_keys
-   use thud_registry, only: floor_names, model_names
+   use thud_registry, only: floor_names
    use thud_room, only: get_completed_room, room_level_type, room_type
    use thud_sampling, only: get_rate_limit
    use thud_source_limits, only: conforms, criterion_type
@@ -77,13 +76,12 @@ contains
       character(len=warning_length), allocatable, intent(out) :: warnings(:)
       !> Force history on a mobile floor.
       type(force_history_type), intent(in), optional :: on_floor
+      logical :: uses_wall
 
       allocate (warnings(0))
-      if (case%has_impact) then
-         call add_ball_warnings(case, case%model, warnings)
-      else
-         call add_ball_warnings(case, modes_model, warnings)
-      end if
+      uses_wall = .not. case%has_impact
+      if (case%has_impact) uses_wall = case%models(get_model_number(case))%model%get_standard_modulus() > 0.0_wp
+      if (uses_wall) call add_limit_warnings(get_rubber_limits(case%ball), warnings)
       if (.not. case%has_impact) return
       call add_law_warning(case, warnings)
       if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
@@ -91,23 +89,21 @@ contains
          //': its force is that on a rigid floor')
       if (case%has_floor) call add_floor_warning(case, state, warnings)
       if (case%has_room) call add_height_warning(case, state, warnings)
-      call add_limit_warnings(case, history, warnings)
+      call add_limit_warnings(get_limits(case, history), warnings)
       call add_level_warnings(history, warnings)
       call add_error_warning(history, '', warnings)
       if (present(on_floor)) call add_error_warning(on_floor, '&floor: ', warnings)
       if (case%sampling%verify .and. all(history%model_quantity_name /= finer_quantities(1))) call add(warnings, &
          '&sampling: verify: the drop cannot be computed at a finer resolution, and is not verified')
-      if (present(on_floor)) call add_limit_warnings(case, on_floor, warnings)
+      if (present(on_floor)) call add_limit_warnings(get_limits(case, on_floor), warnings)
    end subroutine get_warnings
 
-   !> Adds warnings on results outside the validity limits of the model.
-   subroutine add_limit_warnings(case, history, warnings)
+   !> Limits within which the results of a model are valid.
+   function get_limits(case, history) result(limits)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      !> The limits: [n_limit].
       type(validity_limit_type), allocatable :: limits(:)
-      integer :: i
 
       associate (model => case%models(get_model_number(case))%model)
          limits = [get_rate_limit(case%sampling), model%get_validity_limits(case%ball, case%drop, case%sampling, history), &
@@ -116,10 +112,18 @@ contains
             validity_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
             reason='the source goes on downwards with a floor too light for it')]
       end associate
+   end function get_limits
+
+   !> Adds warnings on quantities outside their limits, unless there is one on the quantity.
+   subroutine add_limit_warnings(limits, warnings)
+      !> The limits: [n_limit].
+      type(validity_limit_type), intent(in) :: limits(:)
+      !> Messages: [n].
+      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      integer :: i
+
       do i = 1, size(limits)
-         if (.not. is_outside(limits(i))) cycle
-         ! No repeated warning for the mobile floor.
-         if (any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
+         if (.not. is_outside(limits(i)) .or. any(index(warnings, trim(limits(i)%quantity)//' is ') > 0)) cycle
          call add(warnings, get_limit_message(limits(i)))
       end do
    end subroutine add_limit_warnings
@@ -251,39 +255,25 @@ contains
       end associate
       if (allocated(error)) return
       room = get_completed_room(case%room, plate)
-      if (room%height < usual_height(1) .or. room%height > usual_height(2)) call add(warnings, '&room: below ' &
-         //fixed(room%length*room%width, 1)//' m2 of floor the room is '//fixed(room%height, 2)//' m high; usual are ' &
-         //fixed(usual_height(1), 1)//' to '//fixed(usual_height(2), 1)//' m')
+      call add_limit_warnings([validity_limit_type('room', 'height in m', room%height, usual_height(1), usual_height(2), &
+         'check volume, length and width', 'most rooms have')], warnings)
       if (abs(room%length*room%width/(plate%length*plate%width) - 1) > same_area) call add(warnings, '&room: a room of ' &
          //fixed(room%length*room%width, 1)//' m2 below a floor of '//fixed(plate%length*plate%width, 1) &
          //' m2: only the part of the floor above the room radiates into it')
    end subroutine add_height_warning
 
-   !> Adds warnings on density, modulus and Poisson's ratio of the ball, for models that use them.
-   subroutine add_ball_warnings(case, model, warnings)
-      type(case_type), intent(in) :: case
-      !> The model that uses the ball, one of `model_names`.
-      character(len=*), intent(in) :: model
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      real(wp) :: density
-      integer :: i
+   !> Limits of density, modulus and Poisson's ratio of a ball of rubber.
+   function get_rubber_limits(ball) result(limits)
+      type(ball_type), intent(in) :: ball
+      type(validity_limit_type) :: limits(3)
 
-      i = findloc(model_names == model, .true., dim=1)
-      if (.not. case%models(i)%model%get_standard_modulus() > 0.0_wp) return
-      density = get_density(case%ball)
-      associate (modulus => case%ball%youngs_modulus)
-         if (density < rubber_density(1) .or. density > rubber_density(2)) call add(warnings, &
-            '&ball: the wall has a density of '//fixed(density, 0)//' kg/m3, rubbers have '//fixed(rubber_density(1), 0) &
-            //' to '//fixed(rubber_density(2), 0)//'; check mass, outer_radius and wall_thickness')
-         if (modulus < rubber_modulus(1) .or. modulus > rubber_modulus(2)) call add(warnings, &
-            '&ball: youngs_modulus = '//to_text(modulus)//' Pa, rubbers have '//to_text(rubber_modulus(1))//' to ' &
-            //to_text(rubber_modulus(2))//'; check the unit')
-         if (case%ball%poisson_ratio < rubber_ratio(1)) call add(warnings, '&ball: poisson_ratio = ' &
-            //to_text(case%ball%poisson_ratio)//', rubbers have '//fixed(rubber_ratio(1), 2)//' to ' &
-            //fixed(rubber_ratio(2), 2))
-      end associate
-   end subroutine add_ball_warnings
+      limits = [validity_limit_type('ball', 'density of the wall in kg/m3', get_density(ball), rubber_density(1), &
+         rubber_density(2), 'check mass, outer_radius and wall_thickness', 'rubbers have'), &
+         validity_limit_type('ball', 'youngs_modulus in Pa', ball%youngs_modulus, rubber_modulus(1), rubber_modulus(2), &
+         'check the unit', 'rubbers have'), &
+         validity_limit_type('ball', 'poisson_ratio', ball%poisson_ratio, rubber_ratio(1), &
+         reason='they hardly change their volume', subject='rubbers have')]
+   end function get_rubber_limits
 
    !> Adds a warning on a loss factor that is not stated, with a damping law other than that of the standard ball.
    subroutine add_law_warning(case, warnings)
@@ -299,8 +289,8 @@ contains
          if (fields(i)%key /= 'loss_factor') cycle
          law = fields(i)%get_needed_choice(get_active_fields(case))
          if (law /= fields(i)%needs(2)) call add(warnings, &
-            '&'//trim(fields(i)%group)//': loss_factor = '//to_text(fields(i)%get_number())//' is that of the standard ball ' &
-            //'with '//trim(fields(i)%needs(1))//' = '//quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
+            '&'//trim(fields(i)%group)//': loss_factor = '//to_text(fields(i)%get_number())//' is that of the standard ' &
+            //'ball with '//trim(fields(i)%needs(1))//' = '//quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
       end do
    end subroutine add_law_warning
 

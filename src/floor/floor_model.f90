@@ -1,7 +1,8 @@
 !> The abstract floor: options from a namelist group, mobility at the source, and the plate that radiates into the room.
 !>
-!> A floor `<name>` is a type that extends this one, in the module `thud_<name>_floor` (a name that ends with `_floor` gets no
-!> second suffix), and stands in src/case/registry.f90. Its options form the namelist group `&<name>`. The descriptions of arguments in this file hold for every floor.
+!> A floor `<name>` is a type that extends this one, in the module `thud_<name>_floor` (a name that ends with `_floor` gets
+!> no second suffix), and stands in src/case/registry.f90. Its options form the namelist group `&<name>`. The descriptions of
+!> arguments in this file hold for every floor.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length

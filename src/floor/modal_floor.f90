@@ -6,7 +6,7 @@ module thud_modal_floor
    use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length
    use thud_floor_modes, only: floor_modes_type, new_floor_receiver
    use thud_kinds, only: wp
-   use thud_new_field, only: path_field, real_field
+   use thud_new_field, only: real_field, text_field
    use thud_plate, only: get_mode_density, get_plate_fields, get_resistance, get_surface_mass, plate_type
    use thud_receiver, only: receiver_type
    use thud_sampled_modes, only: get_square_integrals, read_sampled_modes
@@ -53,7 +53,8 @@ contains
 
       fields = get_plate_fields(options%plate, optional_plate=.true.)
       fields = [ &
-         path_field('file', options%file, 'file of the modes: frequencies, loss factors, shapes on a grid'), &
+         text_field('file', options%file, 'file of the modes: frequencies, loss factors, shapes on a grid', &
+         is_path=.true.), &
          real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
          //'levels in the room are means over positions', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)'), &

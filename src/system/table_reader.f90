@@ -1,6 +1,6 @@
-!> Tables of text, files or pipes of any size, row by row. The first row determines whether tabs, semicolons, commas or blanks
-!> separate the cells, which may stand in quotes. Decimal commas are allowed in quotes, or if the comma is not the separator;
-!> a table must not mix decimal points and commas. Empty lines and text after a `#` are skipped.
+!> Tables of text, files or pipes of any size, row by row. The first row determines whether tabs, semicolons, commas or
+!> blanks separate the cells, which may stand in quotes. Decimal commas are allowed in quotes, or if the comma is not the
+!> separator; a table must not mix decimal points and commas. Empty lines and text after a `#` are skipped.
 module thud_table_reader
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp

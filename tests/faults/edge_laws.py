@@ -98,8 +98,8 @@ def _outside(impact: thud.Impact) -> dict[str, bool]:
     total = 10 * np.log10(np.sum(impact.floor_force**2) / impact.sample_rate)
     lowest = float(impact.levels(method="exact", force="floor").min())
     return {
-        "the wall has a density of": wall and not 799 < density < 2201,
-        "rubbers have 10000.0 to 3.0e9": wall and not 1e4 <= ball.youngs_modulus <= 3e9,
+        "density of the wall": wall and not 799 < density < 2201,
+        "youngs_modulus in Pa": wall and not 1e4 <= ball.youngs_modulus <= 3e9,
         "poisson_ratio": wall and ball.poisson_ratio < 0.45,
         "sample_rate in Hz": rate < 8000,
         # Unknown errors are NaN.

@@ -34,8 +34,8 @@ contains
       ! Pipes and devices have no size; opening one could block.
       call get_file_size(path, bytes)
       if (bytes < 1 .or. bytes > max_size) then
-         error = input_error('there is no such file, or it is empty, a directory, not regular or too large; allowed: a table ' &
-            //'of modes of up to '//to_text(int(max_size))//' bytes')
+         error = input_error('there is no such file, or it is empty, a directory, not regular or too large; allowed: a ' &
+            //'table of modes of up to '//to_text(int(max_size))//' bytes')
       else
          call read_mode_table(path, table, error)
       end if

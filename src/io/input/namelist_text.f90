@@ -46,23 +46,17 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: clean, structure
       type(group_type) :: group
-      integer :: start, finish, gap
+      integer :: start, gap
 
       allocate (groups(0))
       call separate(text, clean, structure, error)
-      if (allocated(error)) return
       start = 1
-      do
+      do while (.not. allocated(error))
          gap = verify(structure(start:), blanks)
          if (gap == 0) return
          start = start + gap - 1
-         call find_group(structure, start, group, finish, error)
-         if (allocated(error)) return
-         call split_group(clean, structure, start + 1 + len(group%name), finish - 1, group, error)
-         if (allocated(error)) return
-         groups = [groups, group]
-         start = finish + 1
-         if (structure(finish:finish) == '&') start = finish + len('&end')
+         call read_group(clean, structure, start, group, error)
+         if (.not. allocated(error)) groups = [groups, group]
       end do
    end subroutine parse_groups
 
@@ -112,77 +106,61 @@ contains
          //'; allowed: quotes that begin and end in one line')
    end subroutine separate
 
-   !> Finds name and end of the group that starts at a position.
-   subroutine find_group(structure, start, group, finish, error)
-      !> Text without comments and quoted text.
-      character(len=*), intent(in) :: structure
-      !> Position of the first character.
-      integer, intent(in) :: start
-      !> The group, still without assignments.
+   !> Reads one group.
+   subroutine read_group(clean, structure, start, group, error)
+      !> Text without comments; the same without quoted text.
+      character(len=*), intent(in) :: clean, structure
+      !> Position of the first character of the group; afterwards that behind its end.
+      integer, intent(inout) :: start
       type(group_type), intent(out) :: group
-      !> Position of the `/` or of the `&` in `&end`.
-      integer, intent(out) :: finish
-      !> Set if no group starts here, or it has no end.
+      !> Set if no group starts here, it has no end, or a part of it is not `key = value`.
       type(error_type), allocatable, intent(out) :: error
-      integer :: length
+      type(assignment_type) :: assignment
       logical :: closed
+      integer :: begin, finish, equals, first, last, next_first
 
-      finish = start
       group%line = line_of(structure, start)
-      length = verify(structure(start + 1:)//' ', name_characters) - 1
-      if (structure(start:start) /= '&' .or. length == 0) then
+      begin = start + verify(structure(start + 1:)//' ', name_characters)
+      if (structure(start:start) /= '&' .or. begin == start + 1) then
          error = input_error('line '//to_text(group%line)//' stands outside a group; ' &
             //"allowed: groups '&name key = value /' and comments after '!'")
          return
       end if
-      group%name = structure(start + 1:start + length)
-      finish = start + length + scan(structure(start + length + 1:), '/&')
-      closed = finish > start + length
-      if (closed) then
-         if (structure(finish:finish) == '&') closed = index(structure(finish:)//' ', '&end') == 1
-      end if
-      if (.not. closed) error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line) &
-         //" is not terminated; allowed: a '/' at the end of the group")
-   end subroutine find_group
-
-   !> Splits the content of a group into assignments.
-   subroutine split_group(clean, structure, start, finish, group, error)
-      !> Text without comments; the same without quoted text.
-      character(len=*), intent(in) :: clean, structure
-      !> First position after the name of the group; last position before its end.
-      integer, intent(in) :: start, finish
-      !> The group, to which the assignments are added.
-      type(group_type), intent(inout) :: group
-      !> Set if a part of the content is not `key = value`.
-      type(error_type), allocatable, intent(out) :: error
-      type(assignment_type) :: assignment
-      integer :: equals, key_start, key_end, next_key, position
-
+      group%name = structure(start + 1:begin - 1)
       allocate (group%assignments(0))
-      position = start
-      call find_key(structure(:finish), position, key_start, key_end, equals)
-      if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
-      if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
-         call get_value(clean(start:finish), assignment%value)
+      ! The group ends with `/` or `&end`.
+      finish = begin - 1 + scan(structure(begin:), '/&')
+      closed = finish >= begin
+      if (closed) closed = structure(finish:finish) == '/' .or. index(structure(finish:)//' ', '&end') == 1
+      if (.not. closed) then
+         error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line) &
+            //" is not terminated; allowed: a '/' at the end of the group")
+         return
+      end if
+      start = finish + merge(1, len('&end'), structure(finish:finish) == '/')
+      finish = finish - 1
+      call find_key(structure(:finish), begin, first, last, equals)
+      if (verify(structure(begin:min(first - 1, finish)), blanks//',') > 0) then
+         call get_value(clean(begin:finish), assignment%value)
          error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line)//": '" &
             //shortened(assignment%value)//"' is not an assignment; allowed: 'key = value'")
          return
       end if
-      do while (key_start <= finish)
-         assignment%line = line_of(structure, key_start)
-         if (key_end < key_start) then
+      do while (first <= finish)
+         assignment%line = line_of(structure, first)
+         if (last < first) then
             error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(assignment%line) &
                //" has no key; allowed: 'key = value'")
             return
          end if
-         assignment%key = structure(key_start:key_end)
-         position = equals + 1
-         call find_key(structure(:finish), position, next_key, key_end, equals)
-         call get_value(clean(position:min(next_key, finish + 1) - 1), assignment%value)
+         assignment%key = structure(first:last)
+         begin = equals + 1
+         call find_key(structure(:finish), begin, next_first, last, equals)
+         call get_value(clean(begin:min(next_first - 1, finish)), assignment%value)
          group%assignments = [group%assignments, assignment]
-         key_start = next_key
+         first = next_first
       end do
-   end subroutine split_group
+   end subroutine read_group
 
    !> Finds the next key and its equals sign; all positions lie past the end if there is none.
    pure subroutine find_key(structure, from, first, last, equals)
