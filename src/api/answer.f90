@@ -2,7 +2,7 @@
 module thud_answer
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type
-   use thud_case_answers, only: answer_compression, answer_effective_case, answer_loss_factors, answer_modes, answer_run, &
+   use thud_case_answers, only: answer_compression, answer_effective_case, answer_loss_factors, answer_run, &
       answer_samples, answer_solve, describe_library
    use thud_case_text, only: read_case
    use thud_directory_answers, only: answer_check_results, answer_close_results, answer_open_results
@@ -53,8 +53,6 @@ contains
          call answer_close_results(request, error)
       case ('solve')
          call answer_solve(case, bundle, error)
-      case ('modes')
-         call answer_modes(case, bundle, error)
       case ('compression')
          call answer_compression(case, bundle, error)
       case ('loss_factors')

@@ -14,12 +14,12 @@ module thud_case_answers
    use thud_result_bundle, only: add_compression, add_results
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
-   use thud_text, only: newline, split, to_text
+   use thud_text, only: newline, split
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
 
-   public :: answer_compression, answer_effective_case, answer_loss_factors, answer_modes, answer_run, answer_samples
+   public :: answer_compression, answer_effective_case, answer_loss_factors, answer_run, answer_samples
    public :: answer_solve, describe_library
 
 contains
@@ -61,7 +61,6 @@ contains
       type(outcome_type) :: outcome
       type(run_options_type) :: options
       character(len=:), allocatable :: path, text
-      integer :: i
 
       call request%get_text('path', path)
       options%write_all = request%get_number('all') > 0.0_wp
@@ -78,9 +77,6 @@ contains
       call get_case_text(case, text)
       call bundle%add_text('case', text)
       call bundle%add_text('table', outcome%table)
-      do i = 1, outcome%n_message
-         call bundle%add_text('messages.'//to_text(i), outcome%messages(i)%text)
-      end do
       call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
       call add_results(bundle, case, results)
    end subroutine answer_run
@@ -95,16 +91,6 @@ contains
       call compute(case, scope_type(levels=.false., energies=.false.), results, error)
       if (.not. allocated(error)) call add_results(bundle, case, results)
    end subroutine answer_solve
-
-   !> The free modes of the ball of a case.
-   subroutine answer_modes(case, bundle, error)
-      type(case_type), intent(inout) :: case
-      type(bundle_type), intent(inout) :: bundle
-      type(error_type), allocatable, intent(out) :: error
-
-      case%has_impact = .false.
-      call answer_solve(case, bundle, error)
-   end subroutine answer_modes
 
    !> The quasi-static compression of the ball of a case.
    subroutine answer_compression(case, bundle, error)

@@ -85,7 +85,7 @@ contains
          middle = begin + index(self%header(begin:), tab) - 1
          end = begin + index(self%header(begin:), newline) - 1
          if (self%header(middle + 1:middle + 1) == kind) then
-            count = get_count(self%header(middle + 2:end - 1))
+            read (self%header(middle + 2:end - 1), *) count
             if (self%header(begin:middle - 1) == name) length = count
             if (self%header(begin:middle - 1) == name) return
             first = first + count
@@ -93,17 +93,5 @@ contains
          begin = end + 1
       end do
    end subroutine find
-
-   !> Value of a number written in decimal digits.
-   pure function get_count(digits) result(count)
-      character(len=*), intent(in) :: digits
-      integer :: count
-      integer :: i
-
-      count = 0
-      do i = 1, len(digits)
-         count = 10*count + iachar(digits(i:i)) - iachar('0')
-      end do
-   end function get_count
 
 end module thud_request

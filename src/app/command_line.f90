@@ -109,8 +109,8 @@ contains
             exit_code = error%code
             return
          end if
-         do i = 1, outcome%n_message
-            call print_message(outcome%messages(i)%text, yellow, exit_code)
+         do i = 1, size(outcome%warning)
+            call print_message(request%case_file//': '//trim(outcome%warning(i)), yellow, exit_code)
          end do
          if (.not. request%quiet) call print_results(outcome%table, outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming

@@ -1,7 +1,7 @@
 !> The screen: lines that fit it, and colors where a terminal shows them.
 module thud_screen
    use thud_error, only: bad_input
-   use thud_system, only: get_system_message, is_closed, is_terminal, standard_error, standard_output, write_text
+   use thud_system, only: get_system_message, is_terminal, standard_error, standard_output, write_text
    use thud_text, only: newline, wrap_lines
    implicit none (type, external)
    private
@@ -63,7 +63,7 @@ contains
       integer :: status
 
       call write_text(descriptor, text, status)
-      if (status == 0 .or. is_closed(status)) return
+      if (status == 0) return
       exit_code = bad_input
       if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
          //trim(get_system_message(status))//'); allowed: a screen, a pipe, or a disk with space'//newline, status)

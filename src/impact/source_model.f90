@@ -41,7 +41,6 @@ module thud_source_model
       procedure :: check
       procedure :: refine
       procedure :: compress
-      procedure :: get_snapshot_shape
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: get_loss_factors
@@ -88,17 +87,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
-
-   !> Shape of the snapshots of the deformed ball; by default there are none.
-   function get_snapshot_shape(self, ball, sampling) result(extents)
-      class(source_model_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      !> Number of nodes from pole to pole, of nodes through the wall, and of snapshots.
-      integer :: extents(3)
-
-      extents = 0
-   end function get_snapshot_shape
 
    !> Modulus of elasticity of the standard ball in this model, Pa; by default 0, for models that do not use the wall.
    function get_standard_modulus(self) result(modulus)

@@ -1,27 +1,28 @@
 !> One run from end to end: case, source model, force history, levels, verdict, files.
 module thud_run
-   use thud_ball_files, only: estimate_snapshot_bytes, get_modes_csv, get_snapshots_csv
-   use thud_case, only: case_type, get_model_number
+   use thud_ball_files, only: get_modes_csv, get_snapshots_csv
+   use thud_case, only: case_type
    use thud_case_text, only: get_case_text, read_case
    use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
-   use thud_csv, only: get_history_csv
+   use thud_csv, only: get_history_csv, get_table_csv
    use thud_error, only: error_type, input_error
-   use thud_file, only: get_file_stem, read_text_file, text_file_type
+   use thud_file, only: get_file_stem, read_text_file
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
    use thud_force_history, only: force_history_type
-   use thud_kinds, only: wp
    use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, &
       result_directory_type, write_file
-   use thud_room_report, only: get_room_files, get_room_summary, get_room_table, room_file_names
-   use thud_system, only: get_free_bytes
+   use thud_room_report, only: get_room_levels_csv, get_room_summary, get_room_table
    use thud_table, only: get_compression_table, get_defaults_lines, get_modes_table, get_table
-   use thud_text, only: fixed, lower_case, newline
+   use thud_text, only: lower_case, newline
    implicit none (type, external)
    private
 
    public :: load_case, outcome_type, run_case, run_options_type
+
+   !> Maximum length of a warning.
+   integer, parameter :: message_length = 1200
 
    !> What is written where.
    type :: run_options_type
@@ -35,45 +36,19 @@ module thud_run
       logical :: write_all = .false., verbose = .false.
    end type run_options_type
 
-   !> A warning or a note.
-   type :: message_type
-      !> Text, beginning with the file concerned.
-      character(len=:), allocatable :: text
-   end type message_type
-
    !> Outcome of a run for its caller.
    type :: outcome_type
       !> Directory that holds the files.
       character(len=:), allocatable :: directory
       !> Table for the screen.
       character(len=:), allocatable :: table
-      integer :: n_message = 0
-      !> Warnings and notes for the user: [n_message].
-      type(message_type), allocatable :: messages(:)
+      !> Warnings for the user: [n_warning].
+      character(len=message_length), allocatable :: warning(:)
       !> The source conforms to the limits, or there is no impact to assess.
       logical :: conforms = .true.
-   contains
-      procedure :: add_message
    end type outcome_type
 
 contains
-
-   !> Adds a warning or a note.
-   subroutine add_message(self, path, text)
-      class(outcome_type), intent(inout) :: self
-      !> The file concerned; the message.
-      character(len=*), intent(in) :: path, text
-      type(message_type), allocatable :: messages(:)
-      integer :: i
-
-      allocate (messages(self%n_message + 1))
-      do i = 1, self%n_message
-         call move_alloc(self%messages(i)%text, messages(i)%text)
-      end do
-      self%n_message = self%n_message + 1
-      messages(self%n_message)%text = path//': '//text
-      call move_alloc(messages, self%messages)
-   end subroutine add_message
 
    !> Runs a namelist file and writes its results.
    subroutine run_case(path, options, case, results, outcome, error)
@@ -85,93 +60,52 @@ contains
       type(outcome_type), intent(out) :: outcome
       !> Set if the run fails; the directory is unchanged then.
       type(error_type), allocatable, intent(out) :: error
+      type(result_directory_type) :: directory
+      character(len=1) :: no_names(0)
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call compute_and_write(path, case, options, results, outcome, error)
-      if (allocated(error)) error%message = path//': '//error%message
-   end subroutine run_case
-
-   !> Computes a case and writes its results.
-   subroutine compute_and_write(path, case, options, results, outcome, error)
-      !> The file of the case.
-      character(len=*), intent(in) :: path
-      type(case_type), intent(in), target :: case
-      type(run_options_type), intent(in) :: options
-      type(results_type), intent(out) :: results
-      !> Table, verdict and directory of the results.
-      type(outcome_type), intent(out) :: outcome
-      !> Set if the run fails; the directory is unchanged then.
-      type(error_type), allocatable, intent(out) :: error
-      type(text_file_type), allocatable :: files(:)
-      type(result_directory_type) :: directory
-      character(len=1) :: no_names(0)
-      logical :: opens
-      integer :: i
-
       outcome%directory = options%output
       if (options%output == '') outcome%directory = 'outputs/'//trim(case%name)
       directory = new_result_directory(outcome%directory, 'run', trim(case%name), [path], options%replace)
-      opens = options%folder == ''
-      if (.not. opens) directory%folder = options%folder
-      if (opens) call check_target(directory, no_names, error)
-      if (.not. allocated(error)) call check_space(case, outcome%directory, error)
+      if (options%folder == '') call check_target(directory, no_names, error)
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
-      if (allocated(error)) return
-      call format_results(case, results, options%write_all, options%verbose, files, outcome)
-      if (opens) call open_results(directory, error)
-      do i = 1, size(files)
-         call write_file(directory, files(i)%name, files(i)%content, error)
-      end do
-      if (opens) call close_results(directory, error)
-      if (allocated(error)) return
-      do i = 1, size(results%warning)
-         call outcome%add_message(path, trim(results%warning(i)))
-      end do
-   end subroutine compute_and_write
+      if (.not. allocated(error)) then
+         outcome%warning = results%warning
+         if (options%folder == '') then
+            call open_results(directory, error)
+            call write_results(case, results, options, directory, outcome, error)
+            call close_results(directory, error)
+         else
+            directory%folder = options%folder
+            call write_results(case, results, options, directory, outcome, error)
+         end if
+      end if
+      if (allocated(error)) error%message = path//': '//error%message
+   end subroutine run_case
 
-   !> Returns an error if snapshots would fill the disk.
-   subroutine check_space(case, directory, error)
-      type(case_type), intent(in) :: case
-      character(len=*), intent(in) :: directory
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: wanted, free
-
-      if (.not. case%has_impact) return
-      associate (model => case%models(get_model_number(case))%model)
-         wanted = estimate_snapshot_bytes(model%get_snapshot_shape(case%ball, case%sampling))
-      end associate
-      ! The drop on a mobile floor has snapshots, too.
-      if (case%has_floor) wanted = 2*wanted
-      free = get_free_bytes(directory)
-      if (wanted <= free) return
-      error = input_error('&output: the snapshots make files of up to '//fixed(wanted/1.0e6_wp, 1)//' MB, and '//directory &
-         //' has space for '//fixed(free/1.0e6_wp, 1)//' MB; allowed: a longer snapshot_interval, or 0 for no snapshots')
-   end subroutine check_space
-
-   !> Makes table, verdict and files from results.
-   subroutine format_results(case, results, write_all, verbose, files, outcome)
+   !> Writes the files of results, and makes table and verdict.
+   subroutine write_results(case, results, options, directory, outcome, error)
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
-      !> Also write additional quantities of the model; also show numbers of the solver.
-      logical, intent(in) :: write_all, verbose
-      !> The files: [n_file].
-      type(text_file_type), allocatable, intent(out) :: files(:)
+      type(run_options_type), intent(in) :: options
+      type(result_directory_type), intent(inout) :: directory
       !> The outcome; table and verdict are set.
       type(outcome_type), intent(inout) :: outcome
+      !> Set if an earlier step fails, or a file cannot be written.
+      type(error_type), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text, summary
 
       outcome%table = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
       outcome%table = outcome%table//newline
-      allocate (files(0))
       ! The input with all defaults filled in.
       call get_case_text(case, text)
-      call add_file(files, 'effective.nml', text)
+      call write_file(directory, 'effective.nml', text, error)
       if (case%has_modes) then
          call get_modes_csv(results%modes, text)
-         call add_file(files, 'modes.csv', text)
+         call write_file(directory, 'modes.csv', text, error)
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
       ! A case without an impact has free modes alone: neither floor nor room nor compression.
@@ -181,82 +115,58 @@ contains
       end if
       outcome%conforms = is_conforming(case, results%impact%assessment)
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, &
-         results%impact%assessment, verbose)
-      call add_file(files, 'force.csv', get_force_csv(results%impact%history))
-      call add_file(files, 'levels.csv', get_levels_csv(case, results%impact%assessment))
+         results%impact%assessment, options%verbose)
+      call write_file(directory, 'force.csv', get_force_csv(results%impact%history), error)
+      call write_file(directory, 'levels.csv', get_levels_csv(case, results%impact%assessment), error)
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
-      call add_history_files(results%impact%history, '', write_all, files)
+      call write_history_files(results%impact%history, '', options%write_all, directory, error)
       if (allocated(results%on_floor)) then
          call get_floor_table(case, results%impact, results%on_floor, results%floor, text)
          outcome%table = outcome%table//newline//text
          call get_floor_force_csv(results%impact%history, results%on_floor, results%floor, text)
-         call add_file(files, 'floor_force.csv', text)
+         call write_file(directory, 'floor_force.csv', text, error)
          call get_floor_levels_csv(results%impact, results%floor, text)
-         call add_file(files, 'floor_levels.csv', text)
+         call write_file(directory, 'floor_levels.csv', text, error)
          call get_floor_summary(results%on_floor, text)
          summary = summary//text
-         call add_history_files(results%on_floor, 'floor_', write_all, files)
+         call write_history_files(results%on_floor, 'floor_', options%write_all, directory, error)
       end if
       if (case%has_room) summary = summary//get_room_summary(case, results%room)
-      call add_file(files, 'summary.nml', summary)
+      call write_file(directory, 'summary.nml', summary, error)
       if (case%has_room) then
          call get_room_table(case, results%room, results%impact%history%contact_time, allocated(results%on_floor), text)
          outcome%table = outcome%table//newline//text
-         call extend(files, size(room_file_names))
-         call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))
+         call get_room_levels_csv(results%room, text)
+         call write_file(directory, 'room_levels.csv', text, error)
+         call write_file(directory, 'room_octaves.csv', get_table_csv('nominal_Hz,level_dB', &
+            reshape([results%room%octaves%nominal, results%room%octave_level], [size(results%room%octaves), 2])), error)
       end if
       outcome%table = outcome%table//get_defaults_lines(case)
       if (case%has_compression) then
-         call add_file(files, 'compression.csv', get_history_csv('deflection_m,force_N', &
-            results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])))
+         call write_file(directory, 'compression.csv', get_history_csv('deflection_m,force_N', &
+            results%compression%deflection, reshape(results%compression%force, [size(results%compression%force), 1])), error)
          outcome%table = outcome%table//newline//get_compression_table(results%compression)
       end if
-   end subroutine format_results
+   end subroutine write_results
 
-   !> Adds the files with additional quantities and snapshots, if a history has them.
-   subroutine add_history_files(history, prefix, write_all, files)
+   !> Writes the files with additional quantities and snapshots, if a history has them.
+   subroutine write_history_files(history, prefix, write_all, directory, error)
       type(force_history_type), intent(in) :: history
       !> Prefix of the file names.
       character(len=*), intent(in) :: prefix
       !> Write additional quantities of the model.
       logical, intent(in) :: write_all
-      !> The files: [n_file].
-      type(text_file_type), allocatable, intent(inout) :: files(:)
+      type(result_directory_type), intent(inout) :: directory
+      !> Set if an earlier step fails, or a file cannot be written.
+      type(error_type), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
 
-      if (write_all .and. allocated(history%model_history)) call add_file(files, prefix//'model_histories.csv', &
-         get_model_histories_csv(history))
+      if (write_all .and. allocated(history%model_history)) call write_file(directory, prefix//'model_histories.csv', &
+         get_model_histories_csv(history), error)
       if (.not. allocated(history%motion)) return
       call get_snapshots_csv(history%motion, text)
-      call add_file(files, prefix//'snapshots.csv', text)
-   end subroutine add_history_files
-
-   !> Adds a file.
-   subroutine add_file(files, name, content)
-      !> The files: [n_file].
-      type(text_file_type), allocatable, intent(inout) :: files(:)
-      character(len=*), intent(in) :: name, content
-
-      call extend(files, 1)
-      files(size(files))%name = name
-      files(size(files))%content = content
-   end subroutine add_file
-
-   !> Extends the list by empty files.
-   subroutine extend(files, count)
-      !> The files: [n_file].
-      type(text_file_type), allocatable, intent(inout) :: files(:)
-      integer, intent(in) :: count
-      type(text_file_type), allocatable :: more(:)
-      integer :: i
-
-      allocate (more(size(files) + count))
-      do i = 1, size(files)
-         more(i)%name = files(i)%name
-         call move_alloc(files(i)%content, more(i)%content)
-      end do
-      call move_alloc(more, files)
-   end subroutine extend
+      call write_file(directory, prefix//'snapshots.csv', text, error)
+   end subroutine write_history_files
 
    !> Reads a case from a namelist file.
    subroutine load_case(path, case, error, unchecked, room_alone)

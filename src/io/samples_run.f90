@@ -7,7 +7,6 @@ module thud_samples_run
    use thud_compute, only: get_assessed_force
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
-   use thud_file, only: text_file_type
    use thud_kinds, only: wp
    use thud_progress, only: report_progress
    use thud_result_directory, only: add_text, begin_file, check_target, close_results, new_result_directory, &
@@ -19,6 +18,7 @@ module thud_samples_run
    use thud_system, only: path_length
    use thud_table, only: get_defaults_lines, get_force_title, get_span_row
    use thud_text, only: newline, replaced, to_text
+   use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
 
@@ -87,8 +87,9 @@ contains
       call write_samples(case, table, threads, results, tally, error)
       call close_results(results, error)
       if (allocated(error)) return
-      if (tally%computed < tally%samples) call outcome%add_message(path, to_text(tally%samples - tally%computed)//' of ' &
-         //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure))
+      allocate (outcome%warning(merge(1, 0, tally%computed < tally%samples)))
+      outcome%warning = to_text(tally%samples - tally%computed)//' of ' &
+         //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure)
       outcome%conforms = tally%conforming == tally%samples
       call format_tally(case, table, tally, outcome%table)
       outcome%table = outcome%table//get_defaults_lines(case)
@@ -105,7 +106,7 @@ contains
       !> Set if an earlier step failed, a value or the sampling is invalid, or the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
       type(sweep_type) :: sweep
-      type(text_file_type) :: parts(threads)
+      type(text_buffer_type) :: parts(threads)
       real(wp), allocatable :: values(:, :)
       character(len=:), allocatable :: text
       integer :: n, i
@@ -124,12 +125,12 @@ contains
          !$omp parallel do num_threads(threads)
          do i = 1, threads
             call get_sample_rows(table, tally%samples, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, sweep, &
-               parts(i)%content)
+               parts(i))
          end do
          !$omp end parallel do
          call add(tally, sweep, get_assessed_force(case))
          do i = 1, threads
-            call add_text(results, parts(i)%content, error)
+            call add_text(results, parts(i)%get_text(), error)
          end do
          call report_progress(real(tally%samples, wp), 0.0_wp, 'samples')
       end do

@@ -7,18 +7,10 @@ module thud_file
    implicit none (type, external)
    private
 
-   public :: get_file_stem, read_text_file, text_file_type
+   public :: get_file_stem, read_text_file
 
    !> Maximum size of an input file, bytes.
    integer(int64), parameter :: max_input_size = 65536_int64
-
-   !> A file to write.
-   type :: text_file_type
-      !> Name without directory.
-      character(len=32) :: name = ''
-      !> The whole text.
-      character(len=:), allocatable :: content
-   end type text_file_type
 
 contains
 

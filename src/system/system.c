@@ -14,7 +14,6 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <sys/statvfs.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -254,7 +253,7 @@ int thud_create(const char *path)
    return descriptor < 0 ? -errno : descriptor;
 }
 
-// Writes a whole text; returns -1 after a deferred interrupt.
+// Writes a whole text; returns -1 after a deferred interrupt. Nobody reads a closed pipe or standard stream: that is no error.
 int thud_write(int descriptor, const char *bytes, size_t length)
 {
    while (length > 0) {
@@ -262,17 +261,11 @@ int thud_write(int descriptor, const char *bytes, size_t length)
       ssize_t count = write(descriptor, bytes, length);
 
       if (count < 0 && errno == EINTR) continue;
-      if (count < 0) return errno;
+      if (count < 0) return errno == EPIPE || errno == EBADF ? 0 : errno;
       bytes += count;
       length -= (size_t)count;
    }
    return 0;
-}
-
-// Whether the error of a write means that the pipe or the descriptor is closed.
-int thud_is_closed(int status)
-{
-   return status == EPIPE || status == EBADF;
 }
 
 // Closes a file; some systems report a full disk only then.
@@ -373,20 +366,4 @@ int64_t thud_get_file_size(const char *path)
 
    if (stat(path, &info) != 0) return -1;
    return S_ISREG(info.st_mode) ? (int64_t)info.st_size : 0;
-}
-
-// Bytes that this user may write to the disk of a directory, or of its nearest existing parent; negative if unknown.
-double thud_get_free_bytes(const char *path)
-{
-   struct statvfs disk;
-   char directory[PATH_MAX], *end;
-
-   snprintf(directory, sizeof directory, "%s", path);
-   while (statvfs(directory, &disk) != 0) {
-      if (strcmp(directory, ".") == 0 || strcmp(directory, "/") == 0) return -1.0;
-      end = strrchr(directory, '/');
-      if (end) end[end == directory] = 0;
-      else strcpy(directory, ".");
-   }
-   return (double)disk.f_frsize * (double)disk.f_bavail;
 }

@@ -1,15 +1,14 @@
 !> Operating system calls that Fortran lacks; implemented in `system.c`.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int64_t, c_intptr_t, &
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_int64_t, c_intptr_t, &
       c_null_char, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int64
-   use thud_kinds, only: wp
    implicit none (type, external)
    private
 
    public :: standard_error, standard_output
    public :: begin_call, close_descriptor, create_file, defer_interrupts, directory_exists, end_call, end_process
-   public :: get_file_size, get_free_bytes, get_system_message, interrupt_calls, is_closed, is_forked, is_same_file
+   public :: get_file_size, get_system_message, interrupt_calls, is_forked, is_same_file
    public :: is_terminal, list_directory, make_beside, open_descriptor, pass_interrupts, prepare_process, read_bytes
    public :: remove_file, rename_file, resolve_path, swap_directories, write_text
 
@@ -65,7 +64,6 @@ module thud_system
    procedure(two_path_call), bind(c, name='thud_swap') :: c_swap
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
-   procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
 
    !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then end the process with a message.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
@@ -162,13 +160,6 @@ module thud_system
          type(c_ptr), value :: directory
          integer(c_int) :: status
       end function c_closedir
-
-      function c_get_free_bytes(path) bind(c, name='thud_get_free_bytes') result(bytes)
-         import :: c_char, c_double
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         real(c_double) :: bytes
-      end function c_get_free_bytes
    end interface
 
 contains
@@ -251,15 +242,6 @@ contains
 
       status = int(c_write(int(descriptor, c_int), text, len(text, c_size_t)))
    end subroutine write_text
-
-   !> Whether a write failed because the pipe or the descriptor is closed.
-   function is_closed(status) result(closed)
-      !> Status from `write_text`.
-      integer, intent(in) :: status
-      logical :: closed
-
-      closed = c_is_closed(int(status, c_int)) /= 0
-   end function is_closed
 
    !> Whether a directory exists.
    function directory_exists(path) result(exists)
@@ -385,15 +367,5 @@ contains
 
       yes = c_is_same_file(path//c_null_char, other//c_null_char) == 1
    end function is_same_file
-
-   !> Free space on the disk of a directory, or of its nearest existing parent.
-   function get_free_bytes(path) result(bytes)
-      character(len=*), intent(in) :: path
-      !> Bytes that this user may write; huge if unknown.
-      real(wp) :: bytes
-
-      bytes = real(c_get_free_bytes(path//c_null_char), wp)
-      if (bytes < 0.0_wp) bytes = huge(bytes)
-   end function get_free_bytes
 
 end module thud_system

@@ -290,15 +290,6 @@ def check_refusal(text: str, words: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_snapshots_larger_than_the_disk_are_refused_before_the_run(
-    run: Run, case_file: CaseFile
-) -> None:
-    # The file system of processes has no room at all.
-    result = run(case_file(SNAPSHOTS), "--output", "/proc/thud")
-    assert result.returncode == 1  # type: ignore[attr-defined]
-    assert re.search(naming("/proc/thud", "0.0 MB"), result.stderr)  # type: ignore[attr-defined]
-
-
 def test_record_too_short_for_any_contact_is_told_before_it_is_computed() -> None:
     # Ten elements of 0.4 µm would take minutes to the same end.
     ball = thud.Ball(wall_thickness=4e-7)

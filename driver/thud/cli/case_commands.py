@@ -97,7 +97,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
             "run", path=os.fsencode(path), folder=os.fsencode(folder), all=options.all,
             verbose=options.verbose, progress=not options.quiet,
         )  # fmt: skip
-        print_notes(map(text, answer.get("messages", {}).values()))
+        print_notes(f"{path}: {text(value)}" for value in answer.get("warnings", {}).values())
         results.write_into(folder, _figures(answer, options))
     if not options.quiet:
         print_results(text(answer["table"]).removesuffix("\n"))

@@ -162,7 +162,7 @@ def _centers(position: Array) -> Array:
 def _modes(radius: float, wall: float, mass: float, modulus: float, ratio: float) -> FreeModes:
     # Without the warnings on free modes, which the page does not show.
     case = Case(ball=Ball(radius, wall, mass, modulus, ratio), model=None, modes=Modes(MODES))
-    return new_modes(case.ball, ask("modes", case=case_text(case)))
+    return new_modes(case.ball, ask("solve", case=case_text(case)))
 
 
 def _modal_section(impact: Impact, chosen: NDArray[np.intp]) -> Answer:

@@ -126,7 +126,7 @@ def free_modes(
         model=None,
         modes=Modes(count),
     )
-    modes = new_modes(case.ball, ask("modes", case=case_text(case)))
+    modes = new_modes(case.ball, ask("solve", case=case_text(case)))
     for warning in modes.warnings:
         warnings.warn(warning, PlausibilityWarning, stacklevel=3)
     return modes

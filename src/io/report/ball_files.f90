@@ -8,10 +8,10 @@ module thud_ball_files
    implicit none (type, external)
    private
 
-   public :: estimate_snapshot_bytes, get_modes_csv, get_snapshots_csv
+   public :: get_modes_csv, get_snapshots_csv
 
-   !> Number of columns of `snapshots.csv`, and bytes of a number with all digits.
-   integer, parameter :: n_column = 13, width = 25
+   !> Number of columns of `snapshots.csv`.
+   integer, parameter :: n_column = 13
 
 contains
 
@@ -36,15 +36,6 @@ contains
 
       label = text
    end function to_label
-
-   !> Approximate size of the snapshots of an impact, bytes.
-   pure function estimate_snapshot_bytes(extents) result(bytes)
-      !> Numbers of nodes from pole to pole, nodes through the wall, and snapshots.
-      integer, intent(in) :: extents(3)
-      real(wp) :: bytes
-
-      bytes = n_column*width*product(real(extents, wp))
-   end function estimate_snapshot_bytes
 
    !> Snapshots, one row for each time and node. Line and ring count the nodes from the lowest point to the highest and from
    !> the inner surface to the outer; neighbors of both make the cells. Stresses act on the outer surface, the pressure of

@@ -3,7 +3,6 @@ module thud_room_report
    use thud_band, only: get_band_name
    use thud_case, only: case_type, get_floor_number
    use thud_csv, only: get_table_csv
-   use thud_file, only: text_file_type
    use thud_kinds, only: wp
    use thud_rating, only: class_limits, get_class, get_rounded, rating_names, rating_titles
    use thud_report, only: line
@@ -13,10 +12,7 @@ module thud_room_report
    implicit none (type, external)
    private
 
-   public :: get_room_files, get_room_summary, get_room_table, room_file_names
-
-   !> Files of a prediction.
-   character(len=*), parameter :: room_file_names(*) = [character(len=16) :: 'room_levels.csv', 'room_octaves.csv']
+   public :: get_room_levels_csv, get_room_summary, get_room_table
 
    !> Width of a column of the table.
    integer, parameter :: column = 13
@@ -27,16 +23,15 @@ module thud_room_report
 
 contains
 
-   !> The files: levels and their factors in one-third-octave bands, and octave levels.
-   subroutine get_room_files(prediction, files)
+   !> Levels and their factors in one-third-octave bands.
+   subroutine get_room_levels_csv(prediction, text)
       type(room_level_type), intent(in) :: prediction
-      !> The files: [size(room_file_names)].
-      type(text_file_type), intent(out) :: files(:)
+      !> Text of `room_levels.csv`.
+      character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: header
       real(wp), allocatable :: columns(:)
       integer :: i
 
-      files%name = room_file_names
       header = 'nominal_Hz'
       columns = prediction%bands%nominal
       associate (records => get_band_records(prediction))
@@ -52,11 +47,9 @@ contains
       end do
       columns = [columns, prediction%path_share]
       associate (n_band => size(prediction%bands))
-         files(1)%content = get_table_csv(header, reshape(columns, [n_band, size(columns)/n_band]))
+         text = get_table_csv(header, reshape(columns, [n_band, size(columns)/n_band]))
       end associate
-      files(2)%content = get_table_csv('nominal_Hz,level_dB', &
-         reshape([prediction%octaves%nominal, prediction%octave_level], [size(prediction%octave_level), 2]))
-   end subroutine get_room_files
+   end subroutine get_room_levels_csv
 
    !> Table of the levels for the screen.
    subroutine get_room_table(case, prediction, contact_time, coupled, text)

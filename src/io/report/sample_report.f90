@@ -47,7 +47,7 @@ contains
    end subroutine get_sample_header
 
    !> Rows of the results, with 17 digits; cells of samples without results are empty.
-   subroutine get_sample_rows(table, before, values, first, last, sweep, text)
+   subroutine get_sample_rows(table, before, values, first, last, sweep, rows)
       type(sample_table_type), intent(in) :: table
       !> Number of samples before the first of `values`.
       integer, intent(in) :: before
@@ -56,74 +56,53 @@ contains
       !> Indices of the first and the last sample to write.
       integer, intent(in) :: first, last
       type(sweep_type), intent(in) :: sweep
-      character(len=:), allocatable, intent(out) :: text
-      !> Maximum width of a number with its comma.
-      integer, parameter :: number_width = 26
-      character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
-      character(len=number_width*(size(table%names) + sample_quantity_count + size(sweep%level(:, :, 1)) &
-         + size(sweep%floor_column)) + get_rest_width(sweep)) :: row
-      type(text_buffer_type) :: buffer
-      integer :: i, j, at
+      type(text_buffer_type), intent(out) :: rows
+      integer :: i, j
 
       do i = first, last
-         row = to_text(before + i)
+         call rows%append(to_text(before + i))
          do j = 1, size(table%names)
-            at = len_trim(row) + 1
             associate (field => table%fields(j))
                if (field%n_choice > 0) then
-                  row(at:) = ','//field%choices(nint(values(j, i)))
+                  call rows%append(','//trim(field%choices(nint(values(j, i)))))
                else
-                  write (row(at:), numbers_form) values(j, i)
+                  call append_numbers(rows, values(j:j, i))
                end if
             end associate
          end do
-         at = len_trim(row) + 1
-         if (sweep%status(i) == 0) then
-            write (row(at:), numbers_form) sweep%quantity(:, i), sweep%level(sweep%first_band:, :, i)
-            do j = 1, force_count
-               row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', sweep%conforms(j, i)))
-            end do
-            if (size(sweep%floor_column) > 0) write (row(len_trim(row) + 1:), numbers_form) sweep%floor_value(:, i)
-            write (row(len_trim(row) + 1:), numbers_form) sweep%margin(i)
-            row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', sweep%verdict(i)))//',0,'//newline
-         else
-            row(at:) = repeat(',', sample_quantity_count + size(sweep%level(sweep%first_band:, :, i)) + force_count &
-               + size(sweep%floor_column) + 3) &
-               //to_text(sweep%status(i))//','//trim(in_quotes(sweep%reason(i)%text))//newline
-         end if
-         call buffer%append(row(:index(row, newline)))
+         associate (levels => sweep%level(sweep%first_band:, :, i))
+            if (sweep%status(i) == 0) then
+               call append_numbers(rows, [sweep%quantity(:, i), levels])
+               do j = 1, force_count
+                  call rows%append(','//trim(merge('yes', 'no ', sweep%conforms(j, i))))
+               end do
+               call append_numbers(rows, [sweep%floor_value(:, i), sweep%margin(i)])
+               call rows%append(','//trim(merge('yes', 'no ', sweep%verdict(i)))//',0,'//newline)
+            else
+               call rows%append(repeat(',', sample_quantity_count + size(levels) + force_count &
+                  + size(sweep%floor_column) + 3)//to_text(sweep%status(i))//',"')
+               associate (reason => sweep%reason(i)%text)
+                  do j = 1, len(reason)
+                     call rows%append(repeat(reason(j:j), merge(2, 1, reason(j:j) == '"')))
+                  end do
+               end associate
+               call rows%append('"'//newline)
+            end if
+         end associate
       end do
-      text = buffer%get_text()
    end subroutine get_sample_rows
 
-   !> Width sufficient for all cells of a row except numbers: choices, verdicts, and the longest reason in quotes.
-   pure function get_rest_width(sweep) result(width)
-      type(sweep_type), intent(in) :: sweep
-      integer :: width
-      integer :: i
+   !> Adds cells with numbers to a row that has cells already.
+   subroutine append_numbers(rows, numbers)
+      type(text_buffer_type), intent(inout) :: rows
+      !> The numbers: [n_number].
+      real(wp), intent(in) :: numbers(:)
+      !> Maximum width of a number with its comma.
+      integer, parameter :: width = 26
+      character(len=width*size(numbers)) :: cells
 
-      width = 1024
-      do i = 1, size(sweep%reason)
-         if (allocated(sweep%reason(i)%text)) width = max(width, 1024 + 2*len(sweep%reason(i)%text))
-      end do
-   end function get_rest_width
-
-   !> A message as a cell of a table.
-   pure function in_quotes(message) result(cell)
-      character(len=*), intent(in) :: message
-      !> The message in quotes, with quotes inside doubled.
-      character(len=2*len(message) + 2) :: cell
-      integer :: i, at
-
-      cell = '"'
-      at = 1
-      do i = 1, len(message)
-         at = at + 1
-         cell(at:at) = message(i:i)
-         if (message(i:i) == '"') at = at + 1
-         if (message(i:i) == '"') cell(at:at) = '"'
-      end do
-      cell(at + 1:) = '"'
-   end function in_quotes
+      write (cells, '(*(:,",",es24.16e3))') numbers
+      call rows%append(trim(cells))
+   end subroutine append_numbers
 
 end module thud_sample_report
