@@ -111,14 +111,13 @@ contains
       type(bundle_type), intent(inout) :: bundle
       !> Set if the model has no loss factor.
       type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: frequency(:), loss_factor(:)
+      real(wp), allocatable :: loss_factor(:)
 
-      allocate (frequency, source=request%get_array('frequency'))
-      allocate (loss_factor, mold=frequency)
-      associate (model => case%models(get_model_number(case))%model)
+      associate (model => case%models(get_model_number(case))%model, frequency => request%get_array('frequency'))
+         allocate (loss_factor(size(frequency)))
          call model%get_loss_factors(case%ball, frequency, loss_factor, error)
       end associate
-      if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(frequency), loss_factor)
+      if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(loss_factor), loss_factor)
    end subroutine answer_loss_factors
 
    !> Computes samples of a case that differ in the `key_count` comma-separated `keys`, with `threads` threads. `values`

@@ -43,15 +43,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
       type(receiver_type) :: receiver
-      real(wp), allocatable :: point(:)
       complex(wp), allocatable :: mobility(:)
 
-      allocate (point, source=request%get_array('point'))
       call prepare_floor(case, state, error)
       if (allocated(error)) return
       receiver = state%receiver
-      if (size(point) == 2) call case%floors(get_floor_number(case))%model%get_transfer(state, point(1), point(2), &
-         receiver, error)
+      associate (point => request%get_array('point'))
+         if (size(point) == 2) call case%floors(get_floor_number(case))%model%get_transfer(state, point(1), point(2), &
+            receiver, error)
+      end associate
       if (allocated(error)) return
       mobility = get_mobility(receiver, request%get_array('frequency'))
       call bundle%add_array('real', shape(mobility), real(mobility, wp))
@@ -68,20 +68,21 @@ contains
       type(band_type), allocatable :: bands(:)
       type(floor_state_type) :: state
       character(len=:), allocatable :: set
-      real(wp), allocatable :: force(:), energy(:)
+      real(wp), allocatable :: energy(:)
 
       call request%get_text('bands', set)
       call find_bands(set, bands, error)
       if (.not. allocated(error)) call prepare_floor(case, state, error)
       if (allocated(error)) return
-      allocate (force, source=request%get_array('force'))
       allocate (energy(size(bands)))
-      call get_injected_energies(state%receiver, force, request%get_number('sample_rate'), bands, energy, error)
+      call get_injected_energies(state%receiver, request%get_array('force'), request%get_number('sample_rate'), bands, &
+         energy, error)
       if (allocated(error)) return
       call bundle%add_array('frequency', shape(bands), bands%nominal)
       call bundle%add_array('energy', shape(bands), energy)
       call bundle%add_array('conductance', shape(bands), get_mean_conductances(state%receiver, bands))
-      call bundle%add_number('total', get_total_energy(state%receiver, force, request%get_number('sample_rate')))
+      call bundle%add_number('total', get_total_energy(state%receiver, request%get_array('force'), &
+         request%get_number('sample_rate')))
    end subroutine answer_floor_energy
 
    !> Velocity, m/s, of the point `point`, m, of a case's floor under the record `force`, N, at `sample_rate`, Hz.
@@ -92,14 +93,14 @@ contains
       !> Set if the floor has no such point.
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
-      real(wp), allocatable :: force(:), velocity(:), point(:)
+      real(wp), allocatable :: velocity(:)
 
-      allocate (force, source=request%get_array('force'))
-      allocate (point, source=request%get_array('point'))
-      allocate (velocity, mold=force)
       call prepare_floor(case, state, error)
-      if (.not. allocated(error)) call get_point_velocity(case%floors(get_floor_number(case))%model, state, force, &
-         request%get_number('sample_rate'), point(1), point(2), velocity, error)
+      associate (force => request%get_array('force'), point => request%get_array('point'))
+         allocate (velocity(size(force)))
+         if (.not. allocated(error)) call get_point_velocity(case%floors(get_floor_number(case))%model, state, force, &
+            request%get_number('sample_rate'), point(1), point(2), velocity, error)
+      end associate
       if (.not. allocated(error)) call bundle%add_array('velocity', shape(velocity), velocity)
    end subroutine answer_point_velocity
 
@@ -139,7 +140,8 @@ contains
    end subroutine answer_room_level
 
    !> Sound in the modal room below for each of the positions `ball` and `microphone`, m from the corner of the room, from
-   !> the record `force`, N, at `sample_rate`, Hz. With `pressure`, the sound pressure, too.
+   !> the record `force`, N, at `sample_rate`, Hz, in bands up to `highest`, Hz, by default the crossover. With `pressure`,
+   !> the sound pressure, too.
    subroutine answer_modal_room(case, request, bundle, error)
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
@@ -160,7 +162,7 @@ contains
          if (size(stated_microphone) > 0) microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
       end associate
       call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), ball, microphone, &
-         request%get_number('pressure') > 0.0_wp, .true., room, get_highest(request, box))
+         request%get_number('pressure') > 0.0_wp, .true., room, request%get_number('highest', get_crossover(box)))
       if (.not. all(ieee_is_finite(room%mean))) then
          error = input_error('balls: all positions lie on rigid supports, which do not move; allowed: at least one ' &
             //'elsewhere')
@@ -181,16 +183,6 @@ contains
       call bundle%add_number('sample_rate', room%sample_rate)
       if (allocated(room%pressure)) call bundle%add_array('pressure', shape(room%pressure), room%pressure)
    end subroutine answer_modal_room
-
-   !> Highest mid frequency, Hz, of the modal bands of a request: `highest`, or the crossover.
-   function get_highest(request, box) result(frequency)
-      type(request_type), intent(in) :: request
-      type(box_type), intent(in) :: box
-      real(wp) :: frequency
-
-      frequency = request%get_number('highest')
-      if (.not. request%has('highest')) frequency = get_crossover(box)
-   end function get_highest
 
    !> Radiation of a case's floor into the room below in the rated one-third-octave bands, by its modes: averaged over the
    !> floor, or over the strike points `x`, `y`, relative to its sides.
@@ -311,15 +303,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
       type(plate_type) :: plate
-      real(wp), allocatable :: frequency(:), conductance(:)
+      real(wp), allocatable :: conductance(:)
 
-      allocate (frequency, source=request%get_array('frequency'))
-      allocate (conductance, mold=frequency)
-      call prepare_floor(case, state, error)
-      if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_radiator(state, frequency, plate, &
-         conductance, error)
-      if (allocated(error)) return
-      associate (air => case%room%air)
+      associate (air => case%room%air, frequency => request%get_array('frequency'))
+         allocate (conductance(size(frequency)))
+         call prepare_floor(case, state, error)
+         if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_radiator(state, frequency, plate, &
+            conductance, error)
+         if (allocated(error)) return
          call bundle%add_number('surface_mass', get_surface_mass(plate))
          call bundle%add_number('critical_frequency', get_critical_frequency(plate, air))
          call bundle%add_number('length', plate%length)

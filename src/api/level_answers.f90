@@ -51,11 +51,12 @@ contains
    subroutine answer_low_pass(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      real(wp), allocatable :: force(:), low(:)
+      real(wp), allocatable :: low(:)
 
-      allocate (force, source=request%get_array('force'))
-      allocate (low, mold=force)
-      call get_low_pass(force, request%get_number('sample_rate'), request%get_number('cutoff'), low)
+      associate (force => request%get_array('force'))
+         allocate (low(size(force)))
+         call get_low_pass(force, request%get_number('sample_rate'), request%get_number('cutoff'), low)
+      end associate
       call bundle%add_array('force', shape(low), low)
    end subroutine answer_low_pass
 
@@ -65,42 +66,40 @@ contains
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
       character(len=:), allocatable :: set
-      real(wp), allocatable :: levels(:)
       real(wp) :: a_weighted
 
       call request%get_text('bands', set)
-      allocate (levels, source=request%get_array('levels'))
-      a_weighted = get_a_weighted_level(set, levels)
+      a_weighted = get_a_weighted_level(set, request%get_array('levels'))
       call bundle%add_number('a_weighted', a_weighted)
       call bundle%add_number('rounded', real(get_rounded(a_weighted), wp))
       call bundle%add_number('class', real(get_class(a_weighted), wp))
-      if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(levels), wp))
+      if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(request%get_array('levels')), wp))
    end subroutine answer_rating
 
    !> `levels`, dB, of a room with `reverberation_time`, s, and `volume`, m3, standardized to the reference room.
    subroutine answer_standardization(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      real(wp), allocatable :: levels(:)
 
-      allocate (levels, source=request%get_array('levels'))
-      levels = levels + get_standardization(request%get_array('reverberation_time'), request%get_number('volume'))
-      call bundle%add_array('levels', shape(levels), levels)
+      associate (levels => request%get_array('levels'))
+         call bundle%add_array('levels', shape(levels), levels &
+            + get_standardization(request%get_array('reverberation_time'), request%get_number('volume')))
+      end associate
    end subroutine answer_standardization
 
    !> `levels`, dB, corrected for the levels `background`, dB, and whether a corrected level is only an upper bound.
    subroutine answer_background(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      real(wp), allocatable :: levels(:), corrected(:)
+      real(wp), allocatable :: corrected(:)
       logical, allocatable :: is_upper_bound(:)
 
-      allocate (levels, source=request%get_array('levels'))
-      allocate (corrected, mold=levels)
-      allocate (is_upper_bound(size(levels)))
-      call correct_for_background(levels, request%get_array('background'), corrected, is_upper_bound)
-      call bundle%add_array('levels', shape(levels), corrected)
-      call bundle%add_array('is_upper_bound', shape(levels), merge(1.0_wp, 0.0_wp, is_upper_bound))
+      associate (levels => request%get_array('levels'))
+         allocate (corrected(size(levels)), is_upper_bound(size(levels)))
+         call correct_for_background(levels, request%get_array('background'), corrected, is_upper_bound)
+      end associate
+      call bundle%add_array('levels', shape(corrected), corrected)
+      call bundle%add_array('is_upper_bound', shape(corrected), merge(1.0_wp, 0.0_wp, is_upper_bound))
    end subroutine answer_background
 
 end module thud_level_answers

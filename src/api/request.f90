@@ -44,15 +44,18 @@ contains
       text = self%text(first:first + length - 1)
    end subroutine get_text
 
-   !> A number by its name; 0 if there is none.
-   pure function get_number(self, name) result(number)
+   !> A number by its name.
+   pure function get_number(self, name, default) result(number)
       class(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
+      !> The number if there is none (default: 0).
+      real(wp), intent(in), optional :: default
       real(wp) :: number
       integer :: first, length
 
       call find(self, name, 'n', first, length)
       number = 0.0_wp
+      if (present(default)) number = default
       if (length > 0) number = self%values(first)
    end function get_number
 

@@ -43,12 +43,8 @@ module thud_command_line
    type :: request_type
       !> Path of the case file.
       character(len=:), allocatable :: case_file
-      !> Output directory; empty if not given.
-      character(len=:), allocatable :: output
-      !> Also replace results of another case or command.
-      logical :: replace = .false.
-      !> Also write additional quantities of the model against time.
-      logical :: all = .false.
+      !> What is written where.
+      type(run_options_type) :: options
       !> Path of a table of samples; empty if not given.
       character(len=:), allocatable :: samples
       !> Number of threads for the samples.
@@ -57,8 +53,6 @@ module thud_command_line
       logical :: check = .false.
       !> Show only errors and warnings.
       logical :: quiet = .false.
-      !> Also show numbers of the solver.
-      logical :: verbose = .false.
       !> Text to show instead of a run.
       character(len=:), allocatable :: information
    end type request_type
@@ -70,7 +64,6 @@ contains
       !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted, 143 terminated.
       integer, intent(out) :: exit_code
       type(request_type) :: request
-      type(run_options_type) :: options
       type(case_type), target :: case
       type(results_type) :: results
       type(outcome_type) :: outcome
@@ -93,15 +86,9 @@ contains
          if (allocated(error)) then
             continue
          else if (request%samples == '') then
-            options%output = request%output
-            options%folder = ''
-            options%replace = request%replace
-            options%write_all = request%all
-            options%verbose = request%verbose
-            call run_case(request%case_file, options, case, results, outcome, error)
+            call run_case(request%case_file, request%options, case, results, outcome, error)
          else
-            call run_samples(request%case_file, request%samples, request%threads, request%output, request%replace, &
-               outcome, error)
+            call run_samples(request%case_file, request%samples, request%threads, request%options, outcome, error)
          end if
          call end_progress()
          if (allocated(error)) then
@@ -125,7 +112,8 @@ contains
       character(len=:), allocatable :: argument, number, suggestion
       integer :: i
 
-      request%output = ''
+      request%options%output = ''
+      request%options%folder = ''
       request%samples = ''
       i = 1
       do while (i <= command_argument_count())
@@ -135,17 +123,17 @@ contains
             call get_information(argument, request%information)
             return
          case ('--replace')
-            request%replace = .true.
+            request%options%replace = .true.
          case ('--all')
-            request%all = .true.
+            request%options%write_all = .true.
          case ('--check')
             request%check = .true.
          case ('--quiet', '-q')
             request%quiet = .true.
          case ('--verbose', '-v')
-            request%verbose = .true.
+            request%options%verbose = .true.
          case ('--output', '-o')
-            call take_value(i, '--output', 'a directory', request%output, error)
+            call take_value(i, '--output', 'a directory', request%options%output, error)
          case ('--samples')
             call take_value(i, '--samples', 'a table of samples', request%samples, error)
          case ('--threads')
@@ -171,11 +159,11 @@ contains
          error = input_error('no case is given')
       else if (request%samples == '' .and. allocated(number)) then
          error = input_error('--threads does nothing without --samples; allowed: both')
-      else if (request%samples /= '' .and. request%all) then
+      else if (request%samples /= '' .and. request%options%write_all) then
          error = input_error('--all does nothing with --samples; allowed: one of them')
-      else if (request%verbose .and. request%samples /= '') then
+      else if (request%options%verbose .and. request%samples /= '') then
          error = input_error('--verbose does nothing with --samples; allowed: one of them')
-      else if (request%verbose .and. request%quiet) then
+      else if (request%options%verbose .and. request%quiet) then
          error = input_error('--verbose contradicts --quiet; allowed: one of them')
       end if
    end subroutine parse_arguments

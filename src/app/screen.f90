@@ -2,7 +2,7 @@
 module thud_screen
    use thud_error, only: bad_input
    use thud_system, only: get_system_message, is_terminal, standard_error, standard_output, write_text
-   use thud_text, only: newline, wrap_lines
+   use thud_text, only: newline, to_text, wrap_lines
    implicit none (type, external)
    private
 
@@ -111,10 +111,8 @@ contains
       character(len=*), intent(in) :: text
       integer, intent(in) :: color
       character(len=:), allocatable :: sequence
-      character(len=2) :: number
 
-      write (number, '(i2)') color
-      sequence = achar(27)//'['//number//'m'//text//achar(27)//'[0m'
+      sequence = achar(27)//'['//to_text(color)//'m'//text//achar(27)//'[0m'
    end function painted
 
 end module thud_screen

@@ -140,7 +140,7 @@ contains
       integer :: i, n_thread
 
       n_thread = 1
-      !$ if (case%has_floor .and. .not. is_forked()) n_thread = min(2, omp_get_max_threads())
+      !$ if (case%has_floor .and. is_forked == 0) n_thread = min(2, omp_get_max_threads())
       if (n_thread == 1) then
          call compute_impact(case, scope, impact, error)
          if (.not. allocated(error)) call prepare_floor(case, state, error)

@@ -10,6 +10,7 @@ module thud_run
    use thud_file, only: get_file_stem, read_text_file
    use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
    use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
    use thud_report, only: get_model_histories_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, &
       result_directory_type, write_file
@@ -116,7 +117,8 @@ contains
       outcome%conforms = is_conforming(case, results%impact%assessment)
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, &
          results%impact%assessment, options%verbose)
-      call write_file(directory, 'force.csv', get_force_csv(results%impact%history), error)
+      call write_file(directory, 'force.csv', get_force_csv(results%impact%history, [character(len=1) ::], &
+         reshape([real(wp) ::], [size(results%impact%history%deflection), 0])), error)
       call write_file(directory, 'levels.csv', get_levels_csv(case, results%impact%assessment), error)
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
       call write_history_files(results%impact%history, '', options%write_all, directory, error)

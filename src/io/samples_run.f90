@@ -11,7 +11,7 @@ module thud_samples_run
    use thud_progress, only: report_progress
    use thud_result_directory, only: add_text, begin_file, check_target, close_results, new_result_directory, &
       open_results, result_directory_type, write_file
-   use thud_run, only: load_case, outcome_type
+   use thud_run, only: load_case, outcome_type, run_options_type
    use thud_sample_report, only: get_sample_header, get_sample_rows
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
    use thud_sweep, only: new_sweep, solve_sweep, sweep_type
@@ -43,15 +43,13 @@ module thud_samples_run
 contains
 
    !> Computes all samples of a table and writes their results.
-   subroutine run_samples(path, table_path, threads, output, replace, outcome, error)
+   subroutine run_samples(path, table_path, threads, options, outcome, error)
       !> Path of the namelist file, for all keys that are not in the table.
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: table_path
       integer, intent(in) :: threads
-      !> Directory for the results; empty for `outputs/<name of the case>_samples`.
-      character(len=*), intent(in) :: output
-      !> Also replace results of another case or command.
-      logical, intent(in) :: replace
+      !> What is written where, by default into `outputs/<name of the case>_samples`.
+      type(run_options_type), intent(in) :: options
       !> Table, verdict and directory of the results.
       type(outcome_type), intent(out) :: outcome
       !> Set if the run fails; the directory is unchanged then.
@@ -75,11 +73,11 @@ contains
       ! The table states the keys of its columns.
       case%unstated = pack(case%unstated, [(.not. any(get_full_key(table%fields) == case%unstated(i)), &
          i=1, size(case%unstated))])
-      outcome%directory = output
-      if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
+      outcome%directory = options%output
+      if (options%output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
       inputs(1) = path
       inputs(2) = table_path
-      results = new_result_directory(outcome%directory, 'samples', trim(case%name), inputs, replace)
+      results = new_result_directory(outcome%directory, 'samples', trim(case%name), inputs, options%replace)
       call check_target(results, [result_file, input_file], error)
       if (.not. allocated(error)) call open_results(results, error)
       call get_case_text(case, text)

@@ -253,7 +253,7 @@ int thud_create(const char *path)
    return descriptor < 0 ? -errno : descriptor;
 }
 
-// Writes a whole text; returns -1 after a deferred interrupt. Nobody reads a closed pipe or standard stream: that is no error.
+// Writes a whole text; returns -1 after a deferred interrupt. A closed pipe or standard stream has no reader: no error.
 int thud_write(int descriptor, const char *bytes, size_t length)
 {
    while (length > 0) {

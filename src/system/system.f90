@@ -18,8 +18,8 @@ module thud_system
    !> Maximum length of the name of a file, and of a path.
    integer, parameter, public :: name_length = 255, path_length = 4096
 
-   !> 1 in a process forked from one that had called the library, else 0; defined in system.c.
-   integer(c_int), volatile, bind(c, name='thud_is_forked') :: forked
+   !> 1 in a process forked from one that had called the library, whose threads it lacks, else 0; defined in system.c.
+   integer(c_int), volatile, bind(c, name='thud_is_forked') :: is_forked
 
    abstract interface
       subroutine plain_call() bind(c)
@@ -40,6 +40,15 @@ module thud_system
          integer(c_int) :: status
       end function two_path_call
 
+      function path_text_call(path, text, length) bind(c) result(status)
+         import :: c_char, c_int, c_size_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         character(kind=c_char), intent(out) :: text(*)
+         integer(c_size_t), value :: length
+         integer(c_int) :: status
+      end function path_text_call
+
       function path_number_call(path) bind(c) result(number)
          import :: c_char, c_int64_t
          implicit none (type, external)
@@ -58,6 +67,8 @@ module thud_system
    procedure(path_call), bind(c, name='thud_open') :: c_open
    procedure(path_call), bind(c, name='thud_create') :: c_create
    procedure(path_call), bind(c, name='remove') :: c_remove
+   procedure(path_text_call), bind(c, name='thud_resolve') :: c_resolve
+   procedure(path_text_call), bind(c, name='thud_make_beside') :: c_make_beside
    procedure(path_number_call), bind(c, name='thud_get_file_size') :: c_get_file_size
    procedure(two_path_call), bind(c, name='rename') :: c_rename
    procedure(two_path_call), bind(c, name='thud_is_same_file') :: c_is_same_file
@@ -120,24 +131,6 @@ module thud_system
          integer(c_int) :: status
       end function c_write
 
-      function c_resolve(path, resolved, length) bind(c, name='thud_resolve') result(status)
-         import :: c_char, c_int, c_size_t
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         character(kind=c_char), intent(out) :: resolved(*)
-         integer(c_size_t), value :: length
-         integer(c_int) :: status
-      end function c_resolve
-
-      function c_make_beside(path, made, length) bind(c, name='thud_make_beside') result(status)
-         import :: c_char, c_int, c_size_t
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         character(kind=c_char), intent(out) :: made(*)
-         integer(c_size_t), value :: length
-         integer(c_int) :: status
-      end function c_make_beside
-
       function c_opendir(path) bind(c, name='opendir') result(directory)
          import :: c_char, c_ptr
          implicit none (type, external)
@@ -163,13 +156,6 @@ module thud_system
    end interface
 
 contains
-
-   !> Whether the process was forked from one that had called the library: it lacks the threads of the latter.
-   function is_forked() result(yes)
-      logical :: yes
-
-      yes = forked /= 0_c_int
-   end function is_forked
 
    !> The system's message for an error number.
    function get_system_message(status) result(text)

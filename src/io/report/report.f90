@@ -23,37 +23,16 @@ contains
    function get_force_csv(history, names, columns) result(text)
       type(force_history_type), intent(in) :: history
       !> Names, with units, of additional columns: [n_column].
-      character(len=*), intent(in), optional :: names(:)
+      character(len=*), intent(in) :: names(:)
       !> The additional columns: [n_time, n_column].
-      real(wp), intent(in), optional :: columns(:, :)
+      real(wp), intent(in) :: columns(:, :)
       !> Text of `force.csv`.
       character(len=:), allocatable :: text
-      character(len=:), allocatable :: header
-      real(wp), allocatable :: values(:, :)
-      integer :: n_component, n_own, i
 
-      n_component = size(history%component_name)
-      n_own = n_component + 4
-      header = 'time_s,deflection_m,velocity_m_per_s'
-      do i = 1, n_component
-         header = header//','//trim(history%component_name(i))//'_N'
-      end do
-      header = header//',elastic_force_N,floor_force_N'
-      if (present(names)) then
-         do i = 1, size(names)
-            header = header//','//trim(names(i))
-         end do
-         allocate (values(size(history%component, 1), n_own + size(names)))
-         values(:, n_own + 1:) = columns
-      else
-         allocate (values(size(history%component, 1), n_own))
-      end if
-      values(:, 1) = history%deflection
-      values(:, 2) = history%velocity
-      values(:, 3:n_component + 2) = history%component
-      values(:, n_component + 3) = history%elastic_force
-      values(:, n_own) = history%floor_force
-      text = get_history_csv(header, get_times(history), values)
+      text = get_history_csv('time_s,deflection_m,velocity_m_per_s'//listed(history%component_name, '_N') &
+         //',elastic_force_N,floor_force_N'//listed(names, ''), get_times(history), reshape([history%deflection, &
+         history%velocity, history%component, history%elastic_force, history%floor_force, columns], &
+         [size(columns, 1), 4 + size(history%component_name) + size(names)]))
    end function get_force_csv
 
    !> Additional quantities of the model against time.
@@ -62,15 +41,24 @@ contains
       type(force_history_type), intent(in) :: history
       !> Text of `model_histories.csv`.
       character(len=:), allocatable :: text
-      character(len=:), allocatable :: header
+
+      text = get_history_csv('time_s'//listed(history%model_history_name, ''), get_times(history), history%model_history)
+   end function get_model_histories_csv
+
+   !> Names of columns, each after a comma.
+   pure function listed(names, ending) result(text)
+      !> The names: [n_column].
+      character(len=*), intent(in) :: names(:)
+      !> Ending of each name.
+      character(len=*), intent(in) :: ending
+      character(len=:), allocatable :: text
       integer :: i
 
-      header = 'time_s'
-      do i = 1, size(history%model_history_name)
-         header = header//','//trim(history%model_history_name(i))
+      text = ''
+      do i = 1, size(names)
+         text = text//','//trim(names(i))//ending
       end do
-      text = get_history_csv(header, get_times(history), history%model_history)
-   end function get_model_histories_csv
+   end function listed
 
    !> Times of the samples, s: [n_time].
    pure function get_times(history) result(times)
@@ -122,9 +110,10 @@ contains
 
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
          //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '') &
-         //get_quantity_lines(history)//'/'//newline//newline//get_model_quantities('model_quantities', history) &
-         //warning_group(warning) &
-         //'&verdict'//newline &
+         //get_quantity_lines(history)//'/'//newline//newline//get_model_quantities('model_quantities', history)
+      if (size(warning) > 0) text = text//'&warnings'//newline//line('warning', join_quoted(warning), '')//'/'//newline &
+         //newline
+      text = text//'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
@@ -175,18 +164,6 @@ contains
       end do
       text = text//'/'//newline//newline
    end function get_model_quantities
-
-   !> Warnings as a namelist group.
-   function warning_group(warning) result(text)
-      !> The warnings: [n].
-      character(len=*), intent(in) :: warning(:)
-      !> The group; empty if there are none.
-      character(len=:), allocatable :: text
-
-      text = ''
-      if (size(warning) > 0) text = '&warnings'//newline//line('warning', join_quoted(warning), '') &
-         //'/'//newline//newline
-   end function warning_group
 
    !> Verdict on all values: `conforms`, `does not conform`, or `undecided` by their numerical errors.
    pure function get_verdict(criteria) result(word)
