@@ -3,7 +3,6 @@
 module thud_prony
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_fractional_loss, only: fractional_loss_type
    use thud_kinds, only: wp
    use thud_lapack, only: dgels
    use thud_text, only: to_text
@@ -112,12 +111,15 @@ contains
       end if
    end subroutine check_fractional_loss
 
-   !> Series of a fractional law from 5 to 3000 Hz: a spring, branches and a viscosity in parallel.
+   !> Series of a fractional Kelvin-Voigt law from 5 to 3000 Hz: a spring, branches and a viscosity in parallel.
    !>
-   !> Least squares of the complex power law over logarithmically spaced frequencies, relative to its magnitude. The fit
-   !> omits the spring of the law, which only reduces the relative error of the sum.
-   subroutine fit_fractional_loss(law, relative_modulus, time, viscosity)
-      type(fractional_loss_type), intent(in) :: law
+   !> The law is a spring parallel to a spring-pot, G(i omega) = G0 + c (i omega)**order. Order 1 is the classical viscosity;
+   !> near order 0 the loss factor hardly depends on frequency. Least squares of the complex power law over logarithmically
+   !> spaced frequencies, relative to its magnitude. The fit omits the spring of the law, which only reduces the relative
+   !> error of the sum.
+   subroutine fit_fractional_loss(order, loss_factor, frequency, relative_modulus, time, viscosity)
+      !> Order of the derivative; loss factor; its frequency, Hz.
+      real(wp), intent(in) :: order, loss_factor, frequency
       !> Relative moduli of the branches: [n_branch].
       real(wp), allocatable, intent(out) :: relative_modulus(:)
       !> Their relaxation times, s: [n_branch].
@@ -127,7 +129,7 @@ contains
       integer, parameter :: n_term = n_fractional + 2
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), parameter :: span = series_to/series_from*outside**2
-      real(wp) :: omega, omega_max, spring
+      real(wp) :: omega, omega_max, spring, springpot
       complex(wp) :: power
       complex(wp) :: term(n_term)
       real(wp) :: matrix(2*n_frequency, n_term), right(2*n_frequency), work(64*n_term)
@@ -138,8 +140,8 @@ contains
       do i = 1, n_frequency
          omega = 2*pi*series_from*(series_to/series_from)**((i - 1)/real(n_frequency - 1, wp))
          term = [cmplx(1.0_wp, 0.0_wp, wp), 1 - 1/cmplx(1.0_wp, omega*time, wp), cmplx(0.0_wp, omega/omega_max, wp)]
-         term = term*(omega_max/omega)**law%order
-         power = exp(cmplx(0.0_wp, pi/2*law%order, wp))
+         term = term*(omega_max/omega)**order
+         power = exp(cmplx(0.0_wp, pi/2*order, wp))
          matrix(i, :) = real(term)
          matrix(n_frequency + i, :) = aimag(term)
          right(i) = real(power)
@@ -147,8 +149,10 @@ contains
       end do
       ! The columns are independent, and the moduli are positive for any order (see the tests).
       call dgels('N', size(right), n_term, 1, matrix, size(right), right, size(right), work, size(work), info)
-      right = max(right, 0.0_wp)*law%springpot*(omega_max/law%omega)**law%order
-      spring = law%spring + right(1)
+      ! Of the spring-pot at its frequency, over the storage modulus there.
+      springpot = loss_factor/sin(pi/2*order)
+      right = max(right, 0.0_wp)*springpot*(omega_max/(2*pi*frequency))**order
+      spring = 1 - springpot*cos(pi/2*order) + right(1)
       ! The spring-pot of order 1 is a viscosity: its branches are rounding errors.
       time = pack(time, right(2:n_term - 1) > rounding*sum(right(:n_term)))
       relative_modulus = pack(right(2:n_term - 1), right(2:n_term - 1) > rounding*sum(right(:n_term)))/spring

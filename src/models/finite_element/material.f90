@@ -4,7 +4,6 @@ module thud_material
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
-   use thud_fractional_loss, only: new_fractional_loss
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, only_with, real_field
    use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
@@ -142,8 +141,8 @@ contains
       case ('kelvin_voigt')
          viscosity = options%loss_factor/omega
       case ('fractional')
-         call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
-            options%loss_frequency), relative_modulus, material%branch_time, viscosity)
+         call fit_fractional_loss(options%fractional_order, options%loss_factor, options%loss_frequency, relative_modulus, &
+            material%branch_time, viscosity)
       case ('constant_loss')
          call fit_constant_loss(options%loss_factor, relative_modulus, material%branch_time, failed)
          if (failed) then

@@ -9,7 +9,6 @@
 !> modulus.
 module thud_mode_step
    use thud_constants, only: pi
-   use thud_fractional_loss, only: new_fractional_loss
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential
    use thud_prony, only: fit_fractional_loss, get_storage_ratio
@@ -86,8 +85,7 @@ contains
       case ('rising')
          damping%retardation_time = loss_factor/(2*pi*loss_frequency)
       case ('fractional')
-         call fit_fractional_loss(new_fractional_loss(order, loss_factor, loss_frequency), damping%relative_modulus, &
-            damping%time, viscosity)
+         call fit_fractional_loss(order, loss_factor, loss_frequency, damping%relative_modulus, damping%time, viscosity)
          damping%equilibrium_ratio = 1/get_storage_ratio(damping%relative_modulus, damping%time, 2*pi*loss_frequency)
          damping%relative_modulus = damping%relative_modulus*damping%equilibrium_ratio
          damping%retardation_time = viscosity*damping%equilibrium_ratio
