@@ -281,18 +281,9 @@ contains
       integer :: n_frame
 
       n_frame = 0
-      if (self%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(self, sampling)
+      if (self%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling) &
+         /max(1, nint(self%snapshot_interval*sampling%sample_rate))
    end function get_frame_count
-
-   !> Number of samples between two snapshots, at least 1.
-   pure function get_stride(self, sampling) result(stride)
-      !> Options that ask for snapshots.
-      class(finite_element_type), intent(in) :: self
-      type(sampling_type), intent(in) :: sampling
-      integer :: stride
-
-      stride = max(1, nint(self%snapshot_interval*sampling%sample_rate))
-   end function get_stride
 
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
    function get_standard_modulus(self) result(modulus)
@@ -457,7 +448,7 @@ contains
          end if
       end associate
       check_stride = max(1, nint(check_interval*sampling%sample_rate))
-      stride = get_stride(self, sampling)
+      stride = max(1, nint(self%snapshot_interval*sampling%sample_rate))
       samples: do i = 1, size(history%floor_force)
          time = (i - 1)*interval
          if (mod(i - 1, check_stride) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')

@@ -245,43 +245,38 @@ contains
       type(force_history_type), intent(inout) :: history
       !> States what happened, when and why.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: residual
+      character(len=:), allocatable :: cause
+      real(wp) :: residual, energy
+      logical :: rests
 
       call check_interrupt(error)
       if (allocated(error)) return
+      energy = run%total_mass/2*history%impact_velocity**2
+      rests = .false.
       if (run%state%failure == cavity_closed) then
-         error = numerical_error(trim(event_prefix(time))//' the cavity has no volume left; ' &
-            //'allowed: a lower height, a stiffer ball')
+         cause = 'the cavity has no volume left; allowed: a lower height, a stiffer ball'
       else if (run%state%failure /= no_failure) then
-         error = numerical_error(trim(event_prefix(time))//' an element is turned inside out (ratio of volumes ' &
-            //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
+         cause = 'an element is turned inside out (ratio of volumes '//to_text(run%state%min_jacobian) &
+            //'); allowed: a lower height, a stiffer ball, more polar_elements'
       else if (run%contact%layer_stiffness > 0.0_wp &
          .and. run%penetration > max_penetration*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
          error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
             //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to ' &
             //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
-      else if (run%dissipated + run%contact_loss + run%friction_loss &
-         > run%total_mass/2*history%impact_velocity**2) then
-         error = numerical_error(trim(event_prefix(time))//' the ball has lost the energy of the drop and stays on the ' &
-            //'floor; allowed: less viscosity, or a higher drop')
-         error%has_short_record = .true.
+         return
+      else if (run%dissipated + run%contact_loss + run%friction_loss > energy) then
+         rests = .true.
+         cause = 'the ball has lost the energy of the drop and stays on the floor; allowed: less viscosity, or a higher drop'
       else
-         residual = abs(get_energy(run) - first_energy)/(run%total_mass/2*history%impact_velocity**2)
+         residual = abs(get_energy(run) - first_energy)/energy
          history%energy_residual = max(history%energy_residual, residual)
-         if (.not. residual < unstable_residual) then
-            history%energy_residual = huge(residual)
-            error = numerical_error(trim(event_prefix(time))//' the run is unstable (energy off by '//to_text(residual) &
-               //' of that at first touch); allowed: a smaller step_safety')
-         end if
+         if (residual < unstable_residual) return
+         history%energy_residual = huge(residual)
+         cause = 'the run is unstable (energy off by '//to_text(residual) &
+            //' of that at first touch); allowed: a smaller step_safety'
       end if
+      error = numerical_error('&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start '//cause)
+      error%has_short_record = rests
    end subroutine check_run
-
-   !> Beginning of a message with the time of an event.
-   function event_prefix(time) result(text)
-      real(wp), intent(in) :: time
-      character(len=64) :: text
-
-      text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
-   end function event_prefix
 
 end module thud_impact_record
