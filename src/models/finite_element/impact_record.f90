@@ -63,7 +63,7 @@ contains
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       type(force_history_type) :: history
-      character(len=24), parameter :: names(11) = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', &
+      character(len=24), parameter :: names(at_floor) = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', &
          'kinetic_energy_J', 'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', &
          'friction_energy_J', 'dissipated_energy_J', 'minimum_volume_ratio', 'floor_energy_J']
 
@@ -263,7 +263,6 @@ contains
          error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
             //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to ' &
             //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
-         return
       else if (run%dissipated + run%contact_loss + run%friction_loss > energy) then
          rests = .true.
          cause = 'the ball has lost the energy of the drop and stays on the floor; allowed: less viscosity, or a higher drop'
@@ -275,6 +274,7 @@ contains
          cause = 'the run is unstable (energy off by '//to_text(residual) &
             //' of that at first touch); allowed: a smaller step_safety'
       end if
+      if (.not. allocated(cause)) return
       error = numerical_error('&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start '//cause)
       error%has_short_record = rests
    end subroutine check_run
