@@ -7,7 +7,8 @@ module thud_case_answers
    use thud_compression, only: compression_type
    use thud_compute, only: compress_case, compute, results_type, scope_type
    use thud_constants, only: get_compiler, version
-   use thud_error, only: error_type
+   use thud_error, only: error_type, input_error
+   use thud_finite_element, only: finite_element_type
    use thud_kinds, only: wp
    use thud_progress_line, only: begin_progress, end_progress
    use thud_request, only: request_type
@@ -113,9 +114,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: loss_factor(:)
 
-      associate (model => case%models(get_model_number(case))%model, frequency => request%get_array('frequency'))
+      associate (frequency => request%get_array('frequency'))
          allocate (loss_factor(size(frequency)))
-         call model%get_loss_factors(case%ball, frequency, loss_factor, error)
+         select type (model => case%models(get_model_number(case))%model)
+         type is (finite_element_type)
+            call model%get_loss_factors(case%ball, frequency, loss_factor, error)
+         class default
+            error = input_error('&model: name: this model has no material with a loss factor; allowed: finite_element')
+         end select
       end associate
       if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(loss_factor), loss_factor)
    end subroutine answer_loss_factors

@@ -10,7 +10,7 @@ module thud_receiver
    implicit none (type, external)
    private
 
-   public :: advance_receiver, can_strike, get_conductance, get_mobility, get_pole_count, get_real_sum
+   public :: advance_receiver, can_strike, get_conductance, get_mobility, get_real_sum
    public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
    public :: receiver_step_type, receiver_type
 

@@ -43,7 +43,6 @@ module thud_source_model
       procedure :: compress
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
-      procedure :: get_loss_factors
    end type source_model_type
 
    abstract interface
@@ -111,21 +110,6 @@ contains
 
       limits = [get_gravity_limit(drop, history), get_size_limit(ball, history)]
    end function get_validity_limits
-
-   !> Loss factor of the material against frequency; models without a material return an error.
-   subroutine get_loss_factors(self, ball, frequency, loss_factor, error)
-      class(source_model_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      !> Frequencies, Hz: [n].
-      real(wp), intent(in) :: frequency(:)
-      !> Loss factors: [n].
-      real(wp), intent(out) :: loss_factor(:)
-      !> Set if the model has no material or the material cannot be made.
-      type(error_type), allocatable, intent(out) :: error
-
-      loss_factor = 0.0_wp
-      error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
-   end subroutine get_loss_factors
 
    !> The model and the sampling at a level of resolution; by default `refine_sampling`.
    subroutine refine(self, ball, level, coarse, sampling, refined, resolution)

@@ -264,6 +264,7 @@ contains
       class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
+      !> Number of nodes from pole to pole, of nodes through the wall, and of snapshots.
       integer :: extents(3)
       integer :: factor(2)
 
@@ -309,8 +310,11 @@ contains
    subroutine get_loss_factors(self, ball, frequency, loss_factor, error)
       class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
+      !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
+      !> Loss factors: [n].
       real(wp), intent(out) :: loss_factor(:)
+      !> Set if the material cannot be made.
       type(error_type), allocatable, intent(out) :: error
       type(material_type) :: material
       integer :: i
