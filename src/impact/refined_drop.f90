@@ -57,7 +57,8 @@ contains
       !> The structure under the source (default: a rigid floor).
       type(receiver_type), intent(in), optional :: receiver
       class(source_model_type), allocatable :: shared, refined
-      type(force_history_type) :: drops(0:max_level), none
+      type(force_history_type) :: drops(0:max_level)
+      type(force_history_type) :: none
       type(motion_type), allocatable :: motion
       type(sampling_type) :: refined_sampling
       type(resolution_type) :: resolution

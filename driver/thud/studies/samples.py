@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
 
 
-# Numbers of samples in a block, which takes some tenths of a second, of elements more: predicted by a
-# surrogate, by the batch of shells, by other models, and by elements.
+# Numbers of samples in a block, which takes some tenths of a second, of elements more: predicted by
+# a surrogate, by the batch of shells, by other models, and by elements.
 _SURROGATE_BLOCK_SIZE, _BATCH_BLOCK_SIZE, _BLOCK_SIZE, _ELEMENT_BLOCK_SIZE = 2**16, 2**14, 32, 1
 
 
