@@ -151,7 +151,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     n_thread = 1 if _FORKED else n_thread
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
     max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
-    size = min(_FIRST_BLOCK * n_thread, max(1, max_count))
+    block_size = min(_FIRST_BLOCK * n_thread, max(1, max_count))
     blocks: list[dict[str, NDArray[Any]]] = []
     try:
         # Raises MemoryError before the computation if the results do not fit.
@@ -159,14 +159,14 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
             start = 0
             while start < len(numbers) or not blocks:
-                block = numbers[start : start + size]
+                block = numbers[start : start + block_size]
                 began = time.perf_counter()
                 blocks.append(
                     _compute(content, columns, block, n_thread, levels=levels, forces=forces)
                 )
                 start += len(block)
                 rate = len(block) / (time.perf_counter() - began)
-                size = int(np.clip(_CALL_TIME * rate, 1, max(1, max_count)))
+                block_size = int(np.clip(_CALL_TIME * rate, 1, max(1, max_count)))
                 bar.update(len(block))
         results = (
             blocks[0]
