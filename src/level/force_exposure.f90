@@ -14,7 +14,7 @@ module thud_force_exposure
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_text, only: join_quoted, quoted, to_text
-   use thud_transform, only: get_autocorrelation, get_power_spectrum
+   use thud_transform, only: get_autocorrelation
    implicit none (type, external)
    private
 
@@ -58,14 +58,8 @@ contains
       call check_record(force, sample_rate, bands, error)
       if (allocated(error)) return
       ! Zeros at the ends add no energy but take time.
-      first = 1
-      do while (.not. abs(force(first)) > 0.0_wp)
-         first = first + 1
-      end do
-      last = size(force)
-      do while (.not. abs(force(last)) > 0.0_wp)
-         last = last - 1
-      end do
+      first = findloc(abs(force) > 0.0_wp, .true., dim=1)
+      last = findloc(abs(force) > 0.0_wp, .true., dim=1, back=.true.)
       select case (method)
       case ('exact')
          energy = get_energy(force(first:last), sample_rate, bands%lower, bands%upper, 0.0_wp)
@@ -124,22 +118,13 @@ contains
       type(band_type), intent(in) :: bands(:)
       !> Energy of each band, N^2 s: [n_band].
       real(wp) :: energy(size(bands))
-      real(wp), allocatable :: power(:)
       real(wp) :: spacing
-      integer, dimension(size(bands)) :: first, last
-      integer :: length, i
+      integer :: length
 
       length = nint(sample_rate)*ceiling(real(size(force), wp)/nint(sample_rate))
       spacing = sample_rate/length
-      first = ceiling(bands%lower/spacing)
-      last = floor(bands%upper/spacing)
-      ! For short records the autocorrelation is faster than the transform of the window.
-      if (3*size(force) < length) then
-         energy = get_energy(force, sample_rate, (first - 0.5_wp)*spacing, (last + 0.5_wp)*spacing, spacing)
-      else
-         call get_power_spectrum(force, length, power)
-         energy = [(2*sum(power(first(i) + 1:last(i) + 1))*spacing/sample_rate**2, i=1, size(bands))]
-      end if
+      energy = get_energy(force, sample_rate, (ceiling(bands%lower/spacing) - 0.5_wp)*spacing, &
+         (floor(bands%upper/spacing) + 0.5_wp)*spacing, spacing)
    end function get_bin_energy
 
    !> Energies of a record between band edges, N^2 s; see the description of the module.

@@ -7,7 +7,7 @@ module thud_transform
    implicit none (type)
    private
 
-   public :: get_autocorrelation, get_low_pass, get_power_spectrum, get_signal
+   public :: get_autocorrelation, get_low_pass, get_signal
 
    include 'fftw3.f03'
 
@@ -79,23 +79,6 @@ contains
       call transform_back(spectrum, signal, plans)
       low = signal(:size(record))/length
    end subroutine get_low_pass
-
-   !> Squared magnitude of the transform of a zero-padded record.
-   subroutine get_power_spectrum(record, length, power)
-      !> Samples: [n].
-      real(wp), intent(in) :: record(:)
-      !> Length of the transform, at least n.
-      integer, intent(in) :: length
-      !> |X(k)|^2 for the bins k = 0 to length/2, in squared units of the record.
-      real(wp), allocatable, intent(out) :: power(:)
-      real(wp), allocatable :: signal(:)
-      complex(wp), allocatable :: spectrum(:)
-      type(plans_type) :: plans
-
-      call transform_padded(record, length, signal, spectrum, plans)
-      call release(plans)
-      power = real(spectrum)**2 + aimag(spectrum)**2
-   end subroutine get_power_spectrum
 
    !> Real signal of a spectrum: the sum of c_k exp(2 pi i k n/length) over all k, negative ones included, over the length.
    subroutine get_signal(spectrum, signal)
