@@ -144,7 +144,7 @@ contains
       call find_columns(case, split(keys, nint(request%get_number('key_count'))), columns, error)
       if (allocated(error)) return
       call acquire_sweep(sweep)
-      call new_sweep(case, columns, request%get_number('levels') > 0.0_wp, sweep)
+      call new_sweep(case, request%get_number('levels') > 0.0_wp, sweep)
       allocate (values, source=request%get_array('values'))
       call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
          nint(request%get_number('threads')), request%get_number('forces') > 0.0_wp, sweep, error)

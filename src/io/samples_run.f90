@@ -109,7 +109,7 @@ contains
       character(len=:), allocatable :: text
       integer :: n, i
 
-      call new_sweep(case, table%columns, .true., sweep)
+      call new_sweep(case, .true., sweep)
       allocate (values(size(table%columns), chunk_size*threads))
       call begin_file(results, result_file, error)
       call get_sample_header(table, sweep, text)

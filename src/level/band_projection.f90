@@ -109,24 +109,20 @@ contains
    end function get_rank
 
    !> Matrices for a length, a sampling rate and bands.
-   subroutine new_band_projection(n_sample, sample_rate, bands, projection, failed)
+   subroutine new_band_projection(n_sample, sample_rate, bands, projection)
       !> Samples of the records, even.
       integer, intent(in) :: n_sample
       !> Samples per second, Hz; at least twice the highest edge.
       real(wp), intent(in) :: sample_rate
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> The matrices; n_sample = 0 if LAPACK fails.
+      !> The matrices; n_sample = 0 if LAPACK does not find the sequences.
       type(band_projection_type), intent(out) :: projection
-      !> True if LAPACK does not find the sequences.
-      logical, intent(out) :: failed
       real(wp), allocatable :: node(:), root_weight(:), spectrum_weight(:), angle(:, :)
       integer :: i
 
-      projection%n_sample = n_sample
-      call set_sequences(projection, maxval(bands%upper)/sample_rate, failed)
-      if (failed) projection%n_sample = 0
-      if (failed) return
+      call set_sequences(projection, n_sample, maxval(bands%upper)/sample_rate)
+      if (projection%n_sample == 0) return
       call get_nodes(bands, real(n_sample, wp)/sample_rate, node, root_weight, projection%last_node)
       ! Angles from the middle of the record.
       allocate (angle(n_sample/2, size(node)))
@@ -142,26 +138,26 @@ contains
    end subroutine new_band_projection
 
    !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
-   subroutine set_sequences(projection, half_width, failed)
+   subroutine set_sequences(projection, n, half_width)
+      !> The matrices; n_sample stays 0 if LAPACK does not find the sequences.
       type(band_projection_type), intent(inout) :: projection
+      !> Samples of the records, even.
+      integer, intent(in) :: n
       real(wp), intent(in) :: half_width
-      !> True if LAPACK does not find them.
-      logical, intent(out) :: failed
-      real(wp), dimension(projection%n_sample) :: diagonal, off_diagonal, values
-      real(wp) :: work(20*projection%n_sample)
+      real(wp), dimension(n) :: diagonal, off_diagonal, values
+      real(wp) :: work(20*n)
       real(wp), allocatable :: vectors(:, :)
-      integer :: support(2*projection%n_sample), integer_work(10*projection%n_sample)
-      integer :: i, n, rank, n_value, status
+      integer :: support(2*n), integer_work(10*n)
+      integer :: i, rank, n_value, status
 
-      n = projection%n_sample
       rank = get_rank(n, half_width)
       diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
       off_diagonal = [(real(i, wp)*(n - i)/2, i=1, n)]
       allocate (vectors(n, rank))
       call dstevr('V', 'I', n, diagonal, off_diagonal, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, n_value, values, vectors, &
          n, support, work, size(work), integer_work, size(integer_work), status)
-      failed = status /= 0 .or. n_value /= rank
-      if (failed) return
+      if (status /= 0 .or. n_value /= rank) return
+      projection%n_sample = n
       ! The largest eigenvalue belongs to the first sequence, which is symmetric; then the symmetry alternates.
       vectors = vectors(:, rank:1:-1)
       projection%even = (vectors(:n/2, 1::2) + vectors(n:n/2 + 1:-1, 1::2))/2

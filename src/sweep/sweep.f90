@@ -4,12 +4,14 @@
 !> the work. The results of a sample do not depend on the number of threads, the other samples or its index.
 module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_batch_samples, only: fill_samples, suits_batch
+   use thud_band_projection, only: get_window_length
+   use thud_cache_line, only: get_aligned_start, line_length
    use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
    use thud_column, only: column_type
    use thud_compute, only: assess_floor, compute_impact, drop_on_floor, get_assessed_force, impact_type, &
       prepare_floor, scope_type
-   use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
+   use thud_ensemble, only: block_result_type, fill_samples, get_record, projections_type, set_projections, solve_drops, &
+      suits_batch
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, key_length
    use thud_floor_columns, only: column_name_length, get_floor_columns, get_floor_values
@@ -23,8 +25,9 @@ module thud_sweep
    use thud_registry, only: floor_names
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count
-   use thud_shell_samples, only: sample_type
-   use thud_source_limits, only: conforms, get_source_limits, source_limits_type
+   use thud_shell_samples, only: block_size, get_blocks, sample_type
+   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_source_limits, &
+      source_limits_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -87,21 +90,17 @@ module thud_sweep
 contains
 
    !> Prepares for many samples of a case.
-   subroutine new_sweep(case, columns, levels, sweep)
+   subroutine new_sweep(case, levels, sweep)
       type(case_type), intent(in), target :: case
-      !> Keys in which the samples differ: [n_column].
-      type(column_type), intent(in) :: columns(:)
       !> Levels and verdicts are wanted.
       logical, intent(in) :: levels
       !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
-      type(projections_type) :: wanted
 
       call get_level_bands(case%bands, sweep%bands, sweep%first_band)
       sweep%levels = levels
       sweep%floor_column = get_floor_columns(case, sweep%bands(sweep%first_band:))
-      wanted = new_projections(case%sampling%sample_rate, sweep%bands(octave_count + 1:), get_sample_count(case%sampling))
-      if (.not. are_alike(wanted, sweep%projections)) sweep%projections = wanted
+      call set_projections(sweep%projections, case%sampling%sample_rate, sweep%bands, get_sample_count(case%sampling))
    end subroutine new_sweep
 
    !> Takes the sweep of an earlier call.
@@ -304,8 +303,8 @@ contains
          if (.not. sweep%levels) return
          sweep%level(:, :, sample) = assessment%level
          sweep%conforms(:, sample) = all(conforms(assessment%criteria), dim=1)
+         call set_verdict(case, assessment%criteria(:, 1), sample, sweep)
       end associate
-      call set_verdict(case, sample, sweep)
    end subroutine solve_sample
 
    !> Computes the drop on a rigid floor, unless the sample before differs only in floor and room; prepares the floor, unless
@@ -347,25 +346,24 @@ contains
    end function is_of_floor
 
    !> Sets margin and verdict of a sample, by the assessed force.
-   subroutine set_verdict(case, sample, sweep)
+   subroutine set_verdict(case, criteria, sample, sweep)
       !> The case of the sample.
       type(case_type), intent(in) :: case
+      !> Criteria of the source, octaves first, of which only the ranges are used: [criterion_count].
+      type(criterion_type), intent(in) :: criteria(:)
       !> Index of the sample; its levels must have been computed.
       integer, intent(in) :: sample
       type(sweep_type), intent(inout) :: sweep
-      type(source_limits_type) :: limits
-      type(error_type), allocatable :: error
       integer :: force
 
       force = get_assessed_force(case)
-      call get_source_limits(case%source, limits, error)
       sweep%verdict(sample) = sweep%conforms(force, sample)
-      associate (level => sweep%level(:octave_count, force, sample))
-         sweep%margin(sample) = minval(min(level - limits%lower_level, limits%upper_level - level))
+      associate (level => sweep%level(:octave_count, force, sample), octaves => criteria(:octave_count))
+         sweep%margin(sample) = minval(min(level - octaves%lower, octaves%upper - level))
       end associate
    end subroutine set_verdict
 
-   !> Computes samples of the shell model in batches.
+   !> Computes samples of the shell model in batches; threads share blocks of samples.
    subroutine solve_batch(case, columns, values, threads, sweep, error)
       type(case_type), intent(in), target :: case
       !> Keys in which the samples differ: [n_column].
@@ -373,22 +371,93 @@ contains
       !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
       integer, intent(in) :: threads
+      !> The sweep; samples without results have the status 1.
       type(sweep_type), intent(inout) :: sweep
-      !> Set if the batch cannot be computed.
+      !> Set if the sampling is invalid, its records do not fit into memory, the source is unknown, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
-      type(sample_type), allocatable :: samples(:)
-      logical, allocatable :: computed(:)
-      integer :: i
+      type(sample_type) :: samples(size(values, 2))
+      type(source_limits_type) :: limits
+      type(criterion_type) :: criteria(criterion_count)
+      logical :: valid(size(values, 2))
+      integer, allocatable :: order(:), first(:)
 
-      allocate (samples(size(values, 2)), computed(size(values, 2)))
-      call fill_samples(case, columns, values, samples)
-      call solve_ensemble(samples, case%sampling, trim(case%source), threads, sweep%levels, sweep%projections, computed, &
-         sweep%quantity, sweep%level, sweep%conforms, sweep%force, error)
+      call check_sampling(case%sampling, error)
+      if (.not. allocated(error)) call get_source_limits(case%source, limits, error)
       if (allocated(error)) return
-      sweep%status = merge(0, 1, computed)
-      do i = 1, size(samples)
-         if (sweep%levels .and. computed(i)) call set_verdict(case, i, sweep)
-      end do
+      criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
+      call fill_samples(case, columns, values, samples)
+      call get_blocks(samples, valid, order, first)
+      sweep%status = 1
+      !$omp parallel num_threads(threads)
+      call solve_blocks()
+      !$omp end parallel
+
+   contains
+
+      !> Computes the blocks of one thread. Memory beyond the longest contact is never touched.
+      subroutine solve_blocks()
+         type(block_result_type) :: block
+         type(error_type), allocatable :: thread_error
+         real(wp), allocatable :: force(:), folded(:, :)
+         integer :: i, n_row, n_time, start, status
+
+         start = 1
+         n_row = force_count*block_size
+         n_time = get_window_length(size(sweep%projections%window))
+         allocate (force(n_row*n_time + line_length), folded(n_row, n_time), stat=status)
+         if (status /= 0) then
+            thread_error = input_error('&sampling: duration = '//to_text(case%sampling%duration) &
+               //' s at sample_rate = '//to_text(case%sampling%sample_rate)//' Hz gives the forces of ' &
+               //to_text(block_size)//' samples no space in memory; allowed: shorter records, or fewer threads')
+         else
+            start = get_aligned_start(force)
+         end if
+         !$omp do schedule(dynamic)
+         do i = 1, size(first) - 1
+            if (.not. allocated(thread_error)) call check_interrupt(thread_error)
+            if (allocated(thread_error)) cycle
+            associate (indices => order(first(i):first(i + 1) - 1))
+               call solve_drops(samples(indices), case%sampling, criteria, sweep%levels, sweep%projections, force(start), &
+                  folded, block)
+               call store_block(case, criteria, indices, force(start), block, sweep)
+            end associate
+         end do
+         !$omp end do
+         !$omp critical (thud_sweep_error)
+         if (allocated(thread_error)) error = thread_error
+         !$omp end critical (thud_sweep_error)
+      end subroutine solve_blocks
+
    end subroutine solve_batch
+
+   !> Stores the results of one block.
+   subroutine store_block(case, criteria, indices, force, block, sweep)
+      type(case_type), intent(in) :: case
+      !> Criteria of the source: [criterion_count].
+      type(criterion_type), intent(in) :: criteria(:)
+      !> Indices of the samples: [n_in_block].
+      integer, intent(in) :: indices(:)
+      type(block_result_type), intent(in) :: block
+      !> Forces of the block, N: [force_count block_size, n_written].
+      real(wp), intent(in) :: force(force_count*block_size, block%n_written)
+      type(sweep_type), intent(inout) :: sweep
+      integer :: i, j
+
+      do i = 1, size(indices)
+         if (.not. block%computed(i)) cycle
+         associate (sample => indices(i))
+            sweep%status(sample) = 0
+            sweep%quantity(:, sample) = block%quantity(:, i)
+            sweep%level(:, :, sample) = not_a_number
+            do j = 1, merge(force_count, 0, size(sweep%force) > 0)
+               sweep%force(:, j, sample) = get_record(force, i, j, block%n_written, size(sweep%force, 1))
+            end do
+            if (.not. sweep%levels) cycle
+            sweep%level(:, :, sample) = block%level(:, :, i)
+            sweep%conforms(:, sample) = block%conforms(:, i)
+            call set_verdict(case, criteria, sample, sweep)
+         end associate
+      end do
+   end subroutine store_block
 
 end module thud_sweep

@@ -132,8 +132,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ensemble = root / "src/sweep/ensemble.f90"
     batch = example(page, "fortran batch").rstrip("\n")
     insert(ensemble, "outcome%restitution, outcome%impulse", batch)
-    insert(ensemble, "   use thud_power, only: not_a_number\n",
-           "   use thud_quantities, only: get_mid_peak\n")  # fmt: skip
+    insert(ensemble, "use thud_quantities, only: ", "get_mid_peak, ")
     drop = root / "driver/thud/recordings/measured_drop.py"
     insert(drop, '"impulse", "effective_mass"', ', "mid_peak"')
     insert(drop, "    effective_mass: Estimate\n", "    mid_peak: Estimate\n")
