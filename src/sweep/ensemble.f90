@@ -150,6 +150,7 @@ contains
       real(wp), intent(inout) :: folded(:, :)
       type(block_result_type), intent(out) :: block
       type(sample_outcome_type) :: outcomes(size(samples))
+      type(criterion_type) :: tested(size(criteria))
       integer :: window_index(size(samples))
       integer :: i, j, window
 
@@ -171,11 +172,17 @@ contains
       do window = minval(window_index, mask=window_index > 0), maxval(window_index)
          if (any(window_index == window)) call set_levels(projections, window, window_index == window, force, folded, block)
       end do
+      tested = criteria
       do i = 1, size(samples)
          if (.not. block%computed(i)) cycle
          do j = 1, force_count
-            block%conforms(j, i) = is_conforming(criteria, samples(i), outcomes(i), block%level(:, j, i), &
-               get_record(force, i, j, block%n_written, get_sample_count(sampling)), sampling%sample_rate)
+            tested%value = [block%level(:octave_count, j, i), outcomes(i)%contact_time, outcomes(i)%restitution, 1.0_wp, &
+               samples(i)%ball%mass, samples(i)%drop%height]
+            if (.not. all(conforms(tested))) cycle
+            ! Peaks are counted last, as this takes longer than all other criteria.
+            tested(octave_count + 3)%value = real(get_peak_count(get_record(force, i, j, block%n_written, &
+               get_sample_count(sampling)), sampling%sample_rate), wp)
+            block%conforms(j, i) = conforms(tested(octave_count + 3))
          end do
       end do
    end subroutine solve_drops
@@ -216,30 +223,6 @@ contains
          end do
       end do
    end subroutine set_levels
-
-   !> Whether a sample meets all criteria. Peaks are counted last, as this takes longer than all other criteria.
-   function is_conforming(criteria, sample, outcome, levels, force, sample_rate) result(met)
-      !> The criteria, of which only the ranges are used: [criterion_count].
-      type(criterion_type), intent(in) :: criteria(:)
-      type(sample_type), intent(in) :: sample
-      type(sample_outcome_type), intent(in) :: outcome
-      !> Levels, dB, octaves first: [n_band].
-      real(wp), intent(in) :: levels(:)
-      !> The force, N: [n_time].
-      real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      logical :: met
-      type(criterion_type) :: tested(size(criteria))
-
-      tested = criteria
-      tested%value = [levels(:octave_count), outcome%contact_time, outcome%restitution, 1.0_wp, sample%ball%mass, &
-         sample%drop%height]
-      met = all(conforms(tested))
-      if (.not. met) return
-      tested(octave_count + 3)%value = real(get_peak_count(force, sample_rate), wp)
-      met = conforms(tested(octave_count + 3))
-   end function is_conforming
 
    !> One force of one sample, N: [n_time].
    pure function get_record(force, sample, number, n_written, n_time) result(record)
