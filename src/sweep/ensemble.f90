@@ -206,8 +206,9 @@ contains
 
       !$omp critical (thud_projections)
       associate (projection => projections%window(window), length => get_window_length(window))
-         if (projection%n_sample == 0 .and. is_projection_fast(length, projections%sample_rate, projections%bands)) &
+         if (projection%n_sample == 0 .and. is_projection_fast(length, projections%sample_rate, projections%bands)) then
             call new_band_projection(length, projections%sample_rate, projections%bands, projection)
+         end if
          has_matrices = projection%n_sample > 0
       end associate
       !$omp end critical (thud_projections)

@@ -399,12 +399,14 @@ contains
          type(block_result_type) :: block
          type(error_type), allocatable :: thread_error
          real(wp), allocatable :: force(:), folded(:, :)
+         character(len=128) :: message
          integer :: i, n_row, n_time, start, status
 
          start = 1
          n_row = force_count*block_size
          n_time = get_window_length(size(sweep%projections%window))
-         allocate (force(n_row*n_time + line_length), folded(n_row, n_time), stat=status)
+         allocate (force(n_row*n_time + line_length), stat=status, errmsg=message)
+         if (status == 0) allocate (folded(n_row, n_time), stat=status, errmsg=message)
          if (status /= 0) then
             thread_error = input_error('&sampling: duration = '//to_text(case%sampling%duration) &
                //' s at sample_rate = '//to_text(case%sampling%sample_rate)//' Hz gives the forces of ' &
