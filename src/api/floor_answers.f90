@@ -24,7 +24,7 @@ module thud_floor_answers
    use thud_request, only: request_type
    use thud_result_bundle, only: add_history, add_room_level
    use thud_room, only: check_below, get_rating_index, get_room_bands, room_level_type, use_standard_positions
-   use thud_room_prediction, only: get_area, get_box, get_positions, predict_room
+   use thud_room_prediction, only: get_area, get_box, place, predict_room
    implicit none (type, external)
    private
 
@@ -152,16 +152,15 @@ contains
       type(floor_modes_type) :: modes
       type(plate_type) :: plate
       type(box_type) :: box
-      real(wp), allocatable :: ball(:, :), microphone(:, :)
 
       call get_modes_and_box(case, modes, plate, box, error)
       if (allocated(error)) return
       associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
-         call get_positions(use_standard_positions(case%room, get_rating_index(case%room)), box, ball, microphone)
-         if (size(stated_ball) > 0) ball = reshape(stated_ball, [2, size(stated_ball)/2])
-         if (size(stated_microphone) > 0) microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
+         call place(use_standard_positions(case%room, get_rating_index(case%room)), box)
+         if (size(stated_ball) > 0) box%ball = reshape(stated_ball, [2, size(stated_ball)/2])
+         if (size(stated_microphone) > 0) box%microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
       end associate
-      call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), ball, microphone, &
+      call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), &
          request%get_number('pressure') > 0.0_wp, .true., room, request%get_number('highest', get_crossover(box)))
       if (.not. all(ieee_is_finite(room%mean))) then
          error = input_error('balls: all positions lie on rigid supports, which do not move; allowed: at least one ' &
@@ -169,8 +168,8 @@ contains
          return
       end if
       call bundle%add_array('sides', [3], box%sides)
-      call bundle%add_array('ball', shape(ball), ball)
-      call bundle%add_array('microphone', shape(microphone), microphone)
+      call bundle%add_array('ball', shape(box%ball), box%ball)
+      call bundle%add_array('microphone', shape(box%microphone), box%microphone)
       call bundle%add_array('frequency', [room%n_band], box%bands(:room%n_band)%nominal)
       call bundle%add_array('level', shape(room%level), room%level)
       call bundle%add_array('mean', shape(room%mean), room%mean)

@@ -12,8 +12,7 @@ module thud_room_prediction
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_modal_radiation, only: get_modal_radiation, get_strike_points, modal_radiation_type
-   use thud_modal_room, only: box_type, get_crossover, get_highest_frequency, get_modal_room, &
-      get_standard_positions, modal_room_type, n_standard
+   use thud_modal_room, only: box_type, get_crossover, get_highest_frequency, get_modal_room, modal_room_type, place_standard
    use thud_plate, only: get_plate_radiation, plate_type
    use thud_room, only: add_ratings, check_below, get_completed_room, get_rating_index, get_reverberation_times, &
       get_room_bands, get_room_level, modal_radiation, positions_of_rating, room_level_type, room_type, &
@@ -22,7 +21,7 @@ module thud_room_prediction
    implicit none (type, external)
    private
 
-   public :: get_area, get_box, get_positions, predict_room
+   public :: get_area, get_box, place, predict_room
 
    !> Number of even positions of ball and of microphone, and their distance from the walls, m (ISO 16283-2).
    integer, parameter :: n_even = 16
@@ -128,8 +127,8 @@ contains
       end associate
       do i = 1, 2
          if (i == 1 .or. case%room%positions == positions_of_rating) then
-            call get_positions(use_standard_positions(case%room, i), box, ball, microphone)
-            call get_modal_room(modes, box, force, sample_rate, ball, microphone, .false., .false., modal)
+            call place(use_standard_positions(case%room, i), box)
+            call get_modal_room(modes, box, force, sample_rate, .false., .false., modal)
          end if
          associate (n => modal%n_band)
             prediction%n_modal = n
@@ -221,29 +220,26 @@ contains
       bare%walls%lengths%count = 0
    end function get_bare_room
 
-   !> Positions of ball and microphone, from the corner of the room, m.
-   subroutine get_positions(are_standard, box, ball, microphone)
-      !> Those of KS F 2810-2, not even ones.
+   !> Places ball and microphone.
+   subroutine place(are_standard, box)
+      !> At the positions of KS F 2810-2, not at even ones.
       logical, intent(in) :: are_standard
-      type(box_type), intent(in) :: box
-      !> Positions: [2, n_ball], [3, n_microphone].
-      real(wp), allocatable, intent(out) :: ball(:, :), microphone(:, :)
+      type(box_type), intent(inout) :: box
       real(wp), allocatable :: even(:, :)
       real(wp) :: distance(3)
       integer :: i
 
       if (are_standard) then
-         allocate (ball(2, n_standard), microphone(3, n_standard))
-         call get_standard_positions(box, ball, microphone)
+         call place_standard(box)
          return
       end if
       call get_strike_points(2*n_even, even)
       distance = min(even_distance, box%sides/4)
       ! Every other point is one of the ball; heights are in another order than the other coordinates.
-      ball = spread(distance(:2), 2, n_even) + spread(box%sides(:2) - 2*distance(:2), 2, n_even)*even(:, 1::2)
-      microphone = reshape([(distance(:2) + (box%sides(:2) - 2*distance(:2))*even(:, 2*i), &
+      box%ball = spread(distance(:2), 2, n_even) + spread(box%sides(:2) - 2*distance(:2), 2, n_even)*even(:, 1::2)
+      box%microphone = reshape([(distance(:2) + (box%sides(:2) - 2*distance(:2))*even(:, 2*i), &
          distance(3) + (box%sides(3) - 2*distance(3))*modulo(0.5_wp + 7*(i - 0.5_wp)/n_even, 1.0_wp), i=1, n_even)], &
          [3, n_even])
-   end subroutine get_positions
+   end subroutine place
 
 end module thud_room_prediction

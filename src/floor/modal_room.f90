@@ -16,8 +16,7 @@ module thud_modal_room
    implicit none (type, external)
    private
 
-   public :: box_type, get_crossover, get_highest_frequency, get_modal_room, get_standard_positions, modal_room_type
-   public :: n_standard
+   public :: box_type, get_crossover, get_highest_frequency, get_modal_room, modal_room_type, place_standard
 
    !> Number of overlapping modes of the room above which the sound is statistical.
    real(wp), parameter :: overlap_limit = 3.0_wp
@@ -47,7 +46,7 @@ module thud_modal_room
    !> Distance of standard positions from the walls, m, and height of the microphones, m (KS F 2810-2).
    real(wp), parameter :: wall_distance = 0.75_wp, microphone_height = 1.2_wp
 
-   !> The room.
+   !> The room, and positions in it.
    type :: box_type
       !> Length, width and height, m.
       real(wp) :: sides(3) = 0.0_wp
@@ -57,6 +56,8 @@ module thud_modal_room
       !> One-third-octave bands and the reverberation times in them, s: [n_band].
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: reverberation_time(:)
+      !> Positions of the ball on the floor and of the microphone, from the corner of the room, m: [2, n_ball], [3, n_mic].
+      real(wp), allocatable :: ball(:, :), microphone(:, :)
    end type box_type
 
    !> Levels at positions.
@@ -97,8 +98,6 @@ module thud_modal_room
       real(wp) :: highest = 0.0_wp
       !> Half waves along length and width: [n_pair].
       integer, allocatable :: lx(:), ly(:)
-      !> Positions of the microphones, m: [3, n_microphone].
-      real(wp), allocatable :: microphone(:, :)
       !> What is coupled, by the parities of the half waves.
       type(group_type) :: group(4)
    end type coupled_type
@@ -133,33 +132,24 @@ contains
       frequency = floor_ratio*room_ratio*maxval([0.0_wp, pack(box%bands%upper, box%bands%center <= get_crossover(box))])
    end function get_highest_frequency
 
-   !> Standard positions: center and four points near the corners (KS F 2810-2).
-   pure subroutine get_standard_positions(box, ball, microphone)
-      type(box_type), intent(in) :: box
-      !> Positions of the ball, from the corner of the room, m: [2, 5].
-      real(wp), intent(out) :: ball(2, n_standard)
-      !> Positions of the microphone, m: [3, 5].
-      real(wp), intent(out) :: microphone(3, n_standard)
+   !> Places ball and microphone at the standard positions: center and four points near the corners (KS F 2810-2).
+   pure subroutine place_standard(box)
+      type(box_type), intent(inout) :: box
       real(wp), parameter :: corner(2, n_standard) = reshape([0, 0, -1, -1, 1, -1, -1, 1, 1, 1], [2, n_standard])
       integer :: i
 
-      do i = 1, 2
-         ball(i, :) = box%sides(i)/2 + corner(i, :)*(box%sides(i)/2 - min(wall_distance, box%sides(i)/4))
-      end do
-      microphone(1:2, :) = ball
-      microphone(3, :) = min(microphone_height, box%sides(3)/2)
-   end subroutine get_standard_positions
+      box%ball = reshape([(box%sides(:2)/2 + corner(:, i)*(box%sides(:2)/2 - min(wall_distance, box%sides(:2)/4)), &
+         i=1, n_standard)], [2, n_standard])
+      box%microphone = reshape([(box%ball(:, i), min(microphone_height, box%sides(3)/2), i=1, n_standard)], [3, n_standard])
+   end subroutine place_standard
 
    !> Levels at positions for a force on the floor.
-   subroutine get_modal_room(modes, box, force, sample_rate, ball, microphone, with_pressure, with_energies, room, &
-      max_frequency)
+   subroutine get_modal_room(modes, box, force, sample_rate, with_pressure, with_energies, room, max_frequency)
       type(floor_modes_type), intent(in) :: modes
       type(box_type), intent(in) :: box
       !> Force on the floor, N: [n_force], and samples per second, Hz.
       real(wp), intent(in) :: force(:)
       real(wp), intent(in) :: sample_rate
-      !> Positions of the ball on the floor and of the microphone, from the corner of the room, m: [2, n_ball], [3, n_mic].
-      real(wp), intent(in) :: ball(:, :), microphone(:, :)
       !> Also return the sound pressure, and the energies.
       logical, intent(in) :: with_pressure, with_energies
       type(modal_room_type), intent(out) :: room
@@ -170,10 +160,11 @@ contains
       complex(wp), allocatable :: spectrum(:), sound(:, :, :)
       integer, allocatable :: moving(:)
       real(wp) :: duration, slowest
-      integer :: i, j, n_sample, n_line
+      integer :: i, j, n_sample, n_line, n_ball, n_microphone
 
       coupled%box = box
-      coupled%microphone = microphone
+      n_ball = size(box%ball, 2)
+      n_microphone = size(box%microphone, 2)
       room%n_band = count(box%bands%center <= get_crossover(box))
       if (present(max_frequency)) room%n_band = count(box%bands%center <= max_frequency)
       ! Bands that the modes of the floor do not reach are statistical.
@@ -195,30 +186,31 @@ contains
          if (.not. with_pressure) slowest = max(minval(decay, omega > pi*box%bands(1)%lower), slowest)
          duration = 0.5_wp + 6*log(10.0_wp)/min(slowest, 6*log(10.0_wp)/maxval(box%reverberation_time))
          n_line = int(coupled%highest*duration)
-         if (get_room_mode_count(box, coupled%highest)*n_line <= max_values) exit
+         ! The number of modes of the room is about that of the half waves in an eighth of an ellipsoid.
+         if (pi/6*product(2*coupled%highest/box%air%sound_speed*box%sides + 1)*n_line <= max_values) exit
          room%n_band = room%n_band - 1
       end do
-      allocate (room%level(room%n_band, size(microphone, 2), size(ball, 2)))
+      allocate (room%level(room%n_band, n_microphone, n_ball))
       allocate (room%mean(room%n_band), room%spread(room%n_band))
-      allocate (room%floor_energy(size(ball, 2), 2), room%room_energy(size(ball, 2), 2), source=0.0_wp)
+      allocate (room%floor_energy(n_ball, 2), room%room_energy(n_ball, 2), source=0.0_wp)
       if (room%n_band == 0) return
       n_sample = 128*ceiling(sample_ratio*coupled%highest*duration/128)
       room%sample_rate = n_sample/duration
       room%floor_modes = size(coupled%pole)
       frequency = [(i, i=1, n_line)]/duration
       spectrum = get_spectrum(force, sample_rate, frequency)
-      coupled%gain = get_mode_values(coupled%floor%modes, 1, box%corner(1) + ball(1, :), box%corner(2) + ball(2, :))
+      coupled%gain = get_mode_values(coupled%floor%modes, 1, box%corner(1) + box%ball(1, :), &
+         box%corner(2) + box%ball(2, :))
       ! Balls on a rigid support move nothing: nobody drops them there.
-      moving = pack([(j, j=1, size(ball, 2))], &
-         maxval(abs(coupled%gain), dim=1) > 1.0e-6_wp*maxval(abs(coupled%gain)))
+      moving = pack([(j, j=1, n_ball)], maxval(abs(coupled%gain), dim=1) > 1.0e-6_wp*maxval(abs(coupled%gain)))
       coupled%gain = get_unmixed(coupled%floor%modes%block, coupled%gain)
       call couple(coupled)
       call get_sound(coupled, frequency, spectrum, with_energies, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
       if (with_pressure) then
-         allocate (room%pressure(n_sample, size(microphone, 2), size(ball, 2)))
-         do j = 1, size(ball, 2)
-            do i = 1, size(microphone, 2)
+         allocate (room%pressure(n_sample, n_microphone, n_ball))
+         do j = 1, n_ball
+            do i = 1, n_microphone
                call get_signal([(0.0_wp, 0.0_wp), sound(:, i, j)*room%sample_rate], room%pressure(:, i, j))
             end do
          end do
@@ -285,7 +277,7 @@ contains
       integer :: before, i, k, n, n_ball, n_microphone
 
       n_ball = size(coupled%gain, 2)
-      n_microphone = size(coupled%microphone, 2)
+      n_microphone = size(coupled%box%microphone, 2)
       allocate (sound(size(frequency), n_microphone, n_ball))
       do before = 0, size(frequency) - 1, chunk_size
          n = min(chunk_size, size(frequency) - before)
@@ -409,17 +401,6 @@ contains
       end associate
    end function get_floor_energies
 
-   !> Number of modes of a room below a frequency, about.
-   pure function get_room_mode_count(box, frequency) result(count)
-      type(box_type), intent(in) :: box
-      real(wp), intent(in) :: frequency
-      real(wp) :: count
-
-      associate (k => 2*frequency/box%air%sound_speed)
-         count = pi/6*product(box%sides*k + 1)
-      end associate
-   end function get_room_mode_count
-
    !> Fourier transform of a force, N s, at frequencies in equal steps.
    pure function get_spectrum(force, sample_rate, frequency) result(spectrum)
       real(wp), intent(in) :: force(:)
@@ -485,16 +466,16 @@ contains
       real(wp), intent(in) :: frequency(:)
       type(answers_type), intent(out) :: answers
       real(wp), allocatable :: shape(:, :)
-      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(coupled%microphone, 2))
+      complex(wp) :: amplitude(size(frequency)), pressure(size(frequency), size(coupled%box%microphone, 2))
       real(wp) :: natural, decay, stiffness
       integer :: i, j, k, n
 
-      n = size(coupled%microphone, 2)
+      n = size(coupled%box%microphone, 2)
       associate (box => coupled%box, lx => coupled%lx, ly => coupled%ly, w => 2*pi*frequency, &
-         height => coupled%microphone(3, :)/coupled%box%sides(3))
+         height => coupled%box%microphone(3, :)/coupled%box%sides(3))
          allocate (answers%pressure(2*n, size(lx), size(frequency)))
          allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
-         shape = get_cosines(lx, coupled%microphone(1, :)/box%sides(1))*get_cosines(ly, coupled%microphone(2, :)/box%sides(2))
+         shape = get_cosines(lx, box%microphone(1, :)/box%sides(1))*get_cosines(ly, box%microphone(2, :)/box%sides(2))
          do i = 1, size(lx)
             k = 0
             pressure = 0.0_wp
@@ -532,7 +513,7 @@ contains
       integer, intent(in) :: n_sample
       !> The levels, dB: [n_band, n_microphone, n_ball].
       real(wp), intent(out) :: level(:, :, :)
-      complex(wp) :: filter(size(frequency)), filtered(0:size(frequency))
+      complex(wp) :: s(size(frequency)), transfer(size(frequency)), filtered(0:size(frequency))
       real(wp) :: signal(n_sample)
       real(wp) :: mean, largest, decay
       integer :: i, j, k, l
@@ -540,10 +521,14 @@ contains
       decay = exp(-1/(sample_rate*time_constant))
       filtered(0) = 0.0_wp
       do i = 1, size(bands)
-         filter = get_filter(bands(i), frequency)
+         ! Butterworth filters of third order with the exact edges (class 1 of IEC 61260-1).
+         associate (low => bands(i)%lower, high => bands(i)%upper)
+            s = cmplx(0.0_wp, (frequency - low*high/frequency)/(high - low), wp)
+            transfer = 1/((s + 1)*(s**2 + s + 1))
+         end associate
          do j = 1, size(sound, 3)
             do k = 1, size(sound, 2)
-               filtered(1:) = sound(:, k, j)*filter
+               filtered(1:) = sound(:, k, j)*transfer
                call get_signal(filtered, signal)
                mean = 0.0_wp
                largest = tiny(largest)
@@ -556,16 +541,5 @@ contains
          end do
       end do
    end subroutine get_levels
-
-   !> Transfer function of a band filter: Butterworth of third order with the exact edges (class 1 of IEC 61260-1).
-   pure function get_filter(band, frequency) result(transfer)
-      type(band_type), intent(in) :: band
-      real(wp), intent(in) :: frequency(:)
-      complex(wp) :: transfer(size(frequency))
-      complex(wp) :: s(size(frequency))
-
-      s = cmplx(0.0_wp, (frequency - band%lower*band%upper/frequency)/(band%upper - band%lower), wp)
-      transfer = 1/((s + 1)*(s**2 + s + 1))
-   end function get_filter
 
 end module thud_modal_room

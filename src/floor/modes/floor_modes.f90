@@ -7,7 +7,7 @@ module thud_floor_modes
    use thud_modal_receiver, only: new_modal_receiver
    use thud_mode_mixing, only: diagonalize
    use thud_plate, only: air_type, get_total_loss, plate_type
-   use thud_plate_stack, only: get_resolved_frequency, is_uncoupled, plate_stack_type, with_rigid_edges
+   use thud_plate_stack, only: get_resolved_frequency, has_shear, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
    use thud_modes, only: get_mode_values, get_some_modes, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
@@ -64,7 +64,8 @@ contains
 
       held = with_rigid_edges(stack)
       wanted = mode_limit*resolution
-      if (is_uncoupled(held) .and. .not. has_shear(held)) wanted = mode_limit*sum_limit_factor
+      ! In shear, waves are short, and many functions gain little.
+      if (is_uncoupled(held) .and. .not. any(has_shear(held%plate))) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
       modes%stack = held
       call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
@@ -183,15 +184,6 @@ contains
       end do
    end function get_poles
 
-   !> Whether a plate yields in shear: its waves are short, and many functions gain little.
-   pure function has_shear(stack) result(yes)
-      type(plate_stack_type), intent(in) :: stack
-      logical :: yes
-      integer :: i
-
-      yes = any([(maxval(stack%plate(i)%shear) > 0.0_wp, i=1, size(stack%plate))])
-   end function has_shear
-
    !> Transfer mobility of the upper plate from a source to a point, as poles and residues. Modes above the limit are
    !> residual modes: static compliances, and the conductance of the infinite plate at high frequencies.
    subroutine new_floor_receiver(group, modes, resistance, source, point, receiver, error)
@@ -212,7 +204,7 @@ contains
 
       ! Sums of functions are stopped at a frequency, or have the compliance of all their modes.
       corner = pi/(2*sqrt(2.0_wp))*modes%limit
-      has_all = .not. (is_uncoupled(modes%stack) .or. has_shear(modes%stack))
+      has_all = .not. (is_uncoupled(modes%stack) .or. any(has_shear(modes%stack%plate)))
       associate (length => modes%stack%length, width => modes%stack%width, omega => modes%omega, &
          set => modes%modes%displacement(1))
          value = get_mode_values(modes%modes, 1, length*[source(1), point(1)], width*[source(2), point(2)])

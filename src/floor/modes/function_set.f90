@@ -245,15 +245,6 @@ contains
       end do
    end function get_functions
 
-   !> Number of the elementary functions of a set: at least as many as it has.
-   elemental function get_order(set) result(order)
-      type(function_set_type), intent(in) :: set
-      integer :: order
-
-      order = set%count
-      if (set%kind == polynomials) order = max(order, size(set%coefficient, 1))
-   end function get_order
-
    !> Points and weights of a quadrature on an interval that integrates products of two functions.
    pure subroutine get_quadrature(count, from, to, point, weight)
       !> Number of points; the number of the functions plus 20 integrates their products to rounding.
@@ -280,7 +271,7 @@ contains
       real(wp) :: overlap(first%count, second%count)
       real(wp), allocatable :: point(:), weight(:)
       real(wp) :: ends(2)
-      integer :: i, phase
+      integer :: i, n, phase
 
       phase = first_order - second_order + merge(0, 1, first%kind == sines) - merge(0, 1, second%kind == sines)
       if (all([first%kind, second%kind] < polynomials) .and. mod(phase, 2) == 0 .and. .not. present(from)) then
@@ -293,7 +284,11 @@ contains
       ends = [0.0_wp, first%length]
       if (present(from)) ends(1) = from
       if (present(to)) ends(2) = to
-      call get_quadrature(get_order(first) + get_order(second) + 20, ends(1), ends(2), point, weight)
+      ! A polynomial may be of a higher degree than there are functions.
+      n = first%count + second%count + 20
+      if (first%kind == polynomials) n = n + max(size(first%coefficient, 1) - first%count, 0)
+      if (second%kind == polynomials) n = n + max(size(second%coefficient, 1) - second%count, 0)
+      call get_quadrature(n, ends(1), ends(2), point, weight)
       associate (left => get_functions(first, point, first_order), right => get_functions(second, point, second_order))
          overlap = get_transposed_product(left*spread(weight, 2, first%count), right)
       end associate

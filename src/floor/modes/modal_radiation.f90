@@ -383,17 +383,9 @@ contains
          return
       end if
       ! With the matrix W: W (product * (W' G W)) W', where ' is the conjugate transpose.
-      product = product*get_unmixed(modes%block, get_hermitian(get_unmixed(modes%block, cmplx(modes%drive, kind=wp))))
-      response = real(get_mixed(modes%block, get_hermitian(get_mixed(modes%block, product))), wp)
+      product = product*get_unmixed(modes%block, conjg(transpose(get_unmixed(modes%block, cmplx(modes%drive, kind=wp)))))
+      response = real(get_mixed(modes%block, conjg(transpose(get_mixed(modes%block, product)))), wp)
    end function get_responses
-
-   !> Conjugate transpose of a matrix.
-   pure function get_hermitian(matrix) result(transposed)
-      complex(wp), intent(in) :: matrix(:, :)
-      complex(wp) :: transposed(size(matrix, 2), size(matrix, 1))
-
-      transposed = conjg(transpose(matrix))
-   end function get_hermitian
 
    !> Relative positions that fill a floor evenly (the R2 sequence of Roberts): [2, n].
    pure subroutine get_strike_points(n, strike)

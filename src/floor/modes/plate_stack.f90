@@ -9,7 +9,8 @@ module thud_plate_stack
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
-   public :: get_counts, get_degree, get_resolved_frequency, get_resolved_part, has_sines, is_uncoupled, with_rigid_edges
+   public :: get_counts, get_degree, get_lines, get_resolved_frequency, get_resolved_part, has_shear, has_sines, &
+      is_uncoupled, with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -117,7 +118,7 @@ contains
       if (is_uncoupled_along(stack, 1)) limit = max_half_coupled
       if (is_uncoupled(stack)) limit = max_uncoupled
       ! Rotations take about as long as two plates.
-      if (any([(maxval(stack%plate(i)%shear) > 0.0_wp, i=1, size(stack%plate))])) limit = limit/2
+      if (any(has_shear(stack%plate))) limit = limit/2
       frequency = max_frequency
       do while (sum([(product(real(get_all_counts(stack%plate(i)), wp)), i=1, size(stack%plate))]) > limit)
          frequency = 0.95_wp*frequency
@@ -217,8 +218,7 @@ contains
             yes = yes .and. abs(edges(1)%deflection - edges(2)%deflection) <= 0.0_wp &
                .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp
          end associate
-         if (direction == 1 .and. allocated(stack%plate(i)%line_x)) yes = yes .and. size(stack%plate(i)%line_x) == 0
-         if (direction == 2 .and. allocated(stack%plate(i)%line_y)) yes = yes .and. size(stack%plate(i)%line_y) == 0
+         yes = yes .and. size(get_lines(stack%plate(i), direction)) == 0
          if (direction == 1 .or. .not. allocated(stack%plate(i)%ribs)) cycle
          associate (position => stack%plate(i)%ribs%position)
             yes = yes .and. all(abs(position + position(size(position):1:-1) - stack%width) <= 1.0e-9_wp*stack%length)
@@ -253,7 +253,7 @@ contains
          half = min(half, many)
          if (has_sines(plate, i)) then
             n(i) = 4 + int(2*half/pi)
-         else if (maxval(plate%shear) > 0.0_wp) then
+         else if (has_shear(plate)) then
             n(i) = get_degree(half)
          else
             ! Modes of a beam lack the coupling of both curvatures at free edges: some more.
@@ -271,6 +271,14 @@ contains
       degree = 8 + int(half + 4*half**(1.0_wp/3))
    end function get_degree
 
+   !> Whether a plate yields in shear.
+   elemental function has_shear(plate) result(yes)
+      type(orthotropic_type), intent(in) :: plate
+      logical :: yes
+
+      yes = maxval(plate%shear) > 0.0_wp
+   end function has_shear
+
    !> Whether both ends of a plate in one direction are simply supported, without further supports.
    pure function has_sines(plate, direction) result(yes)
       type(orthotropic_type), intent(in) :: plate
@@ -281,8 +289,19 @@ contains
       associate (edges => plate%edge(2*direction - 1:2*direction))
          yes = all(edges%deflection >= rigid_support .and. edges%rotation <= 0.0_wp)
       end associate
-      if (direction == 1 .and. allocated(plate%line_x)) yes = yes .and. size(plate%line_x) == 0
-      if (direction == 2 .and. allocated(plate%line_y)) yes = yes .and. size(plate%line_y) == 0
+      yes = yes .and. size(get_lines(plate, direction)) == 0
    end function has_sines
+
+   !> Positions of the lines across a direction on which a plate rests, m: [n_line].
+   pure function get_lines(plate, direction) result(position)
+      type(orthotropic_type), intent(in) :: plate
+      !> 1: along the length, 2: along the width.
+      integer, intent(in) :: direction
+      real(wp), allocatable :: position(:)
+
+      allocate (position(0))
+      if (direction == 1 .and. allocated(plate%line_x)) position = plate%line_x
+      if (direction == 2 .and. allocated(plate%line_y)) position = plate%line_y
+   end function get_lines
 
 end module thud_plate_stack

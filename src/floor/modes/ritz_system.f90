@@ -358,29 +358,27 @@ contains
       integer, intent(in) :: first(:)
       !> The matrix: [n, n].
       real(wp), allocatable, intent(out) :: matrix(:, :)
+      real(wp), allocatable :: x(:, :)
       real(wp) :: factor
-      integer :: h, i, j, k, l, p, q, at_row, at_column
+      integer :: i, j, k, l, at_row, at_column
 
       allocate (matrix(first(size(first)) - 1, first(size(first)) - 1), source=0.0_wp)
       do i = 1, size(terms)
-         p = terms(i)%row
-         q = terms(i)%column
          if (.not. abs(weight(i)) > 0.0_wp) cycle
-         associate (row => block%shape(p), column => block%shape(q))
+         associate (row => block%shape(terms(i)%row), column => block%shape(terms(i)%column))
+            x = terms(i)%x(row%x, column%x)
             do l = 1, size(column%y)
                do k = 1, size(row%y)
                   factor = weight(i)*terms(i)%y(row%y(k), column%y(l))
                   ! Many functions are orthogonal.
                   if (.not. abs(factor) > 0.0_wp) cycle
-                  at_row = first(p) + (k - 1)*size(row%x) - 1
+                  at_row = first(terms(i)%row) + (k - 1)*size(row%x)
                   do j = 1, size(column%x)
-                     at_column = first(q) + (l - 1)*size(column%x) + j - 1
-                     do h = 1, size(row%x)
-                        matrix(at_row + h, at_column) = matrix(at_row + h, at_column) &
-                           + factor*terms(i)%x(row%x(h), column%x(j))
-                     end do
-                     if (p /= q) matrix(at_column, at_row + 1:at_row + size(row%x)) = &
-                        matrix(at_row + 1:at_row + size(row%x), at_column)
+                     at_column = first(terms(i)%column) + (l - 1)*size(column%x) + j - 1
+                     associate (entries => matrix(at_row:at_row + size(row%x) - 1, at_column))
+                        entries = entries + factor*x(:, j)
+                        if (terms(i)%row /= terms(i)%column) matrix(at_column, at_row:at_row + size(row%x) - 1) = entries
+                     end associate
                   end do
                end do
             end do

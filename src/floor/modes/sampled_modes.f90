@@ -1,34 +1,62 @@
-!> Modes of a floor from samples on a grid in a file: splines through the samples.
+!> Modes of a floor from samples on a grid in a file, measured or of another program: splines through the samples.
+!>
+!> The file is a table, see `thud_table_reader`, with one column per mode after two further columns.
+!> Rows that begin with `frequency` (Hz), `loss_factor` and, if the shapes are not normalized to a modal mass of 1 kg,
+!> `modal_mass` (kg) describe the modes. All other rows are points: x, y (m) and the shapes of the modes there, the motion
+!> normal to the floor. A row that begins with `x` is a header.
 module thud_sampled_modes
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_ascending, only: get_ascending_order
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_floor_modes, only: floor_modes_type
-   use thud_function_set, only: function_set_type, new_splines
+   use thud_function_set, only: min_nodes, new_splines
    use thud_kinds, only: wp
-   use thud_mode_table, only: mode_table_type, read_mode_table
-   use thud_modes, only: product_type
    use thud_plate_stack, only: orthotropic_type
    use thud_system, only: get_file_size
-   use thud_text, only: to_text
+   use thud_table_reader, only: cell_length, open_table, read_number, read_row, row_error, table_reader_type
+   use thud_text, only: fixed, lower_case, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: get_square_integrals, read_sampled_modes
+   public :: read_sampled_modes
 
    !> Maximum size of a file, bytes.
    integer(int64), parameter :: max_size = 200000000_int64
 
+   !> Rows that describe the modes.
+   integer, parameter :: label_length = 11
+   character(len=label_length), parameter :: labels(*) = [character(len=label_length) :: 'frequency', 'loss_factor', &
+      'modal_mass']
+
+   !> Limits of their values: above 0, and up to these.
+   real(wp), parameter :: highest_value(*) = [1.0e6_wp, 1.0_wp, 1.0e9_wp]
+
+   !> Maximum number of points: time and memory of the radiation.
+   integer, parameter :: max_points = 10000
+
+   !> Coordinates closer than this, relative to the floor, are equal.
+   real(wp), parameter :: same_position = 1.0e-6_wp
+
+   !> Maximum ratio of the sum of squared differences of neighbors to the sum of squares: 2 is that of a wave of four grid
+   !> spacings, 4 sin(pi/4)**2.
+   real(wp), parameter :: max_roughness = 2.0_wp
+
+   !> A row that describes the modes: [n_mode].
+   type :: row_type
+      real(wp), allocatable :: value(:)
+   end type row_type
+
 contains
 
-   !> Modes of a floor from a file; see `thud_mode_table`.
+   !> Modes of a floor from a file.
    subroutine read_sampled_modes(path, modes, error)
       character(len=*), intent(in) :: path
       type(floor_modes_type), intent(out) :: modes
       !> Set if the file cannot be read, or its modes are not complete; the message begins with the path.
       type(error_type), allocatable, intent(out) :: error
-      type(mode_table_type) :: table
+      type(row_type) :: rows(size(labels))
+      real(wp), allocatable :: point(:, :), x(:), y(:), shape(:, :, :)
       integer(int64) :: bytes
 
       ! Pipes and devices have no size; opening one could block.
@@ -37,42 +65,240 @@ contains
          error = input_error('there is no such file, or it is empty, a directory, not regular or too large; allowed: a ' &
             //'table of modes of up to '//to_text(int(max_size))//' bytes')
       else
-         call read_mode_table(path, table, error)
+         call read_rows(path, rows, point, error)
       end if
+      if (.not. allocated(error)) call get_coordinates(point(1, :), 'x', x, error)
+      if (.not. allocated(error)) call get_coordinates(point(2, :), 'y', y, error)
+      if (.not. allocated(error)) call get_shapes(point, x, y, shape, error)
+      if (.not. allocated(error)) call check_shapes(shape, rows(1)%value, error)
       if (allocated(error)) then
          error = input_error(path//': '//error%message)
       else
-         call get_sampled_modes(table, modes)
+         call get_sampled_modes(rows, x, y, shape, modes)
       end if
    end subroutine read_sampled_modes
 
+   !> Reads all rows of a file.
+   subroutine read_rows(path, rows, point, error)
+      character(len=*), intent(in) :: path
+      !> In the order of `labels`.
+      type(row_type), intent(inout) :: rows(:)
+      !> Points, with coordinates and shapes: [2 + n_mode, n_point].
+      real(wp), allocatable, intent(out) :: point(:, :)
+      !> Set if a row is not one of a table, or one is missing.
+      type(error_type), allocatable, intent(out) :: error
+      type(table_reader_type) :: table
+      character(len=cell_length), allocatable :: cells(:)
+      real(wp), allocatable :: value(:), more(:, :)
+      integer :: i, n_point, number
+
+      n_point = 0
+      call open_table(path, table, error)
+      do
+         if (.not. allocated(error)) call read_row(table, cells, error)
+         if (.not. allocated(error)) then
+            if (size(cells) == 0) exit
+            if (index(lower_case(cells(1)), 'x') == 1) cycle
+            number = findloc(labels == lower_case(cells(1)), .true., dim=1)
+            call read_values(table, cells, merge(3, 1, number > 0), value, error)
+         end if
+         if (allocated(error)) return
+         if (number > 0) then
+            i = findloc(value > 0.0_wp .and. value <= highest_value(number), .false., dim=1)
+            if (allocated(rows(number)%value)) then
+               error = row_error(table, trim(labels(number))//' is given twice; allowed: once')
+            else if (i > 0) then
+               error = row_error(table, trim(labels(number))//' of mode '//to_text(i)//' is ' &
+                  //to_text(value(i))//'; allowed: above 0, up to '//to_text(highest_value(number)))
+            end if
+            rows(number)%value = value
+            cycle
+         end if
+         if (n_point == 0) allocate (point(size(value), 64))
+         if (size(value) /= size(point, 1)) then
+            error = row_error(table, 'it has '//to_text(size(value))//' values, points before it have ' &
+               //to_text(size(point, 1))//'; allowed: x, y and the shape of each mode')
+            return
+         end if
+         if (n_point == size(point, 2)) then
+            allocate (more(size(value), 2*n_point))
+            more(:, :n_point) = point
+            call move_alloc(more, point)
+         end if
+         n_point = n_point + 1
+         point(:, n_point) = value
+      end do
+      if (.not. allocated(rows(1)%value)) then
+         error = input_error('there is no row of frequencies; allowed: a table with rows '//labels(1)//' (Hz) and ' &
+            //labels(2)//', and a row of x, y and the shapes of all modes for each point')
+      else if (.not. allocated(rows(2)%value)) then
+         error = input_error('the modes have no losses; allowed: a row '//labels(2)//' with one value above 0 per mode')
+      else if (n_point == 0) then
+         error = input_error('there is no point; allowed: a row of x, y (m) and the shapes of all modes for each point')
+      else if (n_point > max_points) then
+         error = input_error('the grid has '//to_text(n_point)//' points; allowed: up to '//to_text(max_points) &
+            //', of which eight per wavelength are enough')
+      end if
+      if (allocated(error)) return
+      point = point(:, :n_point)
+      associate (n => size(point, 1) - 2)
+         if (.not. allocated(rows(3)%value)) rows(3)%value = spread(1.0_wp, 1, n)
+         if (n < 1 .or. any([(size(rows(i)%value), i=1, size(rows))] /= n)) then
+            error = input_error('there are '//to_text(size(rows(1)%value))//' frequencies, ' &
+               //to_text(size(rows(2)%value))//' loss factors, '//to_text(size(rows(3)%value))//' modal masses and ' &
+               //to_text(n)//' shapes; allowed: one of each per mode')
+            return
+         end if
+         point(3:, :) = point(3:, :)/spread(sqrt(rows(3)%value), 2, n_point)
+      end associate
+   end subroutine read_rows
+
+   !> Reads the values of a row.
+   subroutine read_values(table, cells, first, value, error)
+      type(table_reader_type), intent(in) :: table
+      !> The cells: [n_cell].
+      character(len=cell_length), intent(in) :: cells(:)
+      !> Index of the first cell with a value: before it there may be a label and a unit.
+      integer, intent(in) :: first
+      real(wp), allocatable, intent(out) :: value(:)
+      !> Set if a cell is neither a number nor a label.
+      type(error_type), allocatable, intent(out) :: error
+      logical :: valid
+      integer :: i
+
+      allocate (value(max(size(cells) - first + 1, 0)))
+      do i = 1, size(value)
+         call read_number(cells(first + i - 1), value(i), valid)
+         if (valid) cycle
+         error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not a ' &
+            //'number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
+         return
+      end do
+   end subroutine read_values
+
+   !> Shapes at the points of a grid.
+   subroutine get_shapes(point, x, y, shape, error)
+      !> Points, with coordinates and shapes: [2 + n_mode, n_point].
+      real(wp), intent(in) :: point(:, :)
+      !> Coordinates of the grid, m: [n_x], [n_y].
+      real(wp), intent(in) :: x(:), y(:)
+      !> Shapes for a modal mass of 1 kg, 1/sqrt(kg): [n_x, n_y, n_mode].
+      real(wp), allocatable, intent(out) :: shape(:, :, :)
+      !> Set if the points are not a rectangular grid over the floor.
+      type(error_type), allocatable, intent(out) :: error
+      logical :: is_set(size(x), size(y))
+      integer :: i, j, k
+
+      if (size(is_set) /= size(point, 2)) then
+         error = input_error('the points are no rectangular grid: there are '//to_text(size(point, 2))//' with ' &
+            //to_text(size(x))//' values of x and '//to_text(size(y))//' of y; allowed: one point for each pair of x and y')
+         return
+      end if
+      allocate (shape(size(x), size(y), size(point, 1) - 2))
+      is_set = .false.
+      do k = 1, size(point, 2)
+         i = minloc(abs(x - point(1, k)), dim=1)
+         j = minloc(abs(y - point(2, k)), dim=1)
+         if (is_set(i, j)) then
+            error = input_error('the points are no rectangular grid: two are at x = '//to_text(point(1, k))//' m, y = ' &
+               //to_text(point(2, k))//' m; allowed: one point for each pair of x and y')
+            return
+         end if
+         is_set(i, j) = .true.
+         shape(i, j, :) = point(3:, k)
+      end do
+   end subroutine get_shapes
+
+   !> Coordinates of a grid, ascending.
+   subroutine get_coordinates(value, name, coordinate, error)
+      !> Coordinates of all points, m: [n_point].
+      real(wp), intent(in) :: value(:)
+      !> Name of the coordinate.
+      character(len=*), intent(in) :: name
+      real(wp), allocatable, intent(out) :: coordinate(:)
+      !> Set if they do not begin at 0, or are too few.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: next, side
+
+      side = maxval(value) - minval(value)
+      allocate (coordinate(0))
+      next = minval(value)
+      do
+         coordinate = [coordinate, next]
+         if (.not. any(value > next + same_position*side)) exit
+         next = minval(value, mask=value > next + same_position*side)
+      end do
+      if (abs(coordinate(1)) > same_position*side) then
+         error = input_error(name//' begins at '//to_text(coordinate(1))//' m; allowed: a grid from the corner of the ' &
+            //'floor, 0, to its opposite edge')
+      else if (size(coordinate) < min_nodes) then
+         error = input_error('the grid has '//to_text(size(coordinate))//' values of '//name//'; allowed: at least ' &
+            //to_text(min_nodes))
+      end if
+      coordinate(1) = 0.0_wp
+   end subroutine get_coordinates
+
+   !> Checks that the grid resolves the shapes.
+   subroutine check_shapes(shapes, frequency, error)
+      !> Shapes: [n_x, n_y, n_mode].
+      real(wp), intent(in) :: shapes(:, :, :)
+      !> Natural frequencies, Hz: [n_mode].
+      real(wp), intent(in) :: frequency(:)
+      !> Set if a mode does not move, or a grid spacing is more than a quarter of its wavelength.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: roughness(2)
+      real(wp) :: total
+      integer :: k
+
+      associate (n_x => size(shapes, 1), n_y => size(shapes, 2))
+         do k = 1, size(frequency)
+            associate (shape => shapes(:, :, k))
+               total = sum(shape**2)
+               if (.not. total > 0.0_wp) then
+                  error = input_error('mode '//to_text(k)//' is 0 at all points; allowed: modes that move')
+                  return
+               end if
+               roughness = [sum((shape(2:, :) - shape(:n_x - 1, :))**2), sum((shape(:, 2:) - shape(:, :n_y - 1))**2)]/total
+            end associate
+            if (maxval(roughness) <= max_roughness) cycle
+            error = input_error('the grid is too coarse for mode '//to_text(k)//' at '//fixed(frequency(k), 1) &
+               //' Hz: along '//merge('x', 'y', roughness(1) > roughness(2))//' its wavelength is less than four grid ' &
+               //'spacings; allowed: more points, or fewer modes')
+            return
+         end do
+      end associate
+   end subroutine check_shapes
+
    !> Modes of a floor from a table.
-   subroutine get_sampled_modes(table, modes)
-      type(mode_table_type), intent(in) :: table
+   subroutine get_sampled_modes(rows, x, y, samples, modes)
+      !> Rows in the order of `labels`.
+      type(row_type), intent(in) :: rows(:)
+      !> Coordinates of the grid, m: [n_x], [n_y].
+      real(wp), intent(in) :: x(:), y(:)
+      !> Shapes there, 1/sqrt(kg): [n_x, n_y, n_mode].
+      real(wp), intent(in) :: samples(:, :, :)
       type(floor_modes_type), intent(out) :: modes
-      type(function_set_type) :: set_x, set_y
       real(wp), allocatable :: by_x(:, :), by_y(:, :)
       integer, allocatable :: order(:)
       integer :: i, n_x, n_y, n_mode
 
-      n_x = size(table%x)
-      n_y = size(table%y)
-      n_mode = size(table%frequency)
-      call new_splines(table%x, set_x, by_x)
-      call new_splines(table%y, set_y, by_y)
-      modes%stack%length = table%x(n_x)
-      modes%stack%width = table%y(n_y)
+      n_x = size(x)
+      n_y = size(y)
+      n_mode = size(samples, 3)
+      modes%stack%length = x(n_x)
+      modes%stack%width = y(n_y)
       allocate (modes%stack%plate(1), modes%stack%layer(0))
       modes%stack%plate(1) = orthotropic_type()
-      order = get_ascending_order(table%frequency)
-      modes%omega = 2*pi*table%frequency(order)
-      modes%loss_factor = table%loss_factor(order)
+      order = get_ascending_order(rows(1)%value)
+      modes%omega = 2*pi*rows(1)%value(order)
+      modes%loss_factor = rows(2)%value(order)
       ! There is no mode above the highest one.
       modes%limit = maxval(modes%omega)*(1 + epsilon(1.0_wp))
       modes%sum_limit = modes%limit
       modes%known_limit = modes%limit
       allocate (modes%modes%displacement(1), modes%modes%block(1))
-      modes%modes%displacement(1) = product_type(set_x, set_y)
+      call new_splines(x, modes%modes%displacement(1)%x, by_x)
+      call new_splines(y, modes%modes%displacement(1)%y, by_y)
       associate (block => modes%modes%block(1))
          block%omega = modes%omega
          block%loss_factor = modes%loss_factor
@@ -83,19 +309,11 @@ contains
             shape%y = [(i, i=1, n_y)]
             allocate (shape%coefficient(n_x*n_y, n_mode))
             do i = 1, n_mode
-               shape%coefficient(:, i) = reshape(matmul(matmul(by_x, table%shape(:, :, order(i))), transpose(by_y)), &
+               shape%coefficient(:, i) = reshape(matmul(matmul(by_x, samples(:, :, order(i))), transpose(by_y)), &
                   [n_x*n_y])
             end do
          end associate
       end associate
    end subroutine get_sampled_modes
-
-   !> Integrals of the squared shapes over the floor for a modal mass of 1 kg, m2/kg: [n_mode].
-   pure function get_square_integrals(modes) result(square)
-      type(floor_modes_type), intent(in) :: modes
-      real(wp), allocatable :: square(:)
-
-      square = sum(modes%modes%block(1)%shape(1)%coefficient**2, dim=1)
-   end function get_square_integrals
 
 end module thud_sampled_modes

@@ -7,8 +7,8 @@ module thud_stack_modes
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
    use thud_modes, only: modes_type, product_type
-   use thud_plate_stack, only: edge_type, get_counts, get_degree, get_resolved_frequency, has_sines, &
-      layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
+   use thud_plate_stack, only: edge_type, get_counts, get_degree, get_lines, get_resolved_frequency, has_shear, &
+      has_sines, orthotropic_type, plate_stack_type, ribs_type, rigid_support
    use thud_ritz_system, only: add_energies, add_stiffness, energy_type, ritz_system_type, solve_ritz_system
    implicit none (type, external)
    private
@@ -46,7 +46,7 @@ contains
       do i = 1, size(stack%plate)
          system%is_bearing = i == stack%bearing
          index = [i, 0, 0]
-         if (maxval(stack%plate(i)%shear) > 0.0_wp) then
+         if (has_shear(stack%plate(i))) then
             index(2:) = size(system%displacement) + [1, 2]
             system%displacement = [system%displacement, products(2:, i)]
          end if
@@ -107,7 +107,7 @@ contains
       integer :: i
 
       n = get_counts(stack, plate, frequency)
-      is_thin = .not. maxval(plate%shear) > 0.0_wp
+      is_thin = .not. has_shear(plate)
       sides = [stack%length, stack%width]
       do i = 1, 2
          if (has_sines(plate, i)) then
@@ -117,9 +117,7 @@ contains
          end if
          degree(i) = n(i)
          if (is_thin) degree(i) = get_degree((n(i) + 2)*pi/2)
-         lines = spread(0.0_wp, 1, 0)
-         if (i == 1 .and. allocated(plate%line_x)) lines = plate%line_x
-         if (i == 2 .and. allocated(plate%line_y)) lines = plate%line_y
+         lines = get_lines(plate, i)
          associate (edge => plate%edge(2*i - 1:2*i), ends => [0.0_wp, sides(i)])
             associate (fixed => [pack(ends, edge%deflection >= rigid_support), lines], &
                clamped => pack(ends, edge%rotation >= rigid_support))
@@ -280,9 +278,9 @@ contains
       end do
    end subroutine add_ends
 
-   !> Energies of the ribs of a plate. They turn with torsion and warping, joined to the slope of the deflection by the static
-   !> stiffness pi B k of the waves shorter than those of the functions, which end at the wavenumber k: their curvature jumps
-   !> at ribs, which the functions approach slowly.
+   !> Energies of the ribs of a plate. They turn with torsion and warping, joined to the slope of the deflection by the
+   !> static stiffness pi B k of the waves shorter than those of the functions, which end at the wavenumber k: their
+   !> curvature jumps at ribs, which the functions approach slowly.
    subroutine add_ribs(system, plate, ribs, w, rotation)
       type(ritz_system_type), intent(inout) :: system
       type(orthotropic_type), intent(in) :: plate

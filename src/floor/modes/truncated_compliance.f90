@@ -36,35 +36,21 @@ contains
       !> Coordinate of the point along the width, m.
       real(wp), intent(in) :: y
       real(wp) :: compliance
-      real(wp) :: no_position(0)
-
-      associate (strip => strip_type(plate%along, plate%coupling + 2*plate%torsion, plate%across))
-         if (allocated(plate%ribs)) then
-            compliance = get_compliance(strip, wavenumber, plate%ribs, y)
-         else
-            compliance = get_compliance(strip, wavenumber, ribs_type(position=no_position), y)
-         end if
-      end associate
-   end function get_truncated_compliance
-
-   !> The compliance with ribs, m/N.
-   function get_compliance(strip, wavenumber, ribs, point) result(compliance)
-      type(strip_type), intent(in) :: strip
-      !> Complete wavenumbers along and across the ribs, 1/m: [2].
-      real(wp), intent(in) :: wavenumber(2)
-      type(ribs_type), intent(in) :: ribs
-      !> Coordinate of the point across the ribs, m.
-      real(wp), intent(in) :: point
-      real(wp) :: compliance
+      type(strip_type) :: strip
+      type(ribs_type) :: ribs
       real(wp), allocatable :: along(:), weight(:), load(:), moment(:), position(:), distance(:, :)
-      logical :: near(size(ribs%position))
+      logical, allocatable :: near(:)
       integer :: i
 
+      strip = strip_type(plate%along, plate%coupling + 2*plate%torsion, plate%across)
+      allocate (ribs%position(0))
+      if (allocated(plate%ribs)) ribs = plate%ribs
+      allocate (near(size(ribs%position)))
       near = .false.
       do i = 1, min(max_ribs, size(near))
-         near(minloc(abs(ribs%position - point), dim=1, mask=.not. near)) = .true.
+         near(minloc(abs(ribs%position - y), dim=1, mask=.not. near)) = .true.
       end do
-      position = [point, pack(ribs%position, near)]
+      position = [y, pack(ribs%position, near)]
       distance = spread(position, 2, size(position)) - spread(position, 1, size(position))
       compliance = 0.0_wp
       ! Waves along the ribs that the functions have: what is missing across.
@@ -84,7 +70,7 @@ contains
                + dot_product(moment, get_deflection(strip, k, distance(2:, 1), 1)))
          end associate
       end do
-   end function get_compliance
+   end function get_truncated_compliance
 
    !> Loads on the plate: a unit force, and the reactions of the ribs.
    subroutine get_line_loads(strip, ribs, k, distance, load, moment)
