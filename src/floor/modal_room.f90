@@ -228,7 +228,8 @@ contains
       !> Box, floor and highest frequency are set.
       type(coupled_type), intent(inout) :: coupled
       complex(wp), allocatable :: coupling(:, :)
-      integer :: i, k, n(2)
+      integer :: n(2)
+      integer :: i, k
 
       associate (box => coupled%box, modes => coupled%floor%modes, plate => coupled%floor%stack%radiator)
          n = int(2*coupled%highest*box%sides(1:2)/box%air%sound_speed)

@@ -73,7 +73,8 @@ module thud_lapack
          integer, intent(in) :: n, lda
          real(wp), intent(in) :: tol
          real(wp), intent(inout) :: a(lda, *)
-         integer, intent(out) :: piv(*), rank, info
+         integer, intent(out) :: piv(*)
+         integer, intent(out) :: rank, info
          real(wp), intent(out) :: work(*)
       end subroutine dpstrf
 

@@ -6,10 +6,10 @@ module thud_floor_modes
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_mode_mixing, only: diagonalize
+   use thud_modes, only: get_mode_values, get_some_modes, mode_block_type, modes_type
    use thud_plate, only: air_type, get_total_loss, plate_type
    use thud_plate_stack, only: get_resolved_frequency, has_shear, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
-   use thud_modes, only: get_mode_values, get_some_modes, mode_block_type, modes_type
    use thud_stack_modes, only: get_stack_modes
    use thud_text, only: to_text
    use thud_truncated_compliance, only: get_truncated_compliance

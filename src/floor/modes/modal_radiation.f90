@@ -272,8 +272,9 @@ contains
          do j = 1, i - 1
             if (set(i) == set(j)) cycle
             associate (one => modes%block(i)%shape(1), other => modes%block(j)%shape(1))
-               if (any(abs(overlap%x(one%x, other%x)) > rounding) .and. any(abs(overlap%y(one%y, other%y)) > rounding)) &
-                  where (set == max(set(i), set(j))) set = min(set(i), set(j))
+               if (all(abs(overlap%x(one%x, other%x)) <= rounding)) cycle
+               if (all(abs(overlap%y(one%y, other%y)) <= rounding)) cycle
+               where (set == max(set(i), set(j))) set = min(set(i), set(j))
             end associate
          end do
       end do
