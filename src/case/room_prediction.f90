@@ -104,7 +104,6 @@ contains
       type(room_level_type) :: bare
       type(modal_room_type) :: modal
       type(box_type) :: box
-      real(wp), allocatable :: ball(:, :), microphone(:, :)
       real(wp), dimension(size(bands)) :: level, conductance
       integer :: i
 

@@ -182,8 +182,8 @@ contains
       type(shape_type), intent(in) :: shape
       !> Integrals of products of all functions over the area.
       type(overlap_type), intent(in) :: overlap
-      real(wp), allocatable :: integral(:, :)
-      real(wp), allocatable :: weighted(:, :)
+      real(wp) :: integral(size(shape%coefficient, 2), size(shape%coefficient, 2))
+      real(wp) :: weighted(size(shape%coefficient, 1), size(shape%coefficient, 2))
       integer :: i
 
       weighted = shape%coefficient
