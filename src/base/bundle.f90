@@ -53,8 +53,9 @@ contains
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: value
+      integer :: extents(0)
 
-      call self%add_array(name, [integer ::], [value])
+      call self%add_array(name, extents, [value])
    end subroutine add_number
 
    !> Adds an array of any rank.

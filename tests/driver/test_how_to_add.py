@@ -107,7 +107,8 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = root / "src/models/linear_spring.f90"
     model.write_text(example(page, "fortran"))
     registry = root / "src/case/registry.f90"
-    insert(registry, "   use thud_joist_floor, only: joist_floor_type\n", example(page, "fortran use"))
+    floor = "   use thud_joist_floor, only: joist_floor_type\n"
+    insert(registry, floor, example(page, "fortran use"))
     insert(registry, "'two_mass'", example(page, "fortran name").rstrip("\n"))
     insert(registry, "(two_mass_type :: models(6)%model)\n", example(page, "fortran allocation"))
     insert(model, "      real(wp) :: stiffness = 6.0e4_wp\n", example(page, "fortran component"))
