@@ -117,8 +117,8 @@ contains
       outcome%conforms = is_conforming(case, results%impact%assessment)
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, &
          results%impact%assessment, options%verbose)
-      call write_file(directory, 'force.csv', get_force_csv(results%impact%history, [character(len=1) ::], &
-         reshape([real(wp) ::], [size(results%impact%history%deflection), 0])), error)
+      call write_file(directory, 'force.csv', get_force_csv(results%impact%history, [character(len=1) :: ], &
+         reshape([real(wp) :: ], [size(results%impact%history%deflection), 0])), error)
       call write_file(directory, 'levels.csv', get_levels_csv(case, results%impact%assessment), error)
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
       call write_history_files(results%impact%history, '', options%write_all, directory, error)
