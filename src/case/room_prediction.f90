@@ -116,7 +116,7 @@ contains
             used%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
             used%upper_factor = used%radiation_factor
          end if
-         if (.not. floor%has_modal_conductance()) used%conductance = conductance
+         if (.not. state%has_modal_conductance) used%conductance = conductance
          call get_room_level(plate, used, room, bands, level - floor%get_improvement(size(bands)), prediction)
          box = get_box(room, plate, bands)
          prediction%crossover = get_crossover(box)

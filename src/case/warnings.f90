@@ -5,7 +5,7 @@ module thud_warnings
    use thud_case, only: case_type, get_active_fields, get_floor_number, get_model_number, get_unstated_fields
    use thud_error, only: error_type
    use thud_field, only: field_type, key_length
-   use thud_floor_model, only: floor_state_type, reason_length
+   use thud_floor_model, only: floor_state_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -189,16 +189,11 @@ contains
       type(floor_state_type), intent(in) :: state
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      character(len=reason_length) :: reason
-      real(wp) :: lowest, highest
 
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_validity(state, lowest, highest, reason)
-      end associate
-      if (lowest > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below '//fixed(lowest, 0)//' Hz ' &
-         //trim(reason))
-      if (highest < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above '//fixed(highest, 0)//' Hz ' &
-         //trim(reason))
+      if (state%lowest_frequency > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below ' &
+         //fixed(state%lowest_frequency, 0)//' Hz '//trim(state%validity_reason))
+      if (state%highest_frequency < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above ' &
+         //fixed(state%highest_frequency, 0)//' Hz '//trim(state%validity_reason))
    end subroutine add_floor_warning
 
    !> Adds a warning on a source that does not conform, for a case with a room.

@@ -36,76 +36,77 @@ module thud_floor_model
       !> has no frequencies.
       type(plate_type) :: plate
       type(floor_modes_type) :: modes
+      !> Whether the mean power into the floor follows from its modes, because no homogeneous plate represents it.
+      logical :: has_modal_conductance = .false.
+      !> Frequency band in which the model of the floor is valid, Hz, and the reason for it, as the end of a message.
+      real(wp) :: lowest_frequency = 0.0_wp, highest_frequency = huge(1.0_wp)
+      character(len=reason_length) :: validity_reason = ''
    end type floor_state_type
 
-   !> The floor, whose components are its options: procedures name it `options`.
+   !> The floor, whose components are its options.
    type, abstract :: floor_model_type
       !> Coordinates along length and width of further points whose velocity is output (rectangular floors), m.
       type(list_type) :: point_x, point_y
       !> Air around the floor: that of the room below (`set_floor_air`).
       type(air_type) :: air
    contains
-      procedure, pass(options) :: get_point_fields
-      procedure, pass(options) :: check_points
-      procedure(get_fields), deferred, pass(options) :: get_fields
-      procedure(get_receiver), deferred, pass(options) :: get_receiver
-      procedure, pass(options) :: check
-      procedure, pass(options) :: prepare
-      procedure, pass(options) :: get_sides
-      procedure, pass(options) :: get_transfer
-      procedure, pass(options) :: has_radiator
-      procedure, pass(options) :: check_radiator
-      procedure, pass(options) :: get_radiator
-      procedure, pass(options) :: get_validity
-      procedure, pass(options) :: get_room_modes
-      procedure, pass(options) :: get_radiating_modes
-      procedure, pass(options) :: has_room_modes
-      procedure, pass(options) :: get_support
-      procedure, pass(options) :: get_improvement
-      procedure, pass(options) :: has_modal_conductance
-      procedure, pass(options) :: has_subceiling
+      procedure :: get_point_fields
+      procedure :: check_points
+      procedure(get_fields), deferred :: get_fields
+      procedure(prepare), deferred :: prepare
+      procedure :: check
+      procedure :: get_sides
+      procedure :: get_transfer
+      procedure :: has_radiator
+      procedure :: check_radiator
+      procedure :: get_radiator
+      procedure :: get_room_modes
+      procedure :: get_radiating_modes
+      procedure :: has_room_modes
+      procedure :: get_support
+      procedure :: get_improvement
+      procedure :: has_subceiling
    end type floor_model_type
 
    abstract interface
       !> Fields of the options: each connects a namelist key to a component.
-      function get_fields(options) result(fields)
+      function get_fields(self) result(fields)
          import :: field_type, floor_model_type
          implicit none (type, external)
          !> The options that the fields read and set.
-         class(floor_model_type), intent(in), target :: options
+         class(floor_model_type), intent(in), target :: self
          !> The fields: [n_field].
          type(field_type), allocatable :: fields(:)
       end function get_fields
 
-      !> Mobility of the floor at the source.
-      subroutine get_receiver(options, receiver, error)
-         import :: error_type, floor_model_type, receiver_type
+      !> Computes what is handed on.
+      subroutine prepare(self, state, error)
+         import :: error_type, floor_model_type, floor_state_type
          implicit none (type, external)
          !> The options, checked.
-         class(floor_model_type), intent(in) :: options
-         !> The mobility, as poles and residues.
-         type(receiver_type), intent(out) :: receiver
-         !> Set if the receiver cannot be made.
+         class(floor_model_type), intent(in) :: self
+         type(floor_state_type), intent(out) :: state
+         !> Set if mobility or modes cannot be computed.
          type(error_type), allocatable, intent(out) :: error
-      end subroutine get_receiver
+      end subroutine prepare
    end interface
 
 contains
 
    !> Fields of the points, for rectangular floors: [2].
-   function get_point_fields(options) result(fields)
-      class(floor_model_type), intent(in), target :: options
+   function get_point_fields(self) result(fields)
+      class(floor_model_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('point_x', options%point_x, 'm', &
+         list_field('point_x', self%point_x, 'm', &
          'positions along the length of points whose velocity is computed', '[0, 1000]'), &
-         list_field('point_y', options%point_y, 'm', 'positions of these points along the width', '[0, 1000]')]
+         list_field('point_y', self%point_y, 'm', 'positions of these points along the width', '[0, 1000]')]
    end function get_point_fields
 
    !> Checks that the points lie on the floor.
-   subroutine check_points(options, group, error)
-      class(floor_model_type), intent(in) :: options
+   subroutine check_points(self, group, error)
+      class(floor_model_type), intent(in) :: self
       !> Namelist group, for messages.
       character(len=*), intent(in) :: group
       !> Set if a point lacks a coordinate or does not lie on the floor.
@@ -113,15 +114,15 @@ contains
       real(wp) :: sides(2)
       integer :: i
 
-      if (options%point_x%count /= options%point_y%count) then
-         error = input_error('&'//trim(group)//': point_x has '//to_text(options%point_x%count)//' values and point_y ' &
-            //to_text(options%point_y%count)//'; allowed: the same number of both')
-      else if (options%point_x%count > 0) then
-         call options%get_sides(sides, error)
+      if (self%point_x%count /= self%point_y%count) then
+         error = input_error('&'//trim(group)//': point_x has '//to_text(self%point_x%count)//' values and point_y ' &
+            //to_text(self%point_y%count)//'; allowed: the same number of both')
+      else if (self%point_x%count > 0) then
+         call self%get_sides(sides, error)
       end if
-      do i = 1, options%point_x%count
-         if (.not. allocated(error)) call check_point(group, sides, options%point_x%values(i), &
-            options%point_y%values(i), error)
+      do i = 1, self%point_x%count
+         if (.not. allocated(error)) call check_point(group, sides, self%point_x%values(i), &
+            self%point_y%values(i), error)
       end do
    end subroutine check_points
 
@@ -142,28 +143,17 @@ contains
    end subroutine check_point
 
    !> Checks options that depend on each other; by default, none do.
-   subroutine check(options, error)
+   subroutine check(self, error)
       !> The options, each inside its own range.
-      class(floor_model_type), intent(in) :: options
+      class(floor_model_type), intent(in) :: self
       !> Set if they contradict each other; the message names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
 
-   !> Computes what is handed on: by default the mobility.
-   subroutine prepare(options, state, error)
-      !> The options, checked.
-      class(floor_model_type), intent(in) :: options
-      type(floor_state_type), intent(out) :: state
-      !> Set if mobility or modes cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
-
-      call options%get_receiver(state%receiver, error)
-   end subroutine prepare
-
    !> Length and width; floors defined only at the source point return an error.
-   subroutine get_sides(options, sides, error)
-      class(floor_model_type), intent(in) :: options
+   subroutine get_sides(self, sides, error)
+      class(floor_model_type), intent(in) :: self
       !> Length and width, m: [2].
       real(wp), intent(out) :: sides(2)
       !> Set if the floor has none.
@@ -175,8 +165,8 @@ contains
    end subroutine get_sides
 
    !> Transfer mobility from the source to another point; floors defined only at the source point return an error.
-   subroutine get_transfer(options, state, x, y, transfer, error)
-      class(floor_model_type), intent(in) :: options
+   subroutine get_transfer(self, state, x, y, transfer, error)
+      class(floor_model_type), intent(in) :: self
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       !> Coordinates of the point along length and width, m.
@@ -187,20 +177,20 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: sides(2)
 
-      call options%get_sides(sides, error)
+      call self%get_sides(sides, error)
    end subroutine get_transfer
 
    !> Whether the floor has a plate that radiates into a room below; by default it has.
-   pure function has_radiator(options) result(yes)
-      class(floor_model_type), intent(in) :: options
+   pure function has_radiator(self) result(yes)
+      class(floor_model_type), intent(in) :: self
       logical :: yes
 
       yes = .true.
    end function has_radiator
 
    !> Checks that the options of a floor that has a radiator determine it; by default they do.
-   subroutine check_radiator(options, error)
-      class(floor_model_type), intent(in) :: options
+   subroutine check_radiator(self, error)
+      class(floor_model_type), intent(in) :: self
       !> Set if options are missing.
       type(error_type), allocatable, intent(out) :: error
 
@@ -208,8 +198,8 @@ contains
 
    !> The plate that radiates into the room below, and its conductance: the power into this plate per mean-square force,
    !> averaged over force positions. Floors without such a plate return an error.
-   subroutine get_radiator(options, state, frequency, plate, conductance, error)
-      class(floor_model_type), intent(in) :: options
+   subroutine get_radiator(self, state, frequency, plate, conductance, error)
+      class(floor_model_type), intent(in) :: self
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       !> Frequencies, Hz: [n].
@@ -224,25 +214,10 @@ contains
       error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
    end subroutine get_radiator
 
-   !> Frequency band in which the model of the floor is valid; by default all frequencies.
-   subroutine get_validity(options, state, lowest, highest, reason)
-      class(floor_model_type), intent(in) :: options
-      !> The floor, prepared.
-      type(floor_state_type), intent(in) :: state
-      !> Lowest and highest valid frequency, Hz.
-      real(wp), intent(out) :: lowest, highest
-      !> Reason for the limits, as the end of a message.
-      character(len=reason_length), intent(out) :: reason
-
-      lowest = 0.0_wp
-      highest = huge(highest)
-      reason = ''
-   end subroutine get_validity
-
    !> Modes of the floor with another support than its own; floors without modes return an error, those with modes from a
    !> file their own.
-   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
-      class(floor_model_type), intent(in) :: options
+   subroutine get_room_modes(self, state, support, plate, modes, error, max_frequency)
+      class(floor_model_type), intent(in) :: self
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       !> Support of the edges, or `uncoupled_support`.
@@ -259,8 +234,8 @@ contains
    end subroutine get_room_modes
 
    !> Modes that give the radiation factor; by default those of the floor.
-   subroutine get_radiating_modes(options, state, plate, modes, error)
-      class(floor_model_type), intent(in) :: options
+   subroutine get_radiating_modes(self, state, plate, modes, error)
+      class(floor_model_type), intent(in) :: self
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       !> The plate that radiates.
@@ -278,24 +253,24 @@ contains
    end subroutine get_radiating_modes
 
    !> Whether the modes that radiate are those of the floor; by default they are.
-   pure function has_room_modes(options) result(yes)
-      class(floor_model_type), intent(in) :: options
+   pure function has_room_modes(self) result(yes)
+      class(floor_model_type), intent(in) :: self
       logical :: yes
 
       yes = .true.
    end function has_room_modes
 
    !> Support of the edges; empty if it cannot be chosen.
-   pure function get_support(options) result(support)
-      class(floor_model_type), intent(in) :: options
+   pure function get_support(self) result(support)
+      class(floor_model_type), intent(in) :: self
       character(len=name_length) :: support
 
       support = ''
    end function get_support
 
    !> Reduction of the levels in the room by a covering whose improvement is stated, dB; by default none.
-   pure function get_improvement(options, n_band) result(improvement)
-      class(floor_model_type), intent(in) :: options
+   pure function get_improvement(self, n_band) result(improvement)
+      class(floor_model_type), intent(in) :: self
       !> Number of one-third-octave bands from 50 Hz on.
       integer, intent(in) :: n_band
       real(wp) :: improvement(n_band)
@@ -303,17 +278,9 @@ contains
       improvement = 0.0_wp
    end function get_improvement
 
-   !> Whether the mean power into the floor follows from its modes, because no homogeneous plate represents it.
-   function has_modal_conductance(options) result(yes)
-      class(floor_model_type), intent(in) :: options
-      logical :: yes
-
-      yes = .false.
-   end function has_modal_conductance
-
    !> Whether a subceiling is a part of the floor; by default not.
-   pure function has_subceiling(options) result(yes)
-      class(floor_model_type), intent(in) :: options
+   pure function has_subceiling(self) result(yes)
+      class(floor_model_type), intent(in) :: self
       logical :: yes
 
       yes = .false.

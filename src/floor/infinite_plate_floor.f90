@@ -2,10 +2,9 @@
 module thud_infinite_plate_floor
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, floor_state_type
    use thud_kinds, only: wp
    use thud_new_field, only: real_field
-   use thud_receiver, only: receiver_type
    implicit none (type, external)
    private
 
@@ -16,35 +15,35 @@ module thud_infinite_plate_floor
       !> Force divided by velocity, 8 sqrt(B' m''), N s/m.
       real(wp) :: resistance = 1600.0_wp
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: get_receiver
-      procedure, pass(options) :: has_radiator
+      procedure :: get_fields
+      procedure :: prepare
+      procedure :: has_radiator
    end type infinite_plate_floor_type
 
 contains
 
    !> Keys and allowed ranges of the group `&infinite_plate`.
-   function get_fields(options) result(fields)
-      class(infinite_plate_floor_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(infinite_plate_floor_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
-      fields = [real_field('resistance', options%resistance, 'N s/m', &
+      fields = [real_field('resistance', self%resistance, 'N s/m', &
          'driving-point resistance: force divided by velocity', '[1, 1e15]')]
    end function get_fields
 
    !> The mobility is constant: it has no poles.
-   subroutine get_receiver(options, receiver, error)
-      class(infinite_plate_floor_type), intent(in) :: options
-      type(receiver_type), intent(out) :: receiver
+   subroutine prepare(self, state, error)
+      class(infinite_plate_floor_type), intent(in) :: self
+      type(floor_state_type), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
 
-      receiver%direct = 1/options%resistance
-      allocate (receiver%pole(0), receiver%residue(0))
-   end subroutine get_receiver
+      state%receiver%direct = 1/self%resistance
+      allocate (state%receiver%pole(0), state%receiver%residue(0))
+   end subroutine prepare
 
    !> A resistance alone does not radiate into a room.
-   pure function has_radiator(options) result(yes)
-      class(infinite_plate_floor_type), intent(in) :: options
+   pure function has_radiator(self) result(yes)
+      class(infinite_plate_floor_type), intent(in) :: self
       logical :: yes
 
       yes = .false.

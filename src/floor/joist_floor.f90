@@ -2,7 +2,6 @@
 module thud_joist_floor
    use thud_constants, only: pi
    use thud_field, only: field_type, name_length
-   use thud_floor_model, only: floor_state_type, reason_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, real_field
    use thud_plate, only: plate_type
@@ -34,100 +33,102 @@ module thud_joist_floor
       !> Impact location: midway between the next two joists (`sheathing`), the next `joist`, or exactly the `position`.
       character(len=name_length) :: source_on = 'sheathing'
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: get_base
-      procedure, pass(options) :: get_source
-      procedure, pass(options) :: get_validity
+      procedure :: get_fields
+      procedure :: get_base
+      procedure :: get_source
    end type joist_floor_type
 
 contains
 
    !> Keys and allowed ranges of the group `&joist_floor`.
-   function get_fields(options) result(fields)
-      class(joist_floor_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(joist_floor_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', options%length, 'm', 'span of the joists', '[0.5, 100]'), &
-         real_field('width', options%width, 'm', 'width of the floor across the joists', '[0.5, 100]'), &
-         real_field('sheathing_thickness', options%sheathing_thickness, 'm', 'thickness of the sheathing', '[0.003, 0.3]'), &
-         real_field('sheathing_density', options%sheathing_density, 'kg/m3', 'density of the sheathing', '[10, 20000]'), &
-         real_field('sheathing_modulus', options%sheathing_modulus, 'Pa', &
+         real_field('length', self%length, 'm', 'span of the joists', '[0.5, 100]'), &
+         real_field('width', self%width, 'm', 'width of the floor across the joists', '[0.5, 100]'), &
+         real_field('sheathing_thickness', self%sheathing_thickness, 'm', 'thickness of the sheathing', '[0.003, 0.3]'), &
+         real_field('sheathing_density', self%sheathing_density, 'kg/m3', 'density of the sheathing', '[10, 20000]'), &
+         real_field('sheathing_modulus', self%sheathing_modulus, 'Pa', &
          'modulus of elasticity of the sheathing in bending', '[1e7, 1e12]'), &
-         real_field('spacing', options%spacing, 'm', &
+         real_field('spacing', self%spacing, 'm', &
          'distance between the axes of adjacent joists', '(joist_width, width)'), &
-         real_field('joist_width', options%joist_width, 'm', 'width of a joist', '[0.005, 1]'), &
-         real_field('joist_height', options%joist_height, 'm', 'height of a joist', '[0.01, 2]'), &
-         real_field('joist_density', options%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
-         real_field('joist_modulus', options%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
-         real_field('connection', options%connection, '', &
+         real_field('joist_width', self%joist_width, 'm', 'width of a joist', '[0.005, 1]'), &
+         real_field('joist_height', self%joist_height, 'm', 'height of a joist', '[0.01, 2]'), &
+         real_field('joist_density', self%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
+         real_field('joist_modulus', self%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
+         real_field('connection', self%connection, '', &
          'composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
-         real_field('loss_factor', options%loss_factor, '', &
+         real_field('loss_factor', self%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
-         options%get_source_fields(), &
-         choice_field('source_on', options%source_on, &
+         self%get_source_fields(), &
+         choice_field('source_on', self%source_on, &
          'impact location: midway between the next joists, on the next joist, or exactly the position', &
          [character(len=9) :: 'sheathing', 'joist', 'position']), &
-         options%get_build_up_fields(on_joists=.true.), options%get_point_fields()]
+         self%get_build_up_fields(on_joists=.true.), self%get_point_fields()]
    end function get_fields
 
    !> The smeared plate, and the sheathing with its joists.
-   function get_base(options) result(base)
-      class(joist_floor_type), intent(in) :: options
+   function get_base(self) result(base)
+      class(joist_floor_type), intent(in) :: self
       type(base_floor_type) :: base
       type(ribs_type) :: joists
 
       base%group = 'joist_floor'
       base%is_homogeneous = .false.
-      base%plate = get_smeared(options)
-      base%stiffness = new_orthotropic(plate_type(length=options%length, width=options%width, &
-         thickness=options%sheathing_thickness, density=options%sheathing_density, &
-         wave_speed=sqrt(options%sheathing_modulus/options%sheathing_density), loss_factor=options%loss_factor))
-      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
-         arm => (options%joist_height + options%sheathing_thickness)/2)
-         joists%position = get_positions(options)
+      base%plate = get_smeared(self)
+      base%stiffness = new_orthotropic(plate_type(length=self%length, width=self%width, &
+         thickness=self%sheathing_thickness, density=self%sheathing_density, &
+         wave_speed=sqrt(self%sheathing_modulus/self%sheathing_density), loss_factor=self%loss_factor))
+      base%highest_frequency = (2*pi/(6*self%sheathing_thickness))**2 &
+         *sqrt(base%stiffness%along/base%stiffness%mass)/(2*pi)
+      base%validity_reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
+      associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
+         arm => (self%joist_height + self%sheathing_thickness)/2)
+         joists%position = get_positions(self)
          joists%bending = e*b*h**3/12
-         call get_composite(options, joists%composite, joists%slip)
+         call get_composite(self, joists%composite, joists%slip)
          ! Shear coefficient of a rectangle: 5/6.
          joists%shear = 5*shear_ratio*e*b*h/6
          joists%torsion = shear_ratio*e*get_torsion_constant(b, h)
-         joists%mass = options%joist_density*b*h
+         joists%mass = self%joist_density*b*h
          joists%inertia = joists%mass*(b**2 + h**2)/12
          ! A free joist swings about the sheathing, and bends sideways where it twists; a subceiling holds it.
-         if (.not. options%has_subceiling()) then
+         if (.not. self%has_subceiling()) then
             joists%inertia = joists%inertia + joists%mass*arm**2
             joists%warping = e*h*b**3/12*arm**2
          end if
       end associate
-      joists%loss_factor = options%loss_factor
+      joists%loss_factor = self%loss_factor
       allocate (base%stiffness%ribs, source=joists)
    end function get_base
 
    !> Positions of the joists' axes across the width, symmetric about the center, m: [n_joist].
-   pure function get_positions(options) result(position)
-      class(joist_floor_type), intent(in) :: options
+   pure function get_positions(self) result(position)
+      class(joist_floor_type), intent(in) :: self
       real(wp), allocatable :: position(:)
       integer :: i, n
 
-      n = max(1, int(options%width/options%spacing*(1 + epsilon(1.0_wp))))
+      n = max(1, int(self%width/self%spacing*(1 + epsilon(1.0_wp))))
       ! A joist at the edge itself would not move.
-      if ((n - 1)*options%spacing > options%width - options%joist_width) n = n - 1
-      position = options%width/2 + options%spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
+      if ((n - 1)*self%spacing > self%width - self%joist_width) n = n - 1
+      position = self%width/2 + self%spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
    end function get_positions
 
    !> Relative position of the source.
-   function get_source(options) result(source)
-      class(joist_floor_type), intent(in) :: options
+   function get_source(self) result(source)
+      class(joist_floor_type), intent(in) :: self
       real(wp) :: source(2)
 
-      source = [options%source_x, options%source_y]
-      associate (joists => get_positions(options), y => options%source_y*options%width)
+      source = [self%source_x, self%source_y]
+      associate (joists => get_positions(self), y => self%source_y*self%width)
          associate (n => size(joists))
-            select case (options%source_on)
+            select case (self%source_on)
              case ('joist')
-               source(2) = get_nearest(joists, y)/options%width
+               source(2) = get_nearest(joists, y)/self%width
              case ('sheathing')
-               if (n > 1) source(2) = get_nearest((joists(:n - 1) + joists(2:))/2, y)/options%width
+               if (n > 1) source(2) = get_nearest((joists(:n - 1) + joists(2:))/2, y)/self%width
              case default
                continue
             end select
@@ -147,50 +148,50 @@ contains
    !> Bending stiffness that the sheathing adds to a joist, without that of its own bending, and its slip
    !> (EN 1995-1-1 annex B: a deflection with the wavenumber k has gamma = 1/(1 + E A k**2/K) with the sheathing's axial
    !> stiffness E A and the slip modulus K per length).
-   pure subroutine get_composite(options, composite, slip)
-      class(joist_floor_type), intent(in) :: options
+   pure subroutine get_composite(self, composite, slip)
+      class(joist_floor_type), intent(in) :: self
       !> Bending stiffness without slip, N m2, and slip by shear force, 1/N.
       real(wp), intent(out) :: composite, slip
       real(wp) :: sheathing, joist, arm
       ! Loose sheathing slips freely.
       real(wp), parameter :: loose = 1.0e-15_wp
 
-      sheathing = options%sheathing_modulus*options%sheathing_thickness*options%spacing
-      joist = options%joist_modulus*options%joist_width*options%joist_height
-      arm = (options%joist_height + options%sheathing_thickness)/2
+      sheathing = self%sheathing_modulus*self%sheathing_thickness*self%spacing
+      joist = self%joist_modulus*self%joist_width*self%joist_height
+      arm = (self%joist_height + self%sheathing_thickness)/2
       composite = arm**2*sheathing*joist/(sheathing + joist)
-      slip = (1/max(options%connection, loose) - 1)/(sheathing*arm**2)*(options%length/pi)**2
+      slip = (1/max(self%connection, loose) - 1)/(sheathing*arm**2)*(self%length/pi)**2
    end subroutine get_composite
 
    !> The orthotropic plate with smeared joists, as thick as the sheathing.
    !>
    !> The bending stiffness along the joists is that of sheathing and joists over the span, across them B' of the sheathing;
    !> H = B' + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
-   pure function get_smeared(options) result(plate)
-      class(joist_floor_type), intent(in) :: options
+   pure function get_smeared(self) result(plate)
+      class(joist_floor_type), intent(in) :: self
       type(plate_type) :: plate
       real(wp) :: across, along, torsion, mass, composite, slip
 
-      call get_composite(options, composite, slip)
-      across = get_sheathing_stiffness(options)
-      associate (e => options%joist_modulus, b => options%joist_width, h => options%joist_height, &
-         t => options%sheathing_thickness, a => options%spacing)
-         along = across + (e*b*h**3/12 + composite/(1 + slip*composite*(pi/options%length)**2))/a
+      call get_composite(self, composite, slip)
+      across = get_sheathing_stiffness(self)
+      associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
+         t => self%sheathing_thickness, a => self%spacing)
+         along = across + (e*b*h**3/12 + composite/(1 + slip*composite*(pi/self%length)**2))/a
          torsion = across + shear_ratio*e*get_torsion_constant(b, h)/(2*a)
-         mass = options%sheathing_density*t + options%joist_density*b*h/a
+         mass = self%sheathing_density*t + self%joist_density*b*h/a
       end associate
-      plate = plate_type(length=options%length, width=options%width, thickness=options%sheathing_thickness, &
-         density=mass/options%sheathing_thickness, stiffness_ratio=across/along, torsion_ratio=torsion/sqrt(along*across), &
-         loss_factor=options%loss_factor, edges='absorption')
+      plate = plate_type(length=self%length, width=self%width, thickness=self%sheathing_thickness, &
+         density=mass/self%sheathing_thickness, stiffness_ratio=across/along, torsion_ratio=torsion/sqrt(along*across), &
+         loss_factor=self%loss_factor, edges='absorption')
       plate%wave_speed = sqrt(12*sqrt(along*across)/mass)/plate%thickness
    end function get_smeared
 
    !> Bending stiffness of the sheathing per unit width, N m.
-   pure function get_sheathing_stiffness(options) result(stiffness)
-      class(joist_floor_type), intent(in) :: options
+   pure function get_sheathing_stiffness(self) result(stiffness)
+      class(joist_floor_type), intent(in) :: self
       real(wp) :: stiffness
 
-      stiffness = options%sheathing_modulus*options%sheathing_thickness**3/12
+      stiffness = self%sheathing_modulus*self%sheathing_thickness**3/12
    end function get_sheathing_stiffness
 
    !> Torsion constant of a rectangle, within 0.5 % (Roark).
@@ -204,20 +205,5 @@ contains
          constant = long*short**3*(1.0_wp/3 - 0.21_wp*short/long*(1 - (short/long)**4/12))
       end associate
    end function get_torsion_constant
-
-   !> Frequency band in which the sheathing is thin.
-   subroutine get_validity(options, state, lowest, highest, reason)
-      class(joist_floor_type), intent(in) :: options
-      type(floor_state_type), intent(in) :: state
-      real(wp), intent(out) :: lowest, highest
-      character(len=reason_length), intent(out) :: reason
-      type(base_floor_type) :: base
-
-      base = options%get_base()
-      lowest = 0.0_wp
-      highest = (2*pi/(6*options%sheathing_thickness))**2*sqrt(base%stiffness%along/base%stiffness%mass)/(2*pi)
-      reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
-      call options%limit_by_surroundings(base%plate, highest, reason)
-   end subroutine get_validity
 
 end module thud_joist_floor

@@ -2,7 +2,6 @@
 module thud_laminate_floor
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
-   use thud_floor_model, only: floor_state_type, reason_length
    use thud_kinds, only: wp
    use thud_legendre, only: get_gauss_legendre
    use thud_new_field, only: list_field, real_field
@@ -34,65 +33,64 @@ module thud_laminate_floor
       !> Loss factor including that of the edges, without radiation.
       real(wp) :: loss_factor = 0.03_wp
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: get_base
-      procedure, pass(options) :: get_validity
+      procedure :: get_fields
+      procedure :: check
+      procedure :: get_base
    end type laminate_floor_type
 
 contains
 
    !> Keys and allowed ranges of the group `&laminate_floor`.
-   function get_fields(options) result(fields)
-      class(laminate_floor_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(laminate_floor_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', options%length, 'm', 'length of the floor, along the grain of the first layer', &
+         real_field('length', self%length, 'm', 'length of the floor, along the grain of the first layer', &
          '[0.5, 100]'), &
-         real_field('width', options%width, 'm', 'width of the floor', '[0.5, 100]'), &
-         list_field('layer_thickness', options%layer_thickness, 'm', &
+         real_field('width', self%width, 'm', 'width of the floor', '[0.5, 100]'), &
+         list_field('layer_thickness', self%layer_thickness, 'm', &
          'thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &
-         real_field('youngs_modulus', options%youngs_modulus, 'Pa', &
+         real_field('youngs_modulus', self%youngs_modulus, 'Pa', &
          'modulus of elasticity along the grain', '[1e8, 1e12]'), &
-         real_field('cross_modulus', options%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
-         real_field('shear_modulus', options%shear_modulus, 'Pa', 'shear modulus along the grain', '[1e6, 1e12]'), &
-         real_field('rolling_shear_modulus', options%rolling_shear_modulus, 'Pa', &
+         real_field('cross_modulus', self%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
+         real_field('shear_modulus', self%shear_modulus, 'Pa', 'shear modulus along the grain', '[1e6, 1e12]'), &
+         real_field('rolling_shear_modulus', self%rolling_shear_modulus, 'Pa', &
          'modulus of rolling shear', '[1e6, 1e12]'), &
-         real_field('torsion_factor', options%torsion_factor, '', &
+         real_field('torsion_factor', self%torsion_factor, '', &
          'fraction of the torsional stiffness that joints between boards leave', '[0, 1]'), &
-         real_field('density', options%density, 'kg/m3', 'density of the layers', '[10, 20000]'), &
-         real_field('added_mass', options%added_mass, 'kg/m2', &
+         real_field('density', self%density, 'kg/m3', 'density of the layers', '[10, 20000]'), &
+         real_field('added_mass', self%added_mass, 'kg/m2', &
          'mass without stiffness on the plate, as gravel', '[0, 1000]'), &
-         real_field('loss_factor', options%loss_factor, '', &
+         real_field('loss_factor', self%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
-         options%get_source_fields(), options%get_build_up_fields(), options%get_point_fields()]
+         self%get_source_fields(), self%get_build_up_fields(), self%get_point_fields()]
    end function get_fields
 
    !> Checks the layers, then what all rectangular floors have.
-   subroutine check(options, error)
-      class(laminate_floor_type), intent(in) :: options
+   subroutine check(self, error)
+      class(laminate_floor_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
-      base = options%get_base()
+      base = self%get_base()
       if (min(base%stiffness%along, base%stiffness%across) > 0.0_wp) then
-         call options%check_build_up(error)
+         call self%check_build_up(error)
       else
-         error = input_error('&laminate_floor: cross_modulus = '//to_text(options%cross_modulus)//' Pa leaves a single ' &
+         error = input_error('&laminate_floor: cross_modulus = '//to_text(self%cross_modulus)//' Pa leaves a single ' &
             //'layer without stiffness across it; allowed: a modulus above 0, or more layers')
       end if
    end subroutine check
 
    !> Thicknesses, m, and whether the grain runs along the length: [n_layer].
-   pure subroutine get_layers(options, thickness, is_along)
-      class(laminate_floor_type), intent(in) :: options
+   pure subroutine get_layers(self, thickness, is_along)
+      class(laminate_floor_type), intent(in) :: self
       real(wp), allocatable, intent(out) :: thickness(:)
       logical, allocatable, intent(out) :: is_along(:)
       integer :: i
 
       thickness = default_thickness
-      if (options%layer_thickness%count > 0) thickness = options%layer_thickness%values(:options%layer_thickness%count)
+      if (self%layer_thickness%count > 0) thickness = self%layer_thickness%values(:self%layer_thickness%count)
       is_along = [(mod(i, 2) == 1, i=1, size(thickness))]
    end subroutine get_layers
 
@@ -130,8 +128,8 @@ contains
    end subroutine get_section
 
    !> The equivalent homogeneous plate, and the stiffnesses of the layers.
-   function get_base(options) result(base)
-      class(laminate_floor_type), intent(in) :: options
+   function get_base(self) result(base)
+      class(laminate_floor_type), intent(in) :: self
       type(base_floor_type) :: base
       real(wp), allocatable :: thickness(:)
       logical, allocatable :: is_along(:)
@@ -139,37 +137,24 @@ contains
 
       base%group = 'laminate_floor'
       base%is_homogeneous = .false.
-      call get_layers(options, thickness, is_along)
-      associate (e => options%youngs_modulus, e_cross => options%cross_modulus, g => options%shear_modulus, &
-         g_rolling => options%rolling_shear_modulus, total => sum(thickness), layers => base%stiffness)
+      call get_layers(self, thickness, is_along)
+      associate (e => self%youngs_modulus, e_cross => self%cross_modulus, g => self%shear_modulus, &
+         g_rolling => self%rolling_shear_modulus, total => sum(thickness), layers => base%stiffness)
          call get_section(thickness, merge(e, e_cross, is_along), merge(g, g_rolling, is_along), layers%along, &
             layers%shear(1))
          call get_section(thickness, merge(e_cross, e, is_along), merge(g_rolling, g, is_along), layers%across, &
             layers%shear(2))
-         layers%torsion = options%torsion_factor*g*total**3/12
-         layers%mass = options%density*total + options%added_mass
-         layers%inertia = options%density*total**3/12
-         layers%loss_factor = options%loss_factor
+         layers%torsion = self%torsion_factor*g*total**3/12
+         layers%mass = self%density*total + self%added_mass
+         layers%inertia = self%density*total**3/12
+         layers%loss_factor = self%loss_factor
          mean = sqrt(layers%along*layers%across)
-         base%plate = plate_type(length=options%length, width=options%width, thickness=total, density=layers%mass/total, &
+         base%plate = plate_type(length=self%length, width=self%width, thickness=total, density=layers%mass/total, &
             wave_speed=sqrt(12*mean/layers%mass)/total, stiffness_ratio=layers%across/layers%along, &
-            torsion_ratio=min(2*layers%torsion/mean, 1.0_wp), loss_factor=options%loss_factor, edges='absorption')
+            torsion_ratio=min(2*layers%torsion/mean, 1.0_wp), loss_factor=self%loss_factor, edges='absorption')
       end associate
+      base%highest_frequency = sqrt(minval(base%stiffness%shear)/base%stiffness%mass)/(2*base%plate%thickness)
+      base%validity_reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
    end function get_base
-
-   !> Frequency band in which shear waves are longer than two thicknesses.
-   subroutine get_validity(options, state, lowest, highest, reason)
-      class(laminate_floor_type), intent(in) :: options
-      type(floor_state_type), intent(in) :: state
-      real(wp), intent(out) :: lowest, highest
-      character(len=reason_length), intent(out) :: reason
-      type(base_floor_type) :: base
-
-      base = options%get_base()
-      lowest = 0.0_wp
-      highest = sqrt(minval(base%stiffness%shear)/base%stiffness%mass)/(2*base%plate%thickness)
-      reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
-      call options%limit_by_surroundings(base%plate, highest, reason)
-   end subroutine get_validity
 
 end module thud_laminate_floor

@@ -3,7 +3,7 @@ module thud_modal_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, name_length
-   use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length
+   use thud_floor_model, only: check_point, floor_model_type, floor_state_type
    use thud_floor_modes, only: floor_modes_type, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: real_field, text_field
@@ -31,57 +31,54 @@ module thud_modal_floor
       !> Homogeneous plate of the same mass and mean stiffness; no thickness: none. The file states sides and losses.
       type(plate_type) :: plate = plate_type(thickness=0.0_wp)
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: prepare
-      procedure, pass(options) :: get_receiver
-      procedure, pass(options) :: get_sides
-      procedure, pass(options) :: check_radiator
-      procedure, pass(options) :: get_transfer
-      procedure, pass(options) :: get_radiator
-      procedure, pass(options) :: get_validity
-      procedure, pass(options) :: get_room_modes
-      procedure, pass(options) :: has_modal_conductance
+      procedure :: get_fields
+      procedure :: check
+      procedure :: prepare
+      procedure :: get_sides
+      procedure :: check_radiator
+      procedure :: get_transfer
+      procedure :: get_radiator
+      procedure :: get_room_modes
    end type modal_floor_type
 
 contains
 
    !> Keys and allowed ranges of the group `&modal_floor`.
-   function get_fields(options) result(fields)
-      class(modal_floor_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(modal_floor_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
-      fields = get_plate_fields(options%plate, optional_plate=.true.)
+      fields = get_plate_fields(self%plate, optional_plate=.true.)
       fields = [ &
-         text_field('file', options%file, 'file of the modes: frequencies, loss factors, shapes on a grid', &
+         text_field('file', self%file, 'file of the modes: frequencies, loss factors, shapes on a grid', &
          is_path=.true.), &
-         real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
+         real_field('source_x', self%source_x, '', 'relative source position along the length; ' &
          //'levels in the room are means over positions', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)'), &
-         real_field('residual_compliance', options%residual_compliance, 'm/N', &
+         real_field('source_y', self%source_y, '', 'relative source position along the width', '(0, 1)'), &
+         real_field('residual_compliance', self%residual_compliance, 'm/N', &
          'static compliance at the source of the modes above those of the file; 0: that of the plate', '[0, 1]'), &
          pack(fields, fields%key == 'thickness' .or. fields%key == 'density' .or. fields%key == 'wave_speed' &
-         .or. fields%key == 'stiffness_ratio' .or. fields%key == 'torsion_ratio'), options%get_point_fields()]
+         .or. fields%key == 'stiffness_ratio' .or. fields%key == 'torsion_ratio'), self%get_point_fields()]
    end function get_fields
 
    !> Checks the file, and that a plate fits its modes.
-   subroutine check(options, error)
-      class(modal_floor_type), intent(in) :: options
+   subroutine check(self, error)
+      class(modal_floor_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
       type(floor_modes_type) :: modes
       type(plate_type) :: plate
       real(wp), allocatable :: square(:)
       real(wp) :: mass, expected, highest
 
-      call get_modes(options, modes, error)
-      if (allocated(error) .or. .not. options%plate%thickness > 0.0_wp) return
-      plate = get_plate(options, modes)
+      call get_modes(self, modes, error)
+      if (allocated(error) .or. .not. self%plate%thickness > 0.0_wp) return
+      plate = get_plate(self, modes)
       ! The integral of m'' w**2 is 1 kg times the squared unit of w: the mass per area follows, exactly where it is uniform.
       square = sum(modes%modes%block(1)%shape(1)%coefficient**2, dim=1)
       mass = 1/get_median(square)
       associate (ratio => mass/get_surface_mass(plate))
          if (ratio > max_mass_ratio .or. ratio < 1/max_mass_ratio) then
-            error = input_error('&modal_floor: the modes of '//trim(options%file)//' have a mass per area of ' &
+            error = input_error('&modal_floor: the modes of '//trim(self%file)//' have a mass per area of ' &
                //to_text(real_digits(mass))//' kg/m2, the plate has '//to_text(real_digits(get_surface_mass(plate))) &
                //' kg/m2; allowed: the same within a factor of '//fixed(max_mass_ratio, 0) &
                //', with shapes for a modal mass of 1 kg or a row modal_mass')
@@ -93,7 +90,7 @@ contains
       associate (wave => sqrt(4*pi*get_mode_density(plate)*highest/(plate%length*plate%width)))
          expected = get_mode_density(plate)*highest - (plate%length + plate%width)*wave/(2*pi)
       end associate
-      if (expected > max_count_ratio*size(modes%omega)) error = input_error('&modal_floor: '//trim(options%file)//' has ' &
+      if (expected > max_count_ratio*size(modes%omega)) error = input_error('&modal_floor: '//trim(self%file)//' has ' &
          //to_text(size(modes%omega))//' modes up to '//fixed(highest, 0)//' Hz, the plate about ' &
          //fixed(expected, 0)//'; allowed: all modes of the floor, and the thickness, density and wave_speed of a plate ' &
          //'like it')
@@ -121,27 +118,27 @@ contains
    end function get_median
 
    !> Modes of the file.
-   subroutine get_modes(options, modes, error)
-      class(modal_floor_type), intent(in) :: options
+   subroutine get_modes(self, modes, error)
+      class(modal_floor_type), intent(in) :: self
       type(floor_modes_type), intent(out) :: modes
       !> Set if the file does not hold them.
       type(error_type), allocatable, intent(out) :: error
 
-      if (options%file == '') then
+      if (self%file == '') then
          error = input_error('&modal_floor: file is empty; allowed: the path of a table of modes')
          return
       end if
-      call read_sampled_modes(trim(options%file), modes, error)
+      call read_sampled_modes(trim(self%file), modes, error)
       if (allocated(error)) error = input_error('&modal_floor: '//error%message)
    end subroutine get_modes
 
    !> The plate, with sides and losses of the file.
-   function get_plate(options, modes) result(plate)
-      class(modal_floor_type), intent(in) :: options
+   function get_plate(self, modes) result(plate)
+      class(modal_floor_type), intent(in) :: self
       type(floor_modes_type), intent(in) :: modes
       type(plate_type) :: plate
 
-      plate = options%plate
+      plate = self%plate
       plate%length = modes%stack%length
       plate%width = modes%stack%width
       plate%loss_factor = 0.0_wp
@@ -149,63 +146,62 @@ contains
       plate%known_loss = modes%loss_factor
    end function get_plate
 
-   !> Modes of the file, and the mobility at the source.
-   subroutine prepare(options, state, error)
-      class(modal_floor_type), intent(in) :: options
+   !> Modes of the file, not of a homogeneous plate, and the mobility at the source; valid up to the highest mode.
+   subroutine prepare(self, state, error)
+      class(modal_floor_type), intent(in) :: self
       type(floor_state_type), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
 
-      call get_modes(options, state%modes, error)
+      call get_modes(self, state%modes, error)
       if (allocated(error)) return
-      state%plate = get_plate(options, state%modes)
-      associate (source => [options%source_x, options%source_y])
-         call new_floor_receiver('modal_floor', state%modes, get_residual_resistance(options, state%modes), source, source, &
+      state%plate = get_plate(self, state%modes)
+      state%has_modal_conductance = .true.
+      state%highest_frequency = maxval(state%modes%omega)/(2*pi)
+      if (self%plate%thickness > 0.0_wp) then
+         state%validity_reason = 'the file has no modes, and the infinite plate takes their place'
+      else if (self%residual_compliance > 0.0_wp) then
+         state%validity_reason = 'the file has no modes, and the stated compliance takes their place'
+      else
+         state%validity_reason = 'the file has no modes, and the floor has their mobility only: ' &
+            //'state a plate or residual_compliance'
+      end if
+      associate (source => [self%source_x, self%source_y])
+         call new_floor_receiver('modal_floor', state%modes, get_residual_resistance(self, state%modes), source, source, &
             state%receiver, error)
       end associate
    end subroutine prepare
 
-   !> Mobility at the source.
-   subroutine get_receiver(options, receiver, error)
-      class(modal_floor_type), intent(in) :: options
-      type(receiver_type), intent(out) :: receiver
-      type(error_type), allocatable, intent(out) :: error
-      type(floor_state_type) :: state
-
-      call options%prepare(state, error)
-      if (.not. allocated(error)) receiver = state%receiver
-   end subroutine get_receiver
-
    !> Length and width of the grid of the file.
-   subroutine get_sides(options, sides, error)
-      class(modal_floor_type), intent(in) :: options
+   subroutine get_sides(self, sides, error)
+      class(modal_floor_type), intent(in) :: self
       real(wp), intent(out) :: sides(2)
       type(error_type), allocatable, intent(out) :: error
       type(floor_modes_type) :: modes
 
       sides = 0.0_wp
-      call get_modes(options, modes, error)
+      call get_modes(self, modes, error)
       if (.not. allocated(error)) sides = [modes%stack%length, modes%stack%width]
    end subroutine get_sides
 
    !> Resistance at high frequencies of the infinite plate, or of the residual modes with a stated compliance, N s/m.
-   pure function get_residual_resistance(options, modes) result(resistance)
-      class(modal_floor_type), intent(in) :: options
+   pure function get_residual_resistance(self, modes) result(resistance)
+      class(modal_floor_type), intent(in) :: self
       type(floor_modes_type), intent(in) :: modes
       real(wp) :: resistance
 
       ! Without either, nothing moves beside the modes.
       resistance = sqrt(huge(1.0_wp))
-      if (options%residual_compliance > 0.0_wp) then
+      if (self%residual_compliance > 0.0_wp) then
          ! `new_floor_receiver` lets residual modes of the resistance Z have the compliance 2/(pi Z limit).
-         resistance = 2/(pi*options%residual_compliance*modes%sum_limit)
-      else if (options%plate%thickness > 0.0_wp) then
-         resistance = get_resistance(options%plate)
+         resistance = 2/(pi*self%residual_compliance*modes%sum_limit)
+      else if (self%plate%thickness > 0.0_wp) then
+         resistance = get_resistance(self%plate)
       end if
    end function get_residual_resistance
 
    !> Transfer mobility to another point; a point outside the floor is an error.
-   subroutine get_transfer(options, state, x, y, transfer, error)
-      class(modal_floor_type), intent(in) :: options
+   subroutine get_transfer(self, state, x, y, transfer, error)
+      class(modal_floor_type), intent(in) :: self
       type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
@@ -213,27 +209,27 @@ contains
 
       associate (modes => state%modes, sides => [state%modes%stack%length, state%modes%stack%width])
          call check_point('modal_floor', sides, x, y, error)
-         if (.not. allocated(error)) call new_floor_receiver('modal_floor', modes, get_residual_resistance(options, modes), &
-            [options%source_x, options%source_y], [x, y]/sides, transfer, error)
+         if (.not. allocated(error)) call new_floor_receiver('modal_floor', modes, get_residual_resistance(self, modes), &
+            [self%source_x, self%source_y], [x, y]/sides, transfer, error)
       end associate
    end subroutine get_transfer
 
    !> Checks that a plate is stated, which replaces the modes above the highest one.
-   subroutine check_radiator(options, error)
-      class(modal_floor_type), intent(in) :: options
+   subroutine check_radiator(self, error)
+      class(modal_floor_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
       type(floor_modes_type) :: modes
 
-      if (options%plate%thickness > 0.0_wp) return
-      call get_modes(options, modes, error)
+      if (self%plate%thickness > 0.0_wp) return
+      call get_modes(self, modes, error)
       if (.not. allocated(error)) error = input_error('&modal_floor: the level in a room needs the mass of the floor, and ' &
          //'a plate in place of the modes above '//fixed(maxval(modes%omega)/(2*pi), 0)//' Hz; allowed: thickness (above ' &
          //'0), density and wave_speed of a plate like the floor')
    end subroutine check_radiator
 
    !> The plate, which replaces the modes above the highest one.
-   subroutine get_radiator(options, state, frequency, plate, conductance, error)
-      class(modal_floor_type), intent(in) :: options
+   subroutine get_radiator(self, state, frequency, plate, conductance, error)
+      class(modal_floor_type), intent(in) :: self
       type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
@@ -241,15 +237,15 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       conductance = 0.0_wp
-      call options%check_radiator(error)
+      call self%check_radiator(error)
       if (allocated(error)) return
       plate = state%plate
       conductance = 1/get_resistance(plate)
    end subroutine get_radiator
 
    !> The modes, whose edges are those of the floor.
-   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
-      class(modal_floor_type), intent(in) :: options
+   subroutine get_room_modes(self, state, support, plate, modes, error, max_frequency)
+      class(modal_floor_type), intent(in) :: self
       type(floor_state_type), intent(in) :: state
       character(len=*), intent(in) :: support
       type(plate_type), intent(out) :: plate
@@ -260,31 +256,5 @@ contains
       plate = state%plate
       modes = state%modes
    end subroutine get_room_modes
-
-   !> Frequencies up to the highest mode.
-   subroutine get_validity(options, state, lowest, highest, reason)
-      class(modal_floor_type), intent(in) :: options
-      type(floor_state_type), intent(in) :: state
-      real(wp), intent(out) :: lowest, highest
-      character(len=reason_length), intent(out) :: reason
-
-      lowest = 0.0_wp
-      highest = maxval(state%modes%omega)/(2*pi)
-      if (options%plate%thickness > 0.0_wp) then
-         reason = 'the file has no modes, and the infinite plate takes their place'
-      else if (options%residual_compliance > 0.0_wp) then
-         reason = 'the file has no modes, and the stated compliance takes their place'
-      else
-         reason = 'the file has no modes, and the floor has their mobility only: state a plate or residual_compliance'
-      end if
-   end subroutine get_validity
-
-   !> The modes are those of this floor, not of a homogeneous plate.
-   pure function has_modal_conductance(options) result(yes)
-      class(modal_floor_type), intent(in) :: options
-      logical :: yes
-
-      yes = .true.
-   end function has_modal_conductance
 
 end module thud_modal_floor

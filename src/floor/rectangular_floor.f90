@@ -48,6 +48,9 @@ module thud_rectangular_floor
       type(orthotropic_type) :: stiffness
       !> Whether the homogeneous plate represents the mean power into the floor.
       logical :: is_homogeneous = .true.
+      !> Frequency up to which the model of the plate is valid, Hz, and the reason, as the end of a message.
+      real(wp) :: highest_frequency = huge(1.0_wp)
+      character(len=reason_length) :: validity_reason = ''
    end type base_floor_type
 
    !> The floor; all plates have the same length and width.
@@ -70,34 +73,29 @@ module thud_rectangular_floor
       !> Reduction of the heavy impact sound by a covering, dB: one for each octave or one-third-octave band; empty: none.
       type(list_type) :: covering_improvement
    contains
-      procedure, pass(options) :: get_source_fields
-      procedure, pass(options) :: get_build_up_fields
-      procedure, pass(options) :: check
-      procedure, pass(options) :: check_build_up
-      procedure, pass(options) :: prepare
-      procedure, pass(options) :: get_receiver
-      procedure, pass(options) :: get_sides
-      procedure, pass(options) :: get_transfer
-      procedure, pass(options) :: get_mobility_at
-      procedure, pass(options) :: get_source
-      procedure, pass(options) :: get_radiator
-      procedure, pass(options) :: get_validity
-      procedure, pass(options) :: limit_by_surroundings
-      procedure, pass(options) :: get_room_modes
-      procedure, pass(options) :: get_support
-      procedure, pass(options) :: get_improvement
-      procedure, pass(options) :: has_modal_conductance
-      procedure, pass(options) :: get_double_plate
-      procedure, pass(options) :: has_subceiling
-      procedure(get_base), deferred, pass(options) :: get_base
+      procedure :: get_source_fields
+      procedure :: get_build_up_fields
+      procedure :: check
+      procedure :: check_build_up
+      procedure :: prepare
+      procedure :: get_sides
+      procedure :: get_transfer
+      procedure :: get_source
+      procedure :: get_radiator
+      procedure :: get_room_modes
+      procedure :: get_support
+      procedure :: get_improvement
+      procedure :: get_double_plate
+      procedure :: has_subceiling
+      procedure(get_base), deferred :: get_base
    end type rectangular_floor_type
 
    abstract interface
       !> The floor without supports, floating plate and subceiling.
-      function get_base(options) result(base)
+      function get_base(self) result(base)
          import :: base_floor_type, rectangular_floor_type
          implicit none (type, external)
-         class(rectangular_floor_type), intent(in) :: options
+         class(rectangular_floor_type), intent(in) :: self
          type(base_floor_type) :: base
       end function get_base
    end interface
@@ -105,19 +103,19 @@ module thud_rectangular_floor
 contains
 
    !> Fields of the position of the source: [2].
-   function get_source_fields(options) result(fields)
-      class(rectangular_floor_type), intent(in), target :: options
+   function get_source_fields(self) result(fields)
+      class(rectangular_floor_type), intent(in), target :: self
       type(field_type) :: fields(2)
 
       fields = [ &
-         real_field('source_x', options%source_x, '', 'relative source position along the length; ' &
+         real_field('source_x', self%source_x, '', 'relative source position along the length; ' &
          //'levels in the room are means over positions', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)')]
+         real_field('source_y', self%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
    !> Fields of supports, floating plate, subceiling and covering.
-   function get_build_up_fields(options, on_joists) result(fields)
-      class(rectangular_floor_type), intent(in), target :: options
+   function get_build_up_fields(self, on_joists) result(fields)
+      class(rectangular_floor_type), intent(in), target :: self
       !> The subceiling hangs on joists (default: on the plate).
       logical, intent(in), optional :: on_joists
       type(field_type), allocatable :: fields(:)
@@ -127,73 +125,73 @@ contains
       if (present(on_joists)) has_joists = on_joists
 
       fields = [ &
-         choice_field('support', options%support, 'support of the edges', supports), &
-         list_field('support_stiffness', options%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
+         choice_field('support', self%support, 'support of the edges', supports), &
+         list_field('support_stiffness', self%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
          //'deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)', '[0, 1e14]'), &
-         list_field('support_rotation', options%support_rotation, 'N', &
+         list_field('support_rotation', self%support_rotation, 'N', &
          'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
-         list_field('line_x', options%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
+         list_field('line_x', self%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
          '(0, 100)'), &
-         list_field('line_y', options%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
+         list_field('line_y', self%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
          '(0, 100)'), &
-         get_screed_fields(options%screed), &
-         get_subceiling_fields(options%subceiling, has_joists), &
-         real_field('covering_stiffness', options%covering_stiffness, 'N/m', &
+         get_screed_fields(self%screed), &
+         get_subceiling_fields(self%subceiling, has_joists), &
+         real_field('covering_stiffness', self%covering_stiffness, 'N/m', &
          'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
-         real_field('covering_loss_factor', options%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
+         real_field('covering_loss_factor', self%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
          '[0.01, 2]'), &
-         list_field('covering_improvement', options%covering_improvement, 'dB', 'measured reduction of heavy impact sound ' &
+         list_field('covering_improvement', self%covering_improvement, 'dB', 'measured reduction of heavy impact sound ' &
          //'by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz', '[-30, 60]')]
    end function get_build_up_fields
 
    !> Checks supports and positions.
-   subroutine check(options, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine check(self, error)
+      class(rectangular_floor_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
 
-      call options%check_build_up(error)
+      call self%check_build_up(error)
    end subroutine check
 
    !> Checks what all rectangular floors have: supports and positions.
-   subroutine check_build_up(options, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine check_build_up(self, error)
+      class(rectangular_floor_type), intent(in) :: self
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
-      base = options%get_base()
-      call check_edges(options%support_stiffness, 'support_stiffness')
-      call check_edges(options%support_rotation, 'support_rotation')
-      call check_positions(options%line_x, 'line_x', base%plate%length)
-      call check_positions(options%line_y, 'line_y', base%plate%width)
-      call check_distances(options%line_x, 'line_x')
-      call check_distances(options%line_y, 'line_y')
-      associate (source => options%get_source())
-         call check_source(options%line_x, 'line_x', source(1)*base%plate%length)
-         call check_source(options%line_y, 'line_y', source(2)*base%plate%width)
+      base = self%get_base()
+      call check_edges(self%support_stiffness, 'support_stiffness')
+      call check_edges(self%support_rotation, 'support_rotation')
+      call check_positions(self%line_x, 'line_x', base%plate%length)
+      call check_positions(self%line_y, 'line_y', base%plate%width)
+      call check_distances(self%line_x, 'line_x')
+      call check_distances(self%line_y, 'line_y')
+      associate (source => self%get_source())
+         call check_source(self%line_x, 'line_x', source(1)*base%plate%length)
+         call check_source(self%line_y, 'line_y', source(2)*base%plate%width)
       end associate
       if (allocated(error)) return
-      if (all(options%covering_improvement%count /= [0, octave_bands, third_bands])) then
+      if (all(self%covering_improvement%count /= [0, octave_bands, third_bands])) then
          error = input_error('&'//trim(base%group)//': covering_improvement has ' &
-            //to_text(options%covering_improvement%count)//' values; allowed: 4, one for each octave from 63 to 500 Hz, ' &
+            //to_text(self%covering_improvement%count)//' values; allowed: 4, one for each octave from 63 to 500 Hz, ' &
             //'or 12, one for each one-third-octave band')
-      else if (options%covering_improvement%count > 0 .and. options%covering_stiffness > 0.0_wp) then
+      else if (self%covering_improvement%count > 0 .and. self%covering_stiffness > 0.0_wp) then
          error = input_error('&'//trim(base%group)//': covering_stiffness and covering_improvement describe the same ' &
             //'covering twice; allowed: one of them')
-      else if (options%support == 'elastic' .and. options%support_stiffness%count == 0 &
-         .and. options%support_rotation%count == 0) then
+      else if (self%support == 'elastic' .and. self%support_stiffness%count == 0 &
+         .and. self%support_rotation%count == 0) then
          error = input_error('&'//trim(base%group)//': support = elastic without support_stiffness and support_rotation; ' &
             //'allowed: at least one of them')
-      else if (options%support /= 'elastic' .and. options%support_stiffness%count + options%support_rotation%count > 0) then
+      else if (self%support /= 'elastic' .and. self%support_stiffness%count + self%support_rotation%count > 0) then
          error = input_error('&'//trim(base%group)//': support_stiffness and support_rotation with support = ' &
-            //trim(options%support)//'; allowed: with support = elastic')
-      else if (is_loose() .and. options%line_x%count + options%line_y%count == 0) then
-         error = input_error('&'//trim(base%group)//': support = '//trim(options%support) &
+            //trim(self%support)//'; allowed: with support = elastic')
+      else if (is_loose() .and. self%line_x%count + self%line_y%count == 0) then
+         error = input_error('&'//trim(base%group)//': support = '//trim(self%support) &
             //' without any stiffness needs supports at line_x or line_y; allowed: at least one')
-      else if (options%screed%thickness > 0.0_wp .and. options%screed%thickness < min_sheet) then
-         error = input_error('&'//trim(base%group)//': screed_thickness = '//to_text(options%screed%thickness) &
+      else if (self%screed%thickness > 0.0_wp .and. self%screed%thickness < min_sheet) then
+         error = input_error('&'//trim(base%group)//': screed_thickness = '//to_text(self%screed%thickness) &
             //' m; allowed: 0, or 0.0005 to 0.5 m')
-      else if (options%has_subceiling() .and. options%subceiling%thickness < min_sheet) then
-         error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(options%subceiling%thickness) &
+      else if (self%has_subceiling() .and. self%subceiling%thickness < min_sheet) then
+         error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(self%subceiling%thickness) &
             //' m; allowed: 0, or 0.0005 to 0.2 m')
       end if
    contains
@@ -212,7 +210,7 @@ contains
          logical :: yes
          type(edge_type) :: edge(4)
 
-         edge = get_edges(options, options%support)
+         edge = get_edges(self, self%support)
          yes = all(edge%deflection <= 0.0_wp)
       end function is_loose
 
@@ -259,37 +257,33 @@ contains
    end subroutine check_build_up
 
    !> Modes of the floor as it is supported, and its mobility at the source.
-   subroutine prepare(options, state, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine prepare(self, state, error)
+      class(rectangular_floor_type), intent(in) :: self
       type(floor_state_type), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
+      type(base_floor_type) :: base
+      type(plate_stack_type) :: stack
 
-      call get_modes(options, options%support, state%plate, state%modes, error)
+      base = self%get_base()
+      stack = get_stack(self, base, self%support)
+      state%plate = base%plate
+      call get_floor_modes(trim(base%group), stack, base%plate, self%air, state%modes, error)
       if (allocated(error)) return
-      associate (source => options%get_source())
-         call options%get_mobility_at(state, source, source, state%receiver, error)
+      state%has_modal_conductance = .not. base%is_homogeneous
+      call add_validity(self, base, stack, state)
+      associate (source => self%get_source())
+         call get_mobility_at(self, base, state, source, source, state%receiver, error)
       end associate
-      if (.not. allocated(error) .and. options%covering_stiffness > 0.0_wp) call add_covering(options, state%receiver)
+      if (.not. allocated(error) .and. self%covering_stiffness > 0.0_wp) call add_covering(self, state%receiver)
    end subroutine prepare
 
-   !> Mobility at the source.
-   subroutine get_receiver(options, receiver, error)
-      class(rectangular_floor_type), intent(in) :: options
-      type(receiver_type), intent(out) :: receiver
-      type(error_type), allocatable, intent(out) :: error
-      type(floor_state_type) :: state
-
-      call options%prepare(state, error)
-      if (.not. allocated(error)) receiver = state%receiver
-   end subroutine get_receiver
-
    !> Adds the mobility s/(k + c s) of a covering in series; its dashpot c has the loss factor at 50 Hz.
-   subroutine add_covering(options, receiver)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine add_covering(self, receiver)
+      class(rectangular_floor_type), intent(in) :: self
       type(receiver_type), intent(inout) :: receiver
       real(wp), parameter :: omega = 100*acos(-1.0_wp)
 
-      associate (k => options%covering_stiffness, c => options%covering_stiffness*options%covering_loss_factor/omega)
+      associate (k => self%covering_stiffness, c => self%covering_stiffness*self%covering_loss_factor/omega)
          receiver%direct = receiver%direct + 1/c
          receiver%pole = [receiver%pole, cmplx(-k/c, 0.0_wp, wp)]
          receiver%residue = [receiver%residue, cmplx(-k/c**2, 0.0_wp, wp)]
@@ -297,35 +291,37 @@ contains
    end subroutine add_covering
 
    !> Length and width.
-   subroutine get_sides(options, sides, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine get_sides(self, sides, error)
+      class(rectangular_floor_type), intent(in) :: self
       real(wp), intent(out) :: sides(2)
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
-      base = options%get_base()
+      base = self%get_base()
       sides = [base%plate%length, base%plate%width]
    end subroutine get_sides
 
    !> Transfer mobility to another point; a point outside the floor is an error.
-   subroutine get_transfer(options, state, x, y, transfer, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine get_transfer(self, state, x, y, transfer, error)
+      class(rectangular_floor_type), intent(in) :: self
       type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
-      base = options%get_base()
+      base = self%get_base()
       associate (sides => [base%plate%length, base%plate%width])
          call check_point(base%group, sides, x, y, error)
-         if (.not. allocated(error)) call options%get_mobility_at(state, options%get_source(), [x, y]/sides, transfer, error)
+         if (.not. allocated(error)) call get_mobility_at(self, base, state, self%get_source(), &
+            [x, y]/sides, transfer, error)
       end associate
    end subroutine get_transfer
 
    !> Transfer mobility from a source to a point of the upper plate, without covering.
-   subroutine get_mobility_at(options, state, source, point, receiver, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine get_mobility_at(self, base, state, source, point, receiver, error)
+      class(rectangular_floor_type), intent(in) :: self
+      type(base_floor_type), intent(in) :: base
       !> The floor, with its modes.
       type(floor_state_type), intent(in) :: state
       !> Positions of source and point, as fractions of length and width: [2].
@@ -334,83 +330,56 @@ contains
       type(receiver_type), intent(out) :: receiver
       !> Set if the losses are too high.
       type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
       type(plate_type) :: plate
 
-      base = options%get_base()
       plate = base%plate
-      if (options%screed%thickness > 0.0_wp) plate = get_screed_plate(options%screed, plate)
+      if (self%screed%thickness > 0.0_wp) plate = get_screed_plate(self%screed, plate)
       call new_floor_receiver(trim(base%group), state%modes, get_resistance(plate), source, point, receiver, error)
    end subroutine get_mobility_at
 
    !> Relative position of the source.
-   function get_source(options) result(source)
-      class(rectangular_floor_type), intent(in) :: options
+   function get_source(self) result(source)
+      class(rectangular_floor_type), intent(in) :: self
       real(wp) :: source(2)
 
-      source = [options%source_x, options%source_y]
+      source = [self%source_x, self%source_y]
    end function get_source
 
-   !> Modes of the floor with a support of its edges.
-   subroutine get_modes(options, support, plate, modes, error, max_frequency)
-      class(rectangular_floor_type), intent(in) :: options
-      !> Support of the edges, or `uncoupled_support`.
-      character(len=*), intent(in) :: support
-      !> The bearing plate with homogeneous stiffness.
-      type(plate_type), intent(out) :: plate
-      type(floor_modes_type), intent(out) :: modes
-      !> Set if they cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
-      !> Frequency up to which modes are wanted, Hz (default: all that the mobility needs).
-      real(wp), intent(in), optional :: max_frequency
-      type(base_floor_type) :: base
-
-      base = options%get_base()
-      plate = base%plate
-      call get_floor_modes(trim(base%group), get_stack(options, base, support), plate, options%air, modes, error, &
-         max_frequency)
-   end subroutine get_modes
-
    !> The plates above each other.
-   function get_stack(options, floor, support) result(stack)
-      class(rectangular_floor_type), intent(in) :: options
+   function get_stack(self, floor, support) result(stack)
+      class(rectangular_floor_type), intent(in) :: self
       !> The floor without supports, floating plate and subceiling.
       type(base_floor_type), intent(in) :: floor
-      !> Support of the edges (default: its own).
-      character(len=*), intent(in), optional :: support
+      !> Support of the edges, or `uncoupled_support`.
+      character(len=*), intent(in) :: support
       type(plate_stack_type) :: stack
       logical :: is_uncoupled
       type(base_floor_type) :: base
 
-      is_uncoupled = .false.
+      is_uncoupled = support == uncoupled_support
       base = floor
       associate (lower => base%stiffness)
-         if (present(support)) then
-            lower%edge = get_edges(options, support)
-         else
-            lower%edge = get_edges(options, options%support)
-         end if
-         if (present(support)) is_uncoupled = support == uncoupled_support
+         lower%edge = get_edges(self, support)
          if (.not. is_uncoupled) then
-            lower%line_x = options%line_x%values(:options%line_x%count)
-            lower%line_y = options%line_y%values(:options%line_y%count)
+            lower%line_x = self%line_x%values(:self%line_x%count)
+            lower%line_y = self%line_y%values(:self%line_y%count)
          end if
       end associate
       associate (plate => base%plate)
          stack%length = plate%length
          stack%width = plate%width
-         if (options%screed%thickness > 0.0_wp) then
-            stack%plate = [new_orthotropic(get_screed_plate(options%screed, plate)), base%stiffness]
-            stack%layer = [get_screed_layer(options%screed)]
+         if (self%screed%thickness > 0.0_wp) then
+            stack%plate = [new_orthotropic(get_screed_plate(self%screed, plate)), base%stiffness]
+            stack%layer = [get_screed_layer(self%screed)]
          else
             stack%plate = [base%stiffness]
             allocate (stack%layer(0))
          end if
          stack%bearing = size(stack%plate)
-         if (options%has_subceiling()) then
-            stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(options%subceiling, plate))]
-            stack%layer = [stack%layer, get_subceiling_layer(options%subceiling, options%air, &
-               get_channels(options, base))]
+         if (self%has_subceiling()) then
+            stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(self%subceiling, plate))]
+            stack%layer = [stack%layer, get_subceiling_layer(self%subceiling, self%air, &
+               get_channels(self, base))]
          end if
          stack%radiator = size(stack%plate)
       end associate
@@ -418,63 +387,67 @@ contains
    end function get_stack
 
    !> Whether a subceiling radiates into the room.
-   pure function has_subceiling(options) result(yes)
-      class(rectangular_floor_type), intent(in) :: options
+   pure function has_subceiling(self) result(yes)
+      class(rectangular_floor_type), intent(in) :: self
       logical :: yes
 
-      yes = options%subceiling%thickness > 0.0_wp
+      yes = self%subceiling%thickness > 0.0_wp
    end function has_subceiling
 
    !> Positions of the lines along the length that hold the subceiling: those of the joists, or as stated, m: [n_line].
-   pure function get_channels(options, base) result(position)
-      class(rectangular_floor_type), intent(in) :: options
+   pure function get_channels(self, base) result(position)
+      class(rectangular_floor_type), intent(in) :: self
       type(base_floor_type), intent(in) :: base
       real(wp), allocatable :: position(:)
 
       if (allocated(base%stiffness%ribs)) then
          position = base%stiffness%ribs%position
       else
-         position = get_spaced_positions(base%plate%width, options%subceiling%channel_spacing)
+         position = get_spaced_positions(base%plate%width, self%subceiling%channel_spacing)
       end if
    end function get_channels
 
    !> Modes of the floor with another support of its edges.
-   subroutine get_room_modes(options, state, support, plate, modes, error, max_frequency)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine get_room_modes(self, state, support, plate, modes, error, max_frequency)
+      class(rectangular_floor_type), intent(in) :: self
       type(floor_state_type), intent(in) :: state
       character(len=*), intent(in) :: support
       type(plate_type), intent(out) :: plate
       type(floor_modes_type), intent(out) :: modes
       type(error_type), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: max_frequency
+      type(base_floor_type) :: base
 
-      call get_modes(options, support, plate, modes, error, max_frequency)
+      base = self%get_base()
+      plate = base%plate
+      call get_floor_modes(trim(base%group), get_stack(self, base, support), plate, self%air, modes, error, &
+         max_frequency)
    end subroutine get_room_modes
 
    !> Support of the edges.
-   pure function get_support(options) result(support)
-      class(rectangular_floor_type), intent(in) :: options
+   pure function get_support(self) result(support)
+      class(rectangular_floor_type), intent(in) :: self
       character(len=name_length) :: support
 
-      support = options%support
+      support = self%support
    end function get_support
 
    !> Reduction of the levels in the room by a covering, dB: [n_band].
-   pure function get_improvement(options, n_band) result(improvement)
-      class(rectangular_floor_type), intent(in) :: options
+   pure function get_improvement(self, n_band) result(improvement)
+      class(rectangular_floor_type), intent(in) :: self
       integer, intent(in) :: n_band
       real(wp) :: improvement(n_band)
       integer :: i
 
       improvement = 0.0_wp
-      associate (stated => options%covering_improvement)
+      associate (stated => self%covering_improvement)
          if (stated%count > 0) improvement = [(stated%values(1 + (i - 1)*stated%count/n_band), i=1, n_band)]
       end associate
    end function get_improvement
 
    !> Supports of the edges: [4].
-   pure function get_edges(options, support) result(edge)
-      class(rectangular_floor_type), intent(in) :: options
+   pure function get_edges(self, support) result(edge)
+      class(rectangular_floor_type), intent(in) :: self
       !> One of `supports`, or `uncoupled_support`.
       character(len=*), intent(in) :: support
       type(edge_type) :: edge(4)
@@ -487,8 +460,8 @@ contains
        case ('free')
          edge = edge_type(0.0_wp, 0.0_wp)
        case default
-         edge%deflection = get_four(options%support_stiffness, rigid_support)
-         edge%rotation = get_four(options%support_rotation, 0.0_wp)
+         edge%deflection = get_four(self%support_stiffness, rigid_support)
+         edge%rotation = get_four(self%support_rotation, 0.0_wp)
       end select
    end function get_edges
 
@@ -506,8 +479,8 @@ contains
    end function get_four
 
    !> The plate, and its conductance if it were infinite.
-   subroutine get_radiator(options, state, frequency, plate, conductance, error)
-      class(rectangular_floor_type), intent(in) :: options
+   subroutine get_radiator(self, state, frequency, plate, conductance, error)
+      class(rectangular_floor_type), intent(in) :: self
       type(floor_state_type), intent(in) :: state
       real(wp), intent(in) :: frequency(:)
       type(plate_type), intent(out) :: plate
@@ -515,74 +488,51 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(base_floor_type) :: base
 
-      base = options%get_base()
+      base = self%get_base()
       plate = base%plate
       conductance = 1/get_resistance(plate)
    end subroutine get_radiator
 
-   !> Whether no homogeneous plate represents the mean power into the floor.
-   function has_modal_conductance(options) result(yes)
-      class(rectangular_floor_type), intent(in) :: options
-      logical :: yes
-      type(base_floor_type) :: base
-
-      base = options%get_base()
-      yes = .not. base%is_homogeneous
-   end function has_modal_conductance
-
    !> The floating plate on a bearing plate.
-   pure function get_double_plate(options, lower) result(plates)
-      class(rectangular_floor_type), intent(in) :: options
+   pure function get_double_plate(self, lower) result(plates)
+      class(rectangular_floor_type), intent(in) :: self
       !> The bearing plate.
       type(plate_type), intent(in) :: lower
       type(double_plate_type) :: plates
 
-      associate (screed => options%screed)
+      associate (screed => self%screed)
          plates = double_plate_type(get_screed_plate(screed, lower), lower, screed%layer_stiffness, &
-            screed%layer_loss_factor, options%air)
+            screed%layer_loss_factor, self%air)
       end associate
    end function get_double_plate
 
-   !> Frequency band in which all plates are thin.
-   subroutine get_validity(options, state, lowest, highest, reason)
-      class(rectangular_floor_type), intent(in) :: options
-      type(floor_state_type), intent(in) :: state
-      real(wp), intent(out) :: lowest, highest
-      character(len=reason_length), intent(out) :: reason
-      type(base_floor_type) :: base
+   !> Adds the frequency up to which the model is valid: that of the plate, the modes, the subceiling or its cavity.
+   subroutine add_validity(self, base, stack, state)
+      class(rectangular_floor_type), intent(in) :: self
+      type(base_floor_type), intent(in) :: base
+      !> The plates above each other.
+      type(plate_stack_type), intent(in) :: stack
+      type(floor_state_type), intent(inout) :: state
 
-      base = options%get_base()
-      lowest = 0.0_wp
-      highest = get_thin_limit(base%plate)
-      if (options%screed%thickness > 0.0_wp) then
-         highest = min(highest, get_thin_limit(get_screed_plate(options%screed, base%plate)))
-      end if
-      reason = 'bending waves are shorter than six thicknesses, and a plate is not thin'
-      call options%limit_by_surroundings(base%plate, highest, reason)
-   end subroutine get_validity
-
-   !> Lowers a limit of validity to that of the modes, the subceiling and its cavity.
-   subroutine limit_by_surroundings(options, above, highest, reason)
-      class(rectangular_floor_type), intent(in) :: options
-      !> The plate above the subceiling.
-      type(plate_type), intent(in) :: above
-      real(wp), intent(inout) :: highest
-      character(len=reason_length), intent(inout) :: reason
-
-      associate (modes => get_mode_limit(get_stack(options, options%get_base())))
-         if (modes < highest) then
-            highest = modes
-            reason = 'the modes of the floor are not resolved, and the mean mobility of the construction takes their place'
+      state%highest_frequency = base%highest_frequency
+      state%validity_reason = base%validity_reason
+      associate (modes => get_mode_limit(stack))
+         if (modes < state%highest_frequency) then
+            state%highest_frequency = modes
+            state%validity_reason = 'the modes of the floor are not resolved, and the mean mobility of the construction ' &
+               //'takes their place'
          end if
       end associate
-      if (.not. options%has_subceiling()) return
-      associate (cavity => get_cavity_limit(options%subceiling, options%air), &
-         thin => get_thin_limit(get_subceiling_plate(options%subceiling, above)))
-         if (min(cavity, thin) >= highest) return
-         highest = min(cavity, thin)
-         reason = 'the cavity above the subceiling is deeper than a quarter of a wavelength, and no mere stiffness'
-         if (thin < cavity) reason = 'bending waves are shorter than six thicknesses of the subceiling, and it is not thin'
+      if (.not. self%has_subceiling()) return
+      associate (cavity => get_cavity_limit(self%subceiling, self%air), &
+         thin => get_thin_limit(get_subceiling_plate(self%subceiling, base%plate)))
+         if (min(cavity, thin) >= state%highest_frequency) return
+         state%highest_frequency = min(cavity, thin)
+         state%validity_reason = 'the cavity above the subceiling is deeper than a quarter of a wavelength, and no mere ' &
+            //'stiffness'
+         if (thin < cavity) state%validity_reason = &
+            'bending waves are shorter than six thicknesses of the subceiling, and it is not thin'
       end associate
-   end subroutine limit_by_surroundings
+   end subroutine add_validity
 
 end module thud_rectangular_floor

@@ -2,8 +2,7 @@
 module thud_rigid_floor
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_floor_model, only: floor_model_type
-   use thud_receiver, only: receiver_type
+   use thud_floor_model, only: floor_model_type, floor_state_type
    implicit none (type, external)
    private
 
@@ -12,32 +11,32 @@ module thud_rigid_floor
    !> The floor, without options.
    type, extends(floor_model_type) :: rigid_floor_type
    contains
-      procedure, pass(options) :: get_fields
-      procedure, pass(options) :: get_receiver
-      procedure, pass(options) :: has_radiator
+      procedure :: get_fields
+      procedure :: prepare
+      procedure :: has_radiator
    end type rigid_floor_type
 
 contains
 
    !> No keys.
-   function get_fields(options) result(fields)
-      class(rigid_floor_type), intent(in), target :: options
+   function get_fields(self) result(fields)
+      class(rigid_floor_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
       allocate (fields(0))
    end function get_fields
 
    !> The default receiver, which is rigid.
-   subroutine get_receiver(options, receiver, error)
-      class(rigid_floor_type), intent(in) :: options
-      type(receiver_type), intent(out) :: receiver
+   subroutine prepare(self, state, error)
+      class(rigid_floor_type), intent(in) :: self
+      type(floor_state_type), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
 
-   end subroutine get_receiver
+   end subroutine prepare
 
    !> No plate radiates into a room.
-   pure function has_radiator(options) result(yes)
-      class(rigid_floor_type), intent(in) :: options
+   pure function has_radiator(self) result(yes)
+      class(rigid_floor_type), intent(in) :: self
       logical :: yes
 
       yes = .false.
