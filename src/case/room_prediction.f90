@@ -7,7 +7,7 @@ module thud_room_prediction
    use thud_case, only: case_type, get_floor_number
    use thud_constants, only: pi
    use thud_error, only: error_type
-   use thud_floor_model, only: floor_model_type, floor_state_type, uncoupled_support, unknown_support
+   use thud_floor_model, only: floor_state_type, uncoupled_support, unknown_support
    use thud_floor_modes, only: floor_modes_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
@@ -26,6 +26,18 @@ module thud_room_prediction
    !> Number of even positions of ball and of microphone, and their distance from the walls, m (ISO 16283-2).
    integer, parameter :: n_even = 16
    real(wp), parameter :: even_distance = 0.5_wp
+
+   !> The force on a floor and the plate that radiates, whatever the support of the edges.
+   type :: excitation_type
+      !> Force, N: [n_sample], and samples per second, Hz.
+      real(wp), allocatable :: force(:)
+      real(wp) :: sample_rate = 0.0_wp
+      !> Bands from `get_room_bands`: [n_band].
+      type(band_type), allocatable :: bands(:)
+      !> Force exposure levels, dB, and conductance of the plate, m/(N s): [n_band].
+      real(wp), allocatable :: level(:), conductance(:)
+      type(plate_type) :: plate
+   end type excitation_type
 
 contains
 
@@ -46,6 +58,7 @@ contains
       type(modal_radiation_type) :: radiation, clamped_radiation
       type(plate_type) :: plate
       type(room_level_type) :: clamped
+      type(excitation_type) :: excitation
       type(band_type), allocatable :: bands(:)
       integer :: shown
       logical :: edges_are_known
@@ -54,21 +67,20 @@ contains
          call floor%get_radiating_modes(state, plate, modes, error)
          if (.not. allocated(error)) call check_below(plate, room, error)
          if (.not. allocated(error)) call get_room_bands(bands, error)
-         if (.not. allocated(error)) call get_radiation(room, floor, state, plate, modes, bands, radiation, error)
-         if (.not. allocated(error)) call predict_supported(case, state, modes, radiation, bands, force, sample_rate, &
-            prediction, error)
+         if (.not. allocated(error)) call get_radiation(case, state, plate, modes, bands, radiation, error)
+         if (.not. allocated(error)) call get_excitation(case, state, bands, force, sample_rate, excitation, error)
          if (allocated(error)) return
+         call predict_supported(case, state, excitation, modes, radiation, prediction)
          edges_are_known = floor%get_support() /= unknown_support
          shown = min(get_rating_index(room), 2)
          prediction%edge_level = spread(prediction%rated_level(:, shown), 2, 2)
          if (.not. edges_are_known .and. prediction%n_modal > 0) then
             call floor%get_room_modes(state, 'clamped', plate, clamped_modes, error, &
                get_highest_frequency(get_box(room, plate, bands)))
-            if (.not. allocated(error)) call get_radiation(room, floor, state, plate, clamped_modes, bands, &
+            if (.not. allocated(error)) call get_radiation(case, state, plate, clamped_modes, bands, &
                clamped_radiation, error, radiation)
-            if (.not. allocated(error)) call predict_supported(case, state, clamped_modes, clamped_radiation, bands, force, &
-               sample_rate, clamped, error)
             if (allocated(error)) return
+            call predict_supported(case, state, excitation, clamped_modes, clamped_radiation, clamped)
             ! The modes of clamped edges may be resolved in fewer bands.
             associate (n => clamped%n_modal)
                prediction%edge_level(:n, 2) = clamped%rated_level(:n, shown)
@@ -83,40 +95,56 @@ contains
       end associate
    end subroutine predict_room
 
-   !> Level in the room below a floor with known edges. Walls, a ceiling and a covering change modal levels as much as
-   !> statistical ones.
-   subroutine predict_supported(case, state, modes, radiation, bands, force, sample_rate, prediction, error)
+   !> Levels of a force, and the plate that radiates with its conductance.
+   subroutine get_excitation(case, state, bands, force, sample_rate, excitation, error)
       type(case_type), intent(in) :: case
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
+      !> Bands from `get_room_bands`: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> Force on the floor, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      type(excitation_type), intent(out) :: excitation
+      !> Set if a level cannot be computed, or the floor has no plate that radiates.
+      type(error_type), allocatable, intent(out) :: error
+
+      excitation%force = force
+      excitation%sample_rate = sample_rate
+      excitation%bands = bands
+      allocate (excitation%level(size(bands)), excitation%conductance(size(bands)))
+      call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), excitation%level, error)
+      if (allocated(error)) return
+      call case%floors(get_floor_number(case))%model%get_radiator(state, bands%center, excitation%plate, &
+         excitation%conductance, error)
+   end subroutine get_excitation
+
+   !> Level in the room below a floor with known edges. Walls, a ceiling and a covering change modal levels as much as
+   !> statistical ones.
+   subroutine predict_supported(case, state, excitation, modes, radiation, prediction)
+      type(case_type), intent(in) :: case
+      !> The floor, prepared.
+      type(floor_state_type), intent(in) :: state
+      type(excitation_type), intent(in) :: excitation
       type(floor_modes_type), intent(in) :: modes
       !> Its radiation by these modes.
       type(modal_radiation_type), intent(in) :: radiation
-      !> Bands from `get_room_bands`: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      real(wp), intent(in) :: force(:)
-      real(wp), intent(in) :: sample_rate
       type(room_level_type), intent(out) :: prediction
-      !> Set if a level cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
       type(modal_radiation_type) :: used
-      type(plate_type) :: plate
       type(room_level_type) :: bare
       type(modal_room_type) :: modal
       type(box_type) :: box
-      real(wp), dimension(size(bands)) :: level, conductance
       integer :: i
 
-      call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
-      associate (floor => case%floors(get_floor_number(case))%model, room => case%room)
-         if (.not. allocated(error)) call floor%get_radiator(state, bands%center, plate, conductance, error)
-         if (allocated(error)) return
+      associate (floor => case%floors(get_floor_number(case))%model, room => case%room, plate => excitation%plate, &
+         bands => excitation%bands, level => excitation%level)
          used = radiation
          if (room%radiation /= modal_radiation) then
             used%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
             used%upper_factor = used%radiation_factor
          end if
-         if (.not. state%has_modal_conductance) used%conductance = conductance
+         if (.not. state%has_modal_conductance) used%conductance = excitation%conductance
          call get_room_level(plate, used, room, bands, level - floor%get_improvement(size(bands)), prediction)
          box = get_box(room, plate, bands)
          prediction%crossover = get_crossover(box)
@@ -127,7 +155,7 @@ contains
       do i = 1, 2
          if (i == 1 .or. case%room%positions == positions_of_rating) then
             call place(use_standard_positions(case%room, i), box)
-            call get_modal_room(modes, box, force, sample_rate, .false., .false., modal)
+            call get_modal_room(modes, box, excitation%force, excitation%sample_rate, .false., .false., modal)
          end if
          associate (n => modal%n_band)
             prediction%n_modal = n
@@ -139,9 +167,8 @@ contains
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
    !> that of the simply supported floor without further supports: its waves are so short that these matter little. The
    !> middle of the floor represents it if not all of it is resolved.
-   subroutine get_radiation(room, floor, state, plate, modes, bands, radiation, error, known)
-      type(room_type), intent(in) :: room
-      class(floor_model_type), intent(in) :: floor
+   subroutine get_radiation(case, state, plate, modes, bands, radiation, error, known)
+      type(case_type), intent(in) :: case
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       type(plate_type), intent(in) :: plate
@@ -161,13 +188,14 @@ contains
       integer :: n
 
       n = count(bands%upper <= modes%limit/(2*pi))
-      area = get_area(room, plate)
-      call get_modal_radiation(modes, plate, room%air, bands(:n), area, radiation)
+      area = get_area(case%room, plate)
+      call get_modal_radiation(modes, plate, case%room%air, bands(:n), area, radiation)
       if (n == size(bands)) return
       if (present(known)) then
          beyond = known
       else
-         call floor%get_room_modes(state, uncoupled_support, simple_plate, simple_modes, error)
+         call case%floors(get_floor_number(case))%model%get_room_modes(state, uncoupled_support, simple_plate, &
+            simple_modes, error)
          if (allocated(error)) return
          ! Of a floor whose middle represents it, as much of the middle as the room covers; losses keep energy near the
          ! strike.
@@ -175,7 +203,7 @@ contains
             if (stack%length*stack%width < plate%length*plate%width*(1 - 1.0e-9_wp)) area = &
                [0.0_wp, min(area(2) - area(1), stack%length), 0.0_wp, min(area(4) - area(3), stack%width)]
          end associate
-         call get_modal_radiation(simple_modes, plate, room%air, bands, area, beyond)
+         call get_modal_radiation(simple_modes, plate, case%room%air, bands, area, beyond)
          if (n > 0) beyond%energy_beyond = max(beyond%energy_beyond, radiation%energy_beyond(n))
       end if
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor(n + 1:)]

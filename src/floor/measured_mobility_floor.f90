@@ -118,7 +118,8 @@ contains
       end associate
       ! The test needs a positive direct part: it is raised by less than rounding.
       regularization = rounding*(state%receiver%direct + sum(abs(state%receiver%residue/state%receiver%pole)))
-      call find_violations(state%receiver%pole, state%receiver%residue, state%receiver%direct + regularization, omega, failed)
+      call find_violations(state%receiver%pole, state%receiver%residue, state%receiver%direct + regularization, &
+         omega, failed)
       if (failed) then
          error = numerical_error('&measured_mobility: the zeros of the real part were not found')
       else if (size(omega) > 0) then

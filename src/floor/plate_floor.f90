@@ -1,6 +1,6 @@
 !> A rectangular plate, isotropic or orthotropic, bare or with a floating plate.
 module thud_plate_floor
-   use thud_double_plate, only: get_lower_conductance
+   use thud_double_plate, only: double_plate_type, get_lower_conductance
    use thud_error, only: error_type
    use thud_field, only: field_type
    use thud_floor_model, only: floor_state_type
@@ -57,7 +57,10 @@ contains
 
       plate = self%plate
       if (self%screed%thickness > 0.0_wp) then
-         conductance = get_lower_conductance(self%get_double_plate(plate), frequency)
+         associate (screed => self%screed)
+            conductance = get_lower_conductance(double_plate_type(get_screed_plate(screed, plate), plate, &
+               screed%layer_stiffness, screed%layer_loss_factor, self%air), frequency)
+         end associate
       else
          conductance = 1/get_resistance(plate)
       end if

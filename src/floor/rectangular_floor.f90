@@ -1,6 +1,5 @@
 !> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
-   use thud_double_plate, only: double_plate_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type, name_length
    use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support, &
@@ -85,7 +84,6 @@ module thud_rectangular_floor
       procedure :: get_room_modes
       procedure :: get_support
       procedure :: get_improvement
-      procedure :: get_double_plate
       procedure :: has_subceiling
       procedure(get_base), deferred :: get_base
    end type rectangular_floor_type
@@ -492,19 +490,6 @@ contains
       plate = base%plate
       conductance = 1/get_resistance(plate)
    end subroutine get_radiator
-
-   !> The floating plate on a bearing plate.
-   pure function get_double_plate(self, lower) result(plates)
-      class(rectangular_floor_type), intent(in) :: self
-      !> The bearing plate.
-      type(plate_type), intent(in) :: lower
-      type(double_plate_type) :: plates
-
-      associate (screed => self%screed)
-         plates = double_plate_type(get_screed_plate(screed, lower), lower, screed%layer_stiffness, &
-            screed%layer_loss_factor, self%air)
-      end associate
-   end function get_double_plate
 
    !> Adds the frequency up to which the model is valid: that of the plate, the modes, the subceiling or its cavity.
    subroutine add_validity(self, base, stack, state)
