@@ -97,6 +97,8 @@ contains
       !> Set if an earlier step fails, or a file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text, summary
+      character(len=1) :: no_names(0)
+      real(wp) :: no_values(0)
 
       outcome%table = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
@@ -117,8 +119,8 @@ contains
       outcome%conforms = is_conforming(case, results%impact%assessment)
       outcome%table = outcome%table//newline//get_table(case, results%impact%history, &
          results%impact%assessment, options%verbose)
-      call write_file(directory, 'force.csv', get_force_csv(results%impact%history, [character(len=1) :: ], &
-         reshape([real(wp) :: ], [size(results%impact%history%deflection), 0])), error)
+      call write_file(directory, 'force.csv', get_force_csv(results%impact%history, no_names, reshape(no_values, &
+         [size(results%impact%history%deflection), 0])), error)
       call write_file(directory, 'levels.csv', get_levels_csv(case, results%impact%assessment), error)
       summary = get_summary(case, results%impact%history, results%impact%assessment, results%warning)
       call write_history_files(results%impact%history, '', options%write_all, directory, error)
