@@ -6,6 +6,7 @@ module thud_samples_run
    use thud_case_text, only: get_case_text
    use thud_compute, only: get_assessed_force
    use thud_constants, only: version
+   use thud_ensemble, only: suits_batch
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_progress, only: report_progress
@@ -27,8 +28,8 @@ module thud_samples_run
    !> Files of results and of the full input.
    character(len=*), parameter :: result_file = 'samples.csv', input_file = 'samples.nml'
 
-   !> Number of samples in a chunk for each thread; progress is reported after each chunk.
-   integer, parameter :: chunk_size = 128
+   !> Number of samples in a chunk for each thread, in batches and one by one; progress is reported after each chunk.
+   integer, parameter :: batch_chunk = 1024, single_chunk = 16
 
    !> Summary of many samples.
    type :: tally_type
@@ -110,7 +111,7 @@ contains
       integer :: n, i
 
       call new_sweep(case, .true., sweep)
-      allocate (values(size(table%columns), chunk_size*threads))
+      allocate (values(size(table%columns), threads*merge(batch_chunk, single_chunk, suits_batch(case, table%columns))))
       call begin_file(results, result_file, error)
       call get_sample_header(table, sweep, text)
       call add_text(results, text, error)

@@ -163,7 +163,7 @@ RESOLUTIONS = {
         {"rings": 14, "highest_frequency": 1960.0},
     ),
     "&model name = 'modal_ball' /": (
-        "40 rings, modes up to 1400 Hz, substeps 1, automatic\n", "", {"rings": 56},
+        "40 rings, modes up to 1400 Hz, substeps 1\n", "", {"rings": 56},
     ),
 }  # fmt: skip
 

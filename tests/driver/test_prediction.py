@@ -478,8 +478,8 @@ def test_unusual_height_of_the_room_is_named(
     shell: thud.Impact, volume: float, height: str
 ) -> None:
     prediction = thud.predict_level(shell, thud.Plate(), thud.Room(volume=volume))
-    found = [warning for warning in prediction.warnings if "m high" in warning]
-    assert [f"{height} m high" in warning for warning in found] == [True] * bool(height)
+    found = [warning for warning in prediction.warnings if "height in m" in warning]
+    assert [f"height in m is {height}" in warning for warning in found] == [True] * bool(height)
 
 
 def test_walls_take_their_power_from_the_losses_of_the_edges(shell: thud.Impact) -> None:
