@@ -17,7 +17,7 @@ module thud_table_reader
    !> Maximum length of a cell.
    integer, parameter :: cell_length = 64
 
-   !> An open table.
+   !> An open table. Its file is closed at its end, or with the table.
    type :: table_reader_type
       private
       integer :: descriptor = -1
@@ -31,6 +31,8 @@ module thud_table_reader
       character(len=1) :: separator = newline
       !> Decimal mark of the numbers; blank until a number has one.
       character(len=1) :: decimal = ' '
+   contains
+      final :: close_table
    end type table_reader_type
 
 contains
@@ -47,6 +49,13 @@ contains
       if (directory_exists(path)) error = input_error('this is a directory; allowed: a table')
       if (index(table%buffer, byte_order_mark) == 1) table%taken = len(byte_order_mark)
    end subroutine open_table
+
+   !> Closes the file of a table that is not read to its end.
+   subroutine close_table(table)
+      type(table_reader_type), intent(inout) :: table
+
+      call close_descriptor(table%descriptor)
+   end subroutine close_table
 
    !> Refills the buffer; the table is closed at its end.
    subroutine fill(table, error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,8 +16,6 @@ from thud.case.case import case_text
 from thud.plot.floor_figures import plate_modes
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -320,8 +319,10 @@ def test_incomplete_tables_are_refused(
     path: Path, line: int, old: str, new: str, words: tuple[object, ...]
 ) -> None:
     edited(path, line, old, new)
+    open_files = len(list(Path("/dev/fd").iterdir()))
     with pytest.raises(thud.InputError, match=naming("modal_floor", "modes.csv", *words)):
         thud.mobility(FLOOR, [30.0])
+    assert len(list(Path("/dev/fd").iterdir())) == open_files
 
 
 def test_unfit_modes_are_refused(path: Path) -> None:
