@@ -14,7 +14,6 @@ module thud_compute
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
    use thud_memory, only: require_memory
-   use thud_plate, only: plate_type
    use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid
    use thud_refined_drop, only: solve_drop
