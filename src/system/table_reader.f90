@@ -115,7 +115,7 @@ contains
          ! On some systems lines end with a carriage return and a line feed.
          line = trim(adjustl(replaced(line(:index(line//'#', '#') - 1), achar(13), ' ')))
          if (line == '') cycle
-         if (is_first) call find_separator(get_structure(line), table%separator)
+         if (is_first) call find_separator(line, table%separator)
          call split_line(table, line, cells, error)
          if (.not. allocated(error)) call find_decimal(table, cells, error)
          return
@@ -124,14 +124,16 @@ contains
    end subroutine read_row
 
    !> Separator of a table: the first of tab, semicolon, comma and blank that its first row holds.
-   pure subroutine find_separator(structure, separator)
-      !> The first row, without quoted text.
-      character(len=*), intent(in) :: structure
+   pure subroutine find_separator(line, separator)
+      !> The first row.
+      character(len=*), intent(in) :: line
       !> Unchanged for a single column.
       character(len=1), intent(inout) :: separator
       character(len=*), parameter :: known = tab//';, '
+      character(len=:), allocatable :: structure
       integer :: i
 
+      call get_structure(line, structure)
       do i = len(known), 1, -1
          if (index(structure, known(i:i)) > 0) separator = known(i:i)
       end do
@@ -146,15 +148,19 @@ contains
       character(len=cell_length), allocatable, intent(out) :: cells(:)
       !> Set if a cell is too long, or a quote is not closed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=len(line)) :: structure
+      character(len=:), allocatable :: structure
       integer :: i, n, at, length, last
 
-      structure = get_structure(line)
+      call get_structure(line, structure)
       associate (separator => table%separator)
          last = len(line)
          ! Spreadsheets may end lines with the separator.
          if (separator == ';') last = verify(structure, '; ', back=.true.)
-         allocate (cells(count([(structure(i:i) == separator, i=1, last)]) + 1))
+         n = 1
+         do i = 1, last
+            if (structure(i:i) == separator) n = n + 1
+         end do
+         allocate (cells(n))
          n = 0
          at = 1
          do while (at <= last + merge(1, 0, separator /= ' '))
@@ -235,9 +241,10 @@ contains
    end function may_separate_thousands
 
    !> A line with `x` for quoted text, because separators in quotes do not separate.
-   pure function get_structure(line) result(structure)
+   pure subroutine get_structure(line, structure)
       character(len=*), intent(in) :: line
-      character(len=len(line)) :: structure
+      !> Allocated, since a long line has no space on the stack of a thread.
+      character(len=:), allocatable, intent(out) :: structure
       character(len=1) :: quote
       integer :: i
 
@@ -252,7 +259,7 @@ contains
             structure(i:i) = 'x'
          end if
       end do
-   end function get_structure
+   end subroutine get_structure
 
    !> The finite number in a cell.
    pure subroutine read_number(cell, value, valid)

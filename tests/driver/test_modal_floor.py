@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -323,6 +325,17 @@ def test_incomplete_tables_are_refused(
     with pytest.raises(thud.InputError, match=naming("modal_floor", "modes.csv", *words)):
         thud.mobility(FLOOR, [30.0])
     assert len(list(Path("/dev/fd").iterdir())) == open_files
+
+
+def test_long_rows_do_not_fill_the_stack_of_a_thread(path: Path) -> None:
+    """The rows of many modes are longer than the stacks of some systems' threads."""
+    path.write_text("frequency,Hz," + ",".join(["20"] * 90_000) + "\n")
+    before = threading.stack_size(1 << 20)
+    try:
+        with ThreadPoolExecutor(1) as executor, pytest.raises(thud.InputError, match="no losses"):
+            executor.submit(thud.mobility, FLOOR, [30.0]).result()
+    finally:
+        threading.stack_size(before)
 
 
 def test_unfit_modes_are_refused(path: Path) -> None:
