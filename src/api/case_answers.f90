@@ -15,6 +15,7 @@ module thud_case_answers
    use thud_result_bundle, only: add_compression, add_results
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
+   use thud_system, only: is_forked
    use thud_text, only: newline, split
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
@@ -147,7 +148,7 @@ contains
       call new_sweep(case, request%get_number('levels') > 0.0_wp, sweep)
       allocate (values, source=request%get_array('values'))
       call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
-         nint(request%get_number('threads')), request%get_number('forces') > 0.0_wp, sweep, error)
+         merge(1, nint(request%get_number('threads')), is_forked == 1), request%get_number('forces') > 0.0_wp, sweep, error)
       if (allocated(error)) return
       call add_samples(bundle, sweep)
       call release_sweep(sweep)

@@ -9,9 +9,8 @@ module thud_result_directory
    use thud_error, only: error_type, input_error
    use thud_file, only: read_text_file
    use thud_interrupt, only: check_interrupt
-   use thud_system, only: close_descriptor, create_file, defer_interrupts, directory_exists, get_system_message, &
-      is_same_file, list_directory, make_beside, name_length, pass_interrupts, path_length, remove_file, rename_file, &
-      resolve_path, swap_directories, write_text
+   use thud_system, only: close_file, create_file, directory_exists, get_system_message, is_same_file, list_directory, &
+      make_beside, name_length, path_length, remove_file, swap_directories, write_text
    use thud_text, only: newline
    implicit none (type, external)
    private
@@ -161,17 +160,14 @@ contains
       end do
    end subroutine read_identity
 
-   !> Makes the new directory beside the target. Until the results are closed, interrupts do not end the process.
+   !> Makes the new directory beside the target.
    subroutine open_results(self, error)
       type(result_directory_type), intent(inout) :: self
       !> Set if the directory cannot be made.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: target
       integer :: status
 
-      call resolve_path(self%path, target, status)
-      call defer_interrupts()
-      if (status == 0) call make_beside(target, self%folder, status)
+      call make_beside(self%path, self%folder, status)
       if (status /= 0) error = unusable_error(self%path, status)
    end subroutine open_results
 
@@ -181,10 +177,9 @@ contains
       !> Set if an earlier step failed, or the target may not be replaced; the target is unchanged then.
       type(error_type), allocatable, intent(inout) :: error
       character(len=name_length), allocatable :: names(:), listed(:)
-      character(len=:), allocatable :: command, subject, target
+      character(len=:), allocatable :: command, subject
       type(error_type), allocatable :: refusal
       integer :: status, i
-      logical :: done
 
       if (.not. allocated(self%folder)) return
       call end_file(self, error)
@@ -203,8 +198,7 @@ contains
          if (i == max_checks) call move_alloc(refusal, error)
       end do
       if (.not. allocated(error)) then
-         call resolve_path(self%path, target, status)
-         if (status == 0) call swap_directories(self%folder, target, status)
+         call swap_directories(self%folder, self%path, status)
          if (status /= 0) error = unusable_error(self%path, status)
       end if
       ! The folder now holds the old results, or after an error the new ones.
@@ -214,11 +208,9 @@ contains
          do i = 1, size(names)
             call remove_file(self%folder//'/'//trim(names(i)))
          end do
-         call remove_file(self%folder, done)
-         ! Another program has written into the old directory meanwhile.
-         if (.not. done .and. .not. allocated(error)) call rename_file(self%folder, target//'.old', done)
+         ! It stays if another program has written into it meanwhile.
+         call remove_file(self%folder)
       end if
-      call pass_interrupts(merge(0, 1, allocated(error)))
    end subroutine close_results
 
    !> Begins a file.
@@ -245,6 +237,7 @@ contains
       integer :: status
 
       if (allocated(error)) return
+      call check_interrupt(error)
       call write_text(self%file, text, status)
       call require_written(self, status, error)
    end subroutine add_text
@@ -257,7 +250,8 @@ contains
       integer :: status
 
       if (self%file < 0) return
-      call close_descriptor(self%file, status)
+      call close_file(self%file, status)
+      self%file = -1
       call require_written(self, status, error)
    end subroutine end_file
 
@@ -276,18 +270,14 @@ contains
    !> Returns an error if a file was not written.
    subroutine require_written(self, status, error)
       type(result_directory_type), intent(in) :: self
-      !> 0, the number of the system's error, or negative after an interrupt.
+      !> 0, or the number of the system's error.
       integer, intent(in) :: status
       !> Set if an earlier step or this one fails.
       type(error_type), allocatable, intent(inout) :: error
 
       if (status == 0 .or. allocated(error)) return
-      if (status < 0) then
-         call check_interrupt(error)
-      else
-         error = input_error(self%path//': '//trim(self%name)//' cannot be written (' &
-            //trim(get_system_message(status))//'); allowed: a directory that you may write to, with space on its disk')
-      end if
+      error = input_error(self%path//': '//trim(self%name)//' cannot be written ('//trim(get_system_message(status)) &
+         //'); allowed: a directory that you may write to, with space on its disk')
    end subroutine require_written
 
    !> Error for a directory that cannot be made or replaced.

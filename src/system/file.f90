@@ -2,7 +2,7 @@
 module thud_file
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
-   use thud_system, only: close_descriptor, directory_exists, get_file_size, open_descriptor, read_bytes
+   use thud_system, only: directory_exists
    use thud_text, only: byte_order_mark, to_text
    implicit none (type, external)
    private
@@ -22,10 +22,9 @@ contains
       !> Set if the file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
       integer(int64) :: bytes
-      integer :: descriptor, count, done
+      integer :: unit, status
 
-      ! Fortran's own `inquire` and `open` would drop blanks at the end of a path.
-      call get_file_size(path, bytes)
+      inquire (file=path, size=bytes)
       if (directory_exists(path)) then
          error = input_error('this is a directory; allowed: the path of a namelist file')
       else if (bytes < 0) then
@@ -36,16 +35,13 @@ contains
             bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(max_input_size))//' bytes')
       end if
       if (allocated(error)) return
-      descriptor = open_descriptor(path)
       allocate (character(len=bytes) :: text)
-      done = 0
-      do while (descriptor >= 0 .and. done < len(text))
-         call read_bytes(descriptor, text(done + 1:), count)
-         if (count <= 0) exit
-         done = done + count
-      end do
-      call close_descriptor(descriptor)
-      if (done < len(text)) error = input_error('the file cannot be read; allowed: a readable namelist file')
+      open (newunit=unit, file=path, action='read', access='stream', status='old', iostat=status)
+      if (status == 0) then
+         read (unit, iostat=status) text
+         close (unit)
+      end if
+      if (status /= 0) error = input_error('the file cannot be read; allowed: a readable namelist file')
       if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
 

@@ -6,49 +6,93 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <math.h>
-#include <pthread.h>
 #include <signal.h>
-#include <stdint.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 // Number of the signal that asks to end the work, 0 for none; long loops check it through the module thud_interrupt.
 volatile sig_atomic_t thud_latest_signal = 0;
 
-// Whether interrupts are deferred, and the message if they are not.
-static volatile sig_atomic_t deferred = 0;
-static const char *volatile interruption = "\nthud: interrupted; nothing was written\n";
+// 1 in a process forked from one that had called the library: it has none of the threads of OpenMP, which would be waited
+// for.
+volatile sig_atomic_t thud_is_forked = 0;
+
+// The process that called last, 0 for none, and its number of running calls.
+static _Atomic pid_t caller = 0;
+static atomic_int running = 0;
+
+// Handlers of the process, which `record_signal` calls too.
 static const int ending_signals[] = {SIGINT, SIGTERM};
+static struct sigaction handlers[2];
 
-static void interrupt(int number)
+static void record_signal(int number, siginfo_t *information, void *context)
 {
-   static time_t first;
-   struct timespec now;
+   static volatile sig_atomic_t nested = 0;
+   const struct sigaction *handler = &handlers[number == SIGTERM];
 
-   // The clock of the day may be set back between two signals.
-   clock_gettime(CLOCK_MONOTONIC, &now);
-   if (deferred && !thud_latest_signal) {
-      thud_latest_signal = number;
-      first = now.tv_sec;
-      return;
-   }
-   // Some callers send a signal both to the process and to its group: ignore the second.
-   if (deferred && now.tv_sec <= first + 1) return;
-
-   // On a terminal, begin a new line after ^C and a progress line.
-   const char *text = isatty(STDERR_FILENO) ? interruption : interruption + 1;
-
-   if (write(STDERR_FILENO, text, strlen(text)) < 0) _exit(128 + number);
-   _exit(128 + number);
+   if (running > 0) thud_latest_signal = number;
+   // Another library may have saved this handler and call it from its own handler.
+   if (nested) return;
+   nested = 1;
+   if (handler->sa_flags & SA_SIGINFO) handler->sa_sigaction(number, information, context);
+   else handler->sa_handler(number);
+   nested = 0;
 }
 
-// Prepares the process of the executable: writing to a full file or a closed pipe is an error and not a signal, no
-// file gets the descriptor of a closed standard stream, SIGINT and SIGTERM end the process with a message.
+// Marks a call as running; signals that the process handles then also interrupt it.
+void thud_begin_call(void)
+{
+   static atomic_flag hooking = ATOMIC_FLAG_INIT;
+   struct sigaction action;
+   pid_t before = atomic_exchange(&caller, getpid());
+
+   if (before != 0 && before != caller) {
+      thud_is_forked = 1;
+      running = 0;
+      thud_latest_signal = 0;
+   }
+   running++;
+   if (atomic_flag_test_and_set(&hooking)) return;
+   for (int i = 0; i < 2; i++) {
+      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == record_signal
+          || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
+      handlers[i] = action;
+      action.sa_sigaction = record_signal;
+      action.sa_flags |= SA_SIGINFO;
+      sigaction(ending_signals[i], &action, NULL);
+   }
+   atomic_flag_clear(&hooking);
+}
+
+// Interrupts the running calls.
+void thud_interrupt_calls(void)
+{
+   if (running > 0) thud_latest_signal = SIGINT;
+}
+
+// Marks the end of a call.
+void thud_end_call(void)
+{
+   if (--running == 0) thud_latest_signal = 0;
+}
+
+// Handler of the executable: the work ends in order, and the process at the third signal, as some callers send one both to
+// the process and to its group.
+static void interrupt(int number)
+{
+   static volatile sig_atomic_t count = 0;
+
+   thud_latest_signal = number;
+   if (++count == 3) _exit(128 + number);
+}
+
+// Prepares the process of the executable: writing to a full file or a closed pipe is an error and not a signal, no file
+// gets the descriptor of a closed standard stream, SIGINT and SIGTERM end the work.
 void thud_prepare_process(void)
 {
    struct sigaction action = {.sa_handler = SIG_IGN}, before;
@@ -113,136 +157,10 @@ int thud_has_memory(double bytes, int check_available)
    return (free < 0.0 || bytes <= free) && bytes <= thud_get_container_limit("/sys/fs/cgroup");
 }
 
-// Handlers of the process, which `record_signal` calls too, and the number of running calls of the library.
-static struct sigaction handlers[2];
-static volatile sig_atomic_t running = 0;
-static pthread_mutex_t calls = PTHREAD_MUTEX_INITIALIZER;
-
-static void record_signal(int number, siginfo_t *information, void *context)
-{
-   static volatile sig_atomic_t nested = 0;
-   const struct sigaction *handler = &handlers[number == SIGTERM];
-
-   if (running) thud_latest_signal = number;
-   // Another library may have saved this handler and call it from its own handler.
-   if (nested) return;
-   nested = 1;
-   if (handler->sa_flags & SA_SIGINFO) handler->sa_sigaction(number, information, context);
-   else handler->sa_handler(number);
-   nested = 0;
-}
-
-// Whether a fork waits for the running calls, and the maximum time that it waits, ms.
-static volatile sig_atomic_t forking = 0;
-enum { max_fork_wait = 1000 };
-
-static void pause_calls(void)
-{
-   pthread_mutex_unlock(&calls);
-   usleep(1000);
-   pthread_mutex_lock(&calls);
-}
-
-// A call in another thread may be within OpenBLAS, whose lock would stay locked forever in a forked process. Calls
-// longer than `max_fork_wait` are rare.
-static void wait_for_calls(void)
-{
-   pthread_mutex_lock(&calls);
-   forking = 1;
-   for (int i = 0; running && i < max_fork_wait; i++) pause_calls();
-}
-
-static void resume_calls(void)
-{
-   forking = 0;
-   pthread_mutex_unlock(&calls);
-}
-
-// A forked process has none of the threads of the running calls, nor those of OpenMP, which would be waited for.
-volatile sig_atomic_t thud_is_forked = 0;
-
-static void reset_after_fork(void)
-{
-   thud_is_forked = 1;
-   pthread_mutex_init(&calls, NULL);
-   forking = 0;
-   running = 0;
-   thud_latest_signal = 0;
-}
-
-static void register_fork_handlers(void)
-{
-   pthread_atfork(wait_for_calls, resume_calls, reset_after_fork);
-}
-
-// Marks a call as running; signals that the process handles then also interrupt it.
-void thud_begin_call(void)
-{
-   static pthread_once_t once = PTHREAD_ONCE_INIT;
-   struct sigaction action;
-
-   pthread_once(&once, register_fork_handlers);
-   pthread_mutex_lock(&calls);
-   while (forking) pause_calls();
-   running++;
-   for (int i = 0; i < 2; i++) {
-      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == record_signal
-          || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
-      handlers[i] = action;
-      action.sa_sigaction = record_signal;
-      action.sa_flags |= SA_SIGINFO;
-      sigaction(ending_signals[i], &action, NULL);
-   }
-   pthread_mutex_unlock(&calls);
-}
-
-// Interrupts the running calls.
-void thud_interrupt_calls(void)
-{
-   if (running) thud_latest_signal = SIGINT;
-}
-
-// Marks the end of a call.
-void thud_end_call(void)
-{
-   pthread_mutex_lock(&calls);
-   if (--running == 0) thud_latest_signal = 0;
-   pthread_mutex_unlock(&calls);
-}
-
-// From now on an interrupt is deferred: it only stops `thud_write`.
-void thud_defer_interrupts(void)
-{
-   deferred = 1;
-}
-
-// From now on an interrupt ends the process; the message depends on whether the results have been written.
-void thud_pass_interrupts(int written)
-{
-   if (written) interruption = "\nthud: interrupted; the results are written\n";
-   deferred = 0;
-}
-
 // Message of an error, at most `length` bytes including the final zero.
 void thud_get_error_text(int number, char *text, size_t length)
 {
    snprintf(text, length, "%s", strerror(number));
-}
-
-// A descriptor for reading; negative after an error.
-int thud_open(const char *path)
-{
-   return open(path, O_RDONLY | O_CLOEXEC);
-}
-
-// Number of bytes read; 0 at the end, negative after an error or a signal that ends the work.
-ssize_t thud_read(int descriptor, char *bytes, size_t length)
-{
-   ssize_t count;
-
-   do count = read(descriptor, bytes, length);
-   while (count < 0 && errno == EINTR && !thud_latest_signal);
-   return count;
 }
 
 // A descriptor to write to a new file, or minus the number of the error.
@@ -253,11 +171,10 @@ int thud_create(const char *path)
    return descriptor < 0 ? -errno : descriptor;
 }
 
-// Writes a whole text; returns -1 after a deferred interrupt. A closed pipe or standard stream has no reader: no error.
+// Writes a whole text. A closed pipe or standard stream has no reader: no error.
 int thud_write(int descriptor, const char *bytes, size_t length)
 {
    while (length > 0) {
-      if (deferred && thud_latest_signal) return -1;
       ssize_t count = write(descriptor, bytes, length);
 
       if (count < 0 && errno == EINTR) continue;
@@ -275,7 +192,7 @@ int thud_close(int descriptor)
 }
 
 // Absolute path without links, at most `length` bytes; creates missing parent directories.
-int thud_resolve(const char *path, char *resolved, size_t length)
+static int resolve(const char *path, char *resolved, size_t length)
 {
    char above[PATH_MAX], *real_path, *end;
    const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
@@ -299,13 +216,16 @@ int thud_resolve(const char *path, char *resolved, size_t length)
    return used < length ? 0 : ENAMETOOLONG;
 }
 
-// Makes a new directory beside a target, whose absolute path is given: `.NAME.<process>-<number>.new`.
+// Makes a new directory beside a target, which may be missing: `.NAME.<process>-<number>.new`. Creates missing parents.
 int thud_make_beside(const char *target, char *path, size_t length)
 {
-   const char *name = strrchr(target, '/') + 1;
+   char resolved[PATH_MAX], *name;
+   int error = resolve(target, resolved, sizeof resolved);
 
+   if (error) return error;
+   name = strrchr(resolved, '/') + 1;
    for (int i = 1; i <= 1000; i++) {
-      int used = snprintf(path, length, "%.*s.%s.%ld-%d.new", (int)(name - target), target, name, (long)getpid(), i);
+      int used = snprintf(path, length, "%.*s.%s.%ld-%d.new", (int)(name - resolved), resolved, name, (long)getpid(), i);
 
       if ((size_t)used >= length) return ENAMETOOLONG;
       if (mkdir(path, 0777) == 0) return 0;
@@ -316,12 +236,13 @@ int thud_make_beside(const char *target, char *path, size_t length)
 
 // Puts a directory in the place of a target, which then has the path of the first, in one step if the file system can
 // exchange names; else the target is `NAME.old` for a moment.
-int thud_swap(const char *path, const char *target)
+int thud_swap(const char *path, const char *place)
 {
-   char old[PATH_MAX];
+   char target[PATH_MAX], old[PATH_MAX];
    struct stat there;
-   int error;
+   int error = resolve(place, target, sizeof target);
 
+   if (error) return error;
    // The target is missing or empty.
    if (rename(path, target) == 0) return 0;
    if (stat(target, &there) == 0 && chmod(path, there.st_mode & 07777) != 0) return errno;
@@ -347,23 +268,21 @@ int thud_is_same_file(const char *path, const char *other)
    return stat(path, &here) == 0 && stat(other, &there) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino;
 }
 
-// Length of the next name in an open directory, except `.` and `..`; 0 at the end.
-size_t thud_next_name(DIR *directory, char *name, size_t length)
+// Names in a directory, each with a slash behind it, as far as they fit; returns the length of all of them.
+int thud_list(const char *path, char *names, size_t length)
 {
+   DIR *directory = opendir(path);
    struct dirent *entry;
+   int used = 0;
 
-   do entry = readdir(directory);
-   while (entry && (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0));
-   if (!entry) return 0;
-   snprintf(name, length, "%s", entry->d_name);
-   return strlen(name);
-}
+   while (directory && (entry = readdir(directory))) {
+      const char *name = entry->d_name;
+      int size = (int)strlen(name) + 1;
 
-// Bytes of a file: 0 if it is not regular, negative if there is none.
-int64_t thud_get_file_size(const char *path)
-{
-   struct stat info;
-
-   if (stat(path, &info) != 0) return -1;
-   return S_ISREG(info.st_mode) ? (int64_t)info.st_size : 0;
+      if (strcmp(name, ".") == 0 || strcmp(name, "..") == 0) continue;
+      if ((size_t)(used + size) <= length) snprintf(names + used, length - (size_t)used + 1, "%s/", name);
+      used += size;
+   }
+   if (directory) closedir(directory);
+   return used;
 }

@@ -1,16 +1,13 @@
 !> Operating system calls that Fortran lacks; implemented in `system.c`.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_int64_t, c_intptr_t, &
-      c_null_char, c_ptr, c_size_t
-   use, intrinsic :: iso_fortran_env, only: int64
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_size_t
    implicit none (type, external)
    private
 
    public :: standard_error, standard_output
-   public :: begin_call, close_descriptor, create_file, defer_interrupts, directory_exists, end_call, end_process
-   public :: get_file_size, get_system_message, interrupt_calls, is_forked, is_same_file
-   public :: is_terminal, list_directory, make_beside, open_descriptor, pass_interrupts, prepare_process, read_bytes
-   public :: remove_file, rename_file, resolve_path, swap_directories, write_text
+   public :: begin_call, close_file, create_file, directory_exists, end_call, end_process, get_system_message
+   public :: interrupt_calls, is_forked, is_same_file, is_terminal, list_directory, make_beside, prepare_process
+   public :: remove_file, swap_directories, write_text
 
    !> Standard descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
@@ -49,13 +46,6 @@ module thud_system
          integer(c_int) :: status
       end function path_text_call
 
-      function path_number_call(path) bind(c) result(number)
-         import :: c_char, c_int64_t
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int64_t) :: number
-      end function path_number_call
-
       function number_call(number) bind(c) result(status)
          import :: c_int
          implicit none (type, external)
@@ -64,24 +54,20 @@ module thud_system
       end function number_call
    end interface
 
-   procedure(path_call), bind(c, name='thud_open') :: c_open
    procedure(path_call), bind(c, name='thud_create') :: c_create
    procedure(path_call), bind(c, name='remove') :: c_remove
-   procedure(path_text_call), bind(c, name='thud_resolve') :: c_resolve
+   procedure(path_text_call), bind(c, name='thud_list') :: c_list
    procedure(path_text_call), bind(c, name='thud_make_beside') :: c_make_beside
-   procedure(path_number_call), bind(c, name='thud_get_file_size') :: c_get_file_size
-   procedure(two_path_call), bind(c, name='rename') :: c_rename
    procedure(two_path_call), bind(c, name='thud_is_same_file') :: c_is_same_file
    procedure(two_path_call), bind(c, name='thud_swap') :: c_swap
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
-   !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then end the process with a message.
+   !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then set `latest_signal`, and the third of them
+   !> ends the process.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
-   !> From now on an interrupt does not end the process; it stops `write_text`.
-   procedure(plain_call), bind(c, name='thud_defer_interrupts') :: defer_interrupts
    !> Marks the beginning of a call of the library: until its end, SIGINT and SIGTERM also set `latest_signal` if the process
-   !> handles them, and forks wait. All calls from Python begin with it except `collect`, `get_progress` and `end_calls`.
+   !> handles them. All calls from Python begin with it except `collect`, `get_progress` and `end_calls`.
    procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
    !> Marks the end of a call.
    procedure(plain_call), bind(c, name='thud_end_call') :: end_call
@@ -97,14 +83,6 @@ module thud_system
          integer(c_int), value :: code
       end subroutine end_process
 
-      !> From now on an interrupt ends the process.
-      subroutine pass_interrupts(written) bind(c, name='thud_pass_interrupts')
-         import :: c_int
-         implicit none (type, external)
-         !> 1 if the results have been written, else 0.
-         integer(c_int), value :: written
-      end subroutine pass_interrupts
-
       subroutine c_get_error_text(number, text, length) bind(c, name='thud_get_error_text')
          import :: c_char, c_int, c_size_t
          implicit none (type, external)
@@ -112,15 +90,6 @@ module thud_system
          character(kind=c_char), intent(out) :: text(*)
          integer(c_size_t), value :: length
       end subroutine c_get_error_text
-
-      function c_read(descriptor, bytes, length) bind(c, name='thud_read') result(count)
-         import :: c_char, c_int, c_intptr_t, c_size_t
-         implicit none (type, external)
-         integer(c_int), value :: descriptor
-         character(kind=c_char), intent(out) :: bytes(*)
-         integer(c_size_t), value :: length
-         integer(c_intptr_t) :: count
-      end function c_read
 
       function c_write(descriptor, bytes, length) bind(c, name='thud_write') result(status)
          import :: c_char, c_int, c_size_t
@@ -130,29 +99,6 @@ module thud_system
          integer(c_size_t), value :: length
          integer(c_int) :: status
       end function c_write
-
-      function c_opendir(path) bind(c, name='opendir') result(directory)
-         import :: c_char, c_ptr
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         type(c_ptr) :: directory
-      end function c_opendir
-
-      function c_next_name(directory, name, length) bind(c, name='thud_next_name') result(used)
-         import :: c_char, c_ptr, c_size_t
-         implicit none (type, external)
-         type(c_ptr), value :: directory
-         character(kind=c_char), intent(out) :: name(*)
-         integer(c_size_t), value :: length
-         integer(c_size_t) :: used
-      end function c_next_name
-
-      function c_closedir(directory) bind(c, name='closedir') result(status)
-         import :: c_int, c_ptr
-         implicit none (type, external)
-         type(c_ptr), value :: directory
-         integer(c_int) :: status
-      end function c_closedir
    end interface
 
 contains
@@ -175,38 +121,14 @@ contains
       yes = c_isatty(int(descriptor, c_int)) == 1
    end function is_terminal
 
-   !> Opens a file, pipe or device for reading.
-   function open_descriptor(path) result(descriptor)
-      character(len=*), intent(in) :: path
-      !> The descriptor; negative if the file cannot be opened.
-      integer :: descriptor
-
-      descriptor = int(c_open(path//c_null_char))
-   end function open_descriptor
-
-   !> Reads the available bytes, up to the length of the buffer.
-   subroutine read_bytes(descriptor, buffer, count)
+   !> Closes a file.
+   subroutine close_file(descriptor, status)
       integer, intent(in) :: descriptor
-      character(len=*), intent(out) :: buffer
-      !> Number of bytes read; 0 at the end, negative after an error.
-      integer, intent(out) :: count
-
-      count = int(c_read(int(descriptor, c_int), buffer, len(buffer, c_size_t)))
-   end subroutine read_bytes
-
-   !> Closes a descriptor.
-   subroutine close_descriptor(descriptor, status)
-      !> The descriptor; negative if closed, as it is afterwards.
-      integer, intent(inout) :: descriptor
       !> 0, or the number of the error.
-      integer, intent(out), optional :: status
-      integer :: result_status
+      integer, intent(out) :: status
 
-      result_status = 0
-      if (descriptor >= 0) result_status = int(c_close(int(descriptor, c_int)))
-      descriptor = -1
-      if (present(status)) status = result_status
-   end subroutine close_descriptor
+      status = int(c_close(int(descriptor, c_int)))
+   end subroutine close_file
 
    !> Creates a file.
    subroutine create_file(path, descriptor, status)
@@ -223,7 +145,7 @@ contains
    subroutine write_text(descriptor, text, status)
       integer, intent(in) :: descriptor
       character(len=*), intent(in) :: text
-      !> 0, the number of the error, or negative after an interrupt.
+      !> 0, or the number of the error.
       integer, intent(out) :: status
 
       status = int(c_write(int(descriptor, c_int), text, len(text, c_size_t)))
@@ -232,13 +154,9 @@ contains
    !> Whether a directory exists.
    function directory_exists(path) result(exists)
       character(len=*), intent(in) :: path
-      !> It exists and can be read.
       logical :: exists
-      type(c_ptr) :: directory
 
-      directory = c_opendir(path//c_null_char)
-      exists = c_associated(directory)
-      if (exists) exists = c_closedir(directory) == 0
+      inquire (file=path//'/.', exist=exists)
    end function directory_exists
 
    !> Names in a directory.
@@ -246,51 +164,30 @@ contains
       character(len=*), intent(in) :: path
       !> The names in order; none if the directory cannot be read: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
-      character(len=name_length + 1) :: name
-      type(c_ptr) :: directory
-      integer :: n, length, first
+      character(len=:), allocatable :: text
+      integer :: length, n, at, stop
 
-      allocate (names(64))
-      n = 0
-      directory = c_opendir(path//c_null_char)
-      if (c_associated(directory)) then
-         do
-            length = int(c_next_name(directory, name, len(name, c_size_t)))
-            if (length == 0) exit
-            if (n == size(names)) names = [names, names]
-            n = n + 1
-            names(n) = name(:length)
-            ! A zero byte keeps `trim` from removing a blank at the end of the name.
-            if (name(length:length) == ' ') names(n)(min(length + 1, name_length):) = c_null_char
-         end do
-         if (c_closedir(directory) /= 0) n = 0
-      end if
-      names = names(:n)
+      text = ' '
+      length = int(c_list(path//c_null_char, text, 0_c_size_t))
+      ! C ends a text with a zero.
+      text = repeat('/', length + 1)
+      length = int(c_list(path//c_null_char, text, int(length, c_size_t)))
+      allocate (names(count([(text(n:n) == '/', n=1, min(length, len(text) - 1))])))
+      at = 1
+      do n = 1, size(names)
+         stop = at + index(text(at:), '/') - 1
+         names(n) = text(at:stop - 1)
+         at = stop + 1
+      end do
       do n = 1, size(names) - 1
-         first = n - 1 + minloc(names(n:), dim=1)
-         names([n, first]) = names([first, n])
+         at = n - 1 + minloc(names(n:), dim=1)
+         names([n, at]) = names([at, n])
       end do
    end subroutine list_directory
 
-   !> Resolves links in a path; creates missing parent directories.
-   subroutine resolve_path(path, resolved, status)
-      !> Path of a directory, which may be missing.
-      character(len=*), intent(in) :: path
-      !> Absolute path without links.
-      character(len=:), allocatable, intent(out) :: resolved
-      !> 0, or the number of the error.
-      integer, intent(out) :: status
-      character(len=path_length) :: buffer
-      integer :: stop
-
-      stop = max(verify(path, '/', back=.true.), 1)
-      status = int(c_resolve(path(:stop)//c_null_char, buffer, len(buffer, c_size_t)))
-      if (status == 0) resolved = buffer(:index(buffer, c_null_char) - 1)
-   end subroutine resolve_path
-
-   !> Makes a new directory beside another one.
+   !> Makes a new directory beside another one, and missing parents.
    subroutine make_beside(path, made, status)
-      !> Absolute path of the other directory, which may be missing.
+      !> Path of the other directory, which may be missing; links in it are resolved.
       character(len=*), intent(in) :: path
       !> Path of the new directory.
       character(len=:), allocatable, intent(out) :: made
@@ -298,7 +195,7 @@ contains
       integer, intent(out) :: status
       character(len=path_length) :: buffer
 
-      status = int(c_make_beside(path//c_null_char, buffer, len(buffer, c_size_t)))
+      status = int(c_make_beside(path(:max(verify(path, '/', back=.true.), 1))//c_null_char, buffer, len(buffer, c_size_t)))
       if (status == 0) made = buffer(:index(buffer, c_null_char) - 1)
    end subroutine make_beside
 
@@ -310,39 +207,16 @@ contains
       !> 0, or the number of the error.
       integer, intent(out) :: status
 
-      status = int(c_swap(path//c_null_char, target//c_null_char))
+      status = int(c_swap(path//c_null_char, target(:max(verify(target, '/', back=.true.), 1))//c_null_char))
    end subroutine swap_directories
 
-   !> Renames a file; an existing file of the new name is replaced in the same step.
-   subroutine rename_file(old_path, new_path, done)
-      character(len=*), intent(in) :: old_path
-      !> New path in the same file system.
-      character(len=*), intent(in) :: new_path
-      !> The file has its new name.
-      logical, intent(out) :: done
-
-      done = c_rename(old_path//c_null_char, new_path//c_null_char) == 0
-   end subroutine rename_file
-
    !> Removes a file or an empty directory, if it exists.
-   subroutine remove_file(path, done)
+   subroutine remove_file(path)
       character(len=*), intent(in) :: path
-      !> Something has been removed.
-      logical, intent(out), optional :: done
-      integer(c_int) :: status
+      integer(c_int) :: ignored
 
-      status = c_remove(path//c_null_char)
-      if (present(done)) done = status == 0
+      ignored = c_remove(path//c_null_char)
    end subroutine remove_file
-
-   !> Size of a file.
-   subroutine get_file_size(path, bytes)
-      character(len=*), intent(in) :: path
-      !> Size, bytes: 0 if the file is not regular, negative if there is none.
-      integer(int64), intent(out) :: bytes
-
-      bytes = int(c_get_file_size(path//c_null_char), int64)
-   end subroutine get_file_size
 
    !> Whether two paths lead to the same file, perhaps by links.
    function is_same_file(path, other) result(yes)

@@ -4,7 +4,7 @@
 module thud_table_reader
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_system, only: close_descriptor, directory_exists, open_descriptor, read_bytes
+   use thud_system, only: directory_exists
    use thud_text, only: byte_order_mark, is_number, newline, quoted, replaced, tab, to_text
    implicit none (type, external)
    private
@@ -20,11 +20,8 @@ module thud_table_reader
    !> An open table. Its file is closed at its end, or with the table.
    type :: table_reader_type
       private
-      integer :: descriptor = -1
-      !> The bytes read last.
-      character(len=65536) :: buffer = ''
-      !> Number of bytes in the buffer, and number already returned.
-      integer :: filled = 0, taken = 0
+      !> Unit of the file; 0 if it is closed.
+      integer :: unit = 0
       !> Number of the latest line.
       integer :: line = 0
       !> Separator of the cells; a line feed, which no line holds, until the first row, and for a single column.
@@ -43,58 +40,53 @@ contains
       type(table_reader_type), intent(out) :: table
       !> Set if the file cannot be read; no message of a table names its path.
       type(error_type), allocatable, intent(out) :: error
+      integer :: status
 
-      table%descriptor = open_descriptor(path)
-      call fill(table, error)
-      if (directory_exists(path)) error = input_error('this is a directory; allowed: a table')
-      if (index(table%buffer, byte_order_mark) == 1) table%taken = len(byte_order_mark)
+      if (directory_exists(path)) then
+         error = input_error('this is a directory; allowed: a table')
+         return
+      end if
+      open (newunit=table%unit, file=path, action='read', access='stream', form='formatted', status='old', iostat=status)
+      if (status == 0) return
+      table%unit = 0
+      error = input_error('the file cannot be read; allowed: a table')
    end subroutine open_table
 
    !> Closes the file of a table that is not read to its end.
    subroutine close_table(table)
       type(table_reader_type), intent(inout) :: table
 
-      call close_descriptor(table%descriptor)
+      if (table%unit /= 0) close (table%unit)
+      table%unit = 0
    end subroutine close_table
 
-   !> Refills the buffer; the table is closed at its end.
-   subroutine fill(table, error)
-      type(table_reader_type), intent(inout) :: table
-      !> Set if the file cannot be read.
-      type(error_type), allocatable, intent(out) :: error
-
-      table%taken = 0
-      table%filled = -1
-      if (table%descriptor >= 0) call read_bytes(table%descriptor, table%buffer, table%filled)
-      if (table%filled < 0) error = input_error('the file cannot be read; allowed: a table')
-      if (table%filled <= 0) call close_descriptor(table%descriptor)
-   end subroutine fill
-
-   !> The next line, without its end. Fortran's `read` would load a whole line into memory, however long.
+   !> The next line, without its end. It is read in pieces, as it may be too long for the memory.
    subroutine read_line(table, line, error)
       type(table_reader_type), intent(inout) :: table
       !> The line; not allocated at the end of the table. Of a longer comment, its beginning.
       character(len=:), allocatable, intent(out) :: line
       !> Set if the line is too long or cannot be read.
       type(error_type), allocatable, intent(out) :: error
-      integer :: stop, n
+      character(len=4096) :: piece
+      integer :: n, status
 
-      stop = 0
-      do while (stop == 0 .and. table%descriptor >= 0)
-         if (table%taken >= table%filled) call fill(table, error)
-         if (allocated(error) .or. table%filled == 0) exit
+      do while (table%unit /= 0)
+         read (table%unit, '(a)', advance='no', size=n, iostat=status) piece
+         if (is_iostat_end(status)) exit
          if (.not. allocated(line)) then
             line = ''
             table%line = table%line + 1
+            if (table%line == 1 .and. index(piece, byte_order_mark) == 1) piece = piece(len(byte_order_mark) + 1:n)
          end if
-         stop = index(table%buffer(table%taken + 1:table%filled), newline)
-         n = merge(stop - 1, table%filled - table%taken, stop > 0)
-         if (len(line) <= line_length) line = line//table%buffer(table%taken + 1:table%taken + n)
-         table%taken = table%taken + n + min(stop, 1)
-         if (len(line) <= line_length .or. line(1:1) == '#') cycle
-         error = row_error(table, 'it is too long; allowed: up to '//to_text(line_length)//' characters')
-         exit
+         if (len(line) <= line_length) line = line//piece(:n)
+         if (len(line) > line_length .and. line(1:1) /= '#') then
+            error = row_error(table, 'it is too long; allowed: up to '//to_text(line_length)//' characters')
+         else if (status /= 0 .and. .not. is_iostat_eor(status)) then
+            error = row_error(table, 'it cannot be read; allowed: a table')
+         end if
+         if (status /= 0 .or. allocated(error)) return
       end do
+      call close_table(table)
    end subroutine read_line
 
    !> The cells of the next row.

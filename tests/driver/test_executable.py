@@ -337,15 +337,6 @@ def test_characters_that_no_screen_shows_are_replaced(run: Run, case_file: CaseF
         thud.read_case(path)
 
 
-def test_blanks_at_the_end_of_a_path_belong_to_it(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    case_file(MINIMAL, "ball.nml ")
-    assert run("ball.nml ", "-o", "out ").returncode == 0
-    assert (tmp_path / "out " / "effective.nml").exists()
-    assert "ball.nml" in run("ball.nml").stderr
-
-
 def test_name_that_is_no_text_is_refused(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
     odd = os.fsdecode(b"\xff.nml")
     case_file(MINIMAL, odd)

@@ -191,41 +191,6 @@ except KeyboardInterrupt:
     assert python("-c", code, timeout=2 * LIMIT).returncode == 7
 
 
-@pytest.mark.parametrize(
-    ("work", "forks"),
-    [("thud.solve(case)", 60), ("check_case(case)", 300)],
-    ids=["solve", "check"],
-)
-@pytest.mark.slow
-def test_processes_forked_beside_short_calls_have_no_locked_libraries(
-    work: str, forks: int
-) -> None:
-    code = f"""
-import os, signal, threading, thud
-from thud.case.case import check_case
-case = thud.Case(model=thud.ModalBall(rings=20))
-
-def compute():
-    while True:
-        {work}
-
-{work}
-for _ in range(2):
-    threading.Thread(target=compute, daemon=True).start()
-for _ in range({forks}):
-    child = os.fork()
-    if not child:
-        signal.alarm(20)
-        {work}
-        os._exit(0)
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    if code:
-        os._exit(abs(code))
-os._exit(0)
-"""
-    assert python("-W", "ignore", "-c", code, timeout=6 * LIMIT).returncode == 0
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("copies", [1, 2], ids=["once", "twice"])
 def test_executable_ends_samples_and_leaves_nothing(

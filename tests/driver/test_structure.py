@@ -118,7 +118,7 @@ def test_modules_are_named_after_their_files() -> None:
 
 
 def test_every_call_of_python_is_guarded() -> None:
-    """Interrupts end what computes, and forks wait for it, from the first statement to the last."""
+    """Interrupts end what computes, from the first statement to the last."""
     body = re.compile(r"(?sm)^   subroutine (\w+).*?\n\n(.*?)^   end subroutine")
     public = re.compile(r"(?m)^   public :: (.*)")
     unguarded = set()

@@ -11,7 +11,6 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
-from threading import Event, Thread
 from typing import TYPE_CHECKING
 
 from campaign import Finding
@@ -19,15 +18,15 @@ from injection import PATIENCE
 from public_calls import fast_calls, quiet, same
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from campaign import Tries
     from public_calls import Calls
 
 
 CROWD = 8
-# Ways to start what works at the same time; the last forks while threads compute.
-STARTS = ("threads", "fork", "spawn", "forkserver", "fork beside threads")
+# Ways to start what works at the same time.
+STARTS = ("threads", "fork", "spawn", "forkserver")
 
 
 @cache
@@ -71,30 +70,8 @@ def _stage(way: str, names: list[str]) -> list[object]:
     if way == "threads":
         with ThreadPoolExecutor(3) as pool:
             return list(pool.map(_call, names))
-    if way == "fork beside threads":
-        return _beside_threads(lambda: _stage("fork", names))
     with ProcessPoolExecutor(2, get_context(way)) as processes:  # type: ignore[arg-type]
         return list(processes.map(_call, names, chunksize=len(names)))
-
-
-def _beside_threads(work: Callable[[], list[object]]) -> list[object]:
-    """Return what work gives while two threads compute."""
-    over = Event()
-
-    def compute() -> None:
-        while not over.is_set():
-            _call("modal ball")
-            _call("solve_many")
-
-    threads = [Thread(target=compute) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    try:
-        return work()
-    finally:
-        over.set()
-        for thread in threads:
-            thread.join()
 
 
 def main() -> None:

@@ -29,10 +29,6 @@ from thud.impact.outcomes import Ensemble
 from thud.impact.quantities import ROOM_LEVEL, ROOM_RATING
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 
-# Not empty if this process is a fork of another.
-_FORKED: list[bool] = []
-os.register_at_fork(after_in_child=lambda: _FORKED.append(True))
-
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
@@ -148,7 +144,6 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
             refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
     n_thread = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", n_thread, 1, MAX_THREADS)
-    n_thread = 1 if _FORKED else n_thread
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
     max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
     block_size = min(_FIRST_BLOCK * n_thread, max(1, max_count))

@@ -8,7 +8,6 @@ module thud_case_text
    use thud_namelist_text, only: group_type, parse_groups
    use thud_registry, only: floor_names
    use thud_suggestion, only: get_suggestion
-   use thud_system, only: get_file_size
    use thud_text, only: join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
    private
@@ -99,7 +98,7 @@ contains
          if (.not. fields(i)%is_path) cycle
          call fields(i)%get_words(words)
          if (words(1) == '' .or. words(1)(1:1) == '/') cycle
-         call get_file_size(directory//trim(words(1)), bytes)
+         inquire (file=directory//trim(words(1)), size=bytes)
          if (bytes < 0) cycle
          call fields(i)%set_from_text(quoted(directory//trim(words(1))), error)
          if (allocated(error)) return
