@@ -22,6 +22,7 @@ contains
       !> Set if the file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
       integer(int64) :: bytes
+      character(len=128) :: reason
       integer :: unit, status
 
       inquire (file=path, size=bytes)
@@ -36,12 +37,12 @@ contains
       end if
       if (allocated(error)) return
       allocate (character(len=bytes) :: text)
-      open (newunit=unit, file=path, action='read', access='stream', status='old', iostat=status)
+      open (newunit=unit, file=path, action='read', access='stream', status='old', iostat=status, iomsg=reason)
       if (status == 0) then
-         read (unit, iostat=status) text
+         read (unit, iostat=status, iomsg=reason) text
          close (unit)
       end if
-      if (status /= 0) error = input_error('the file cannot be read; allowed: a readable namelist file')
+      if (status /= 0) error = input_error('the file cannot be read ('//trim(reason)//'); allowed: a readable namelist file')
       if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
 

@@ -63,8 +63,8 @@ module thud_system
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
-   !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then set `latest_signal`, and the third of them
-   !> ends the process.
+   !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then set `latest_signal`, and the third of
+   !> them ends the process.
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
    !> Marks the beginning of a call of the library: until its end, SIGINT and SIGTERM also set `latest_signal` if the process
    !> handles them. All calls from Python begin with it except `collect`, `get_progress` and `end_calls`.

@@ -40,16 +40,18 @@ contains
       type(table_reader_type), intent(out) :: table
       !> Set if the file cannot be read; no message of a table names its path.
       type(error_type), allocatable, intent(out) :: error
+      character(len=128) :: reason
       integer :: status
 
       if (directory_exists(path)) then
          error = input_error('this is a directory; allowed: a table')
          return
       end if
-      open (newunit=table%unit, file=path, action='read', access='stream', form='formatted', status='old', iostat=status)
+      open (newunit=table%unit, file=path, action='read', access='stream', form='formatted', status='old', &
+         iostat=status, iomsg=reason)
       if (status == 0) return
       table%unit = 0
-      error = input_error('the file cannot be read; allowed: a table')
+      error = input_error('the file cannot be read ('//trim(reason)//'); allowed: a table')
    end subroutine open_table
 
    !> Closes the file of a table that is not read to its end.
@@ -68,10 +70,11 @@ contains
       !> Set if the line is too long or cannot be read.
       type(error_type), allocatable, intent(out) :: error
       character(len=4096) :: piece
+      character(len=128) :: reason
       integer :: n, status
 
       do while (table%unit /= 0)
-         read (table%unit, '(a)', advance='no', size=n, iostat=status) piece
+         read (table%unit, '(a)', advance='no', size=n, iostat=status, iomsg=reason) piece
          if (is_iostat_end(status)) exit
          if (.not. allocated(line)) then
             line = ''
@@ -82,7 +85,7 @@ contains
          if (len(line) > line_length .and. line(1:1) /= '#') then
             error = row_error(table, 'it is too long; allowed: up to '//to_text(line_length)//' characters')
          else if (status /= 0 .and. .not. is_iostat_eor(status)) then
-            error = row_error(table, 'it cannot be read; allowed: a table')
+            error = row_error(table, 'it cannot be read ('//trim(reason)//'); allowed: a table')
          end if
          if (status /= 0 .or. allocated(error)) return
       end do
