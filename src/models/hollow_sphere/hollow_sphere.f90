@@ -19,7 +19,7 @@ module thud_hollow_sphere
    implicit none (type, external)
    private
 
-   public :: compression_weights, flux_choices, get_gas_energy, get_gas_force
+   public :: compression_weights, flux_choices, get_gas_force
    public :: get_shell_stiffness, hollow_sphere_type, new_shell, restitution_weights, shell_type
    public :: solve_hollow_sphere
 
@@ -148,17 +148,6 @@ contains
          /(ball%outer_radius*sqrt(12*(1 - ball%poisson_ratio**2)))
    end function get_shell_stiffness
 
-   !> Enclosed volume divided by that of the undeformed sphere.
-   pure function get_volume_ratio(shell, deflection) result(ratio)
-      class(shell_type), intent(in) :: shell
-      !> Deflection, m.
-      real(wp), intent(in) :: deflection
-      !> 1 - deflection^2 (3R - deflection)/(4 R^3).
-      real(wp) :: ratio
-
-      ratio = 1 - deflection**2*(3*shell%radius - deflection)/(4*shell%radius**3)
-   end function get_volume_ratio
-
    !> Force of the enclosed gas, N (paper eq. 2): adiabatic overpressure on the flat cap.
    pure function get_gas_force(shell, deflection, caps) result(force)
       class(shell_type), intent(in) :: shell
@@ -168,33 +157,14 @@ contains
       integer, intent(in), optional :: caps
       !> Force, N.
       real(wp) :: force
-      real(wp) :: overpressure, ratio
+      real(wp) :: overpressure, lost_volume
 
-      ratio = get_volume_ratio(shell, deflection)
-      if (present(caps)) ratio = 1 - caps*(1 - ratio)
-      overpressure = shell%initial_pressure*ratio**(-shell%heat_capacity_ratio) - shell%ambient_pressure
+      ! Fraction of the volume of the undeformed sphere.
+      lost_volume = deflection**2*(3*shell%radius - deflection)/(4*shell%radius**3)
+      if (present(caps)) lost_volume = caps*lost_volume
+      overpressure = shell%initial_pressure*(1 - lost_volume)**(-shell%heat_capacity_ratio) - shell%ambient_pressure
       force = overpressure*pi*deflection*(2*shell%radius - deflection)
    end function get_gas_force
-
-   !> Work against the gas force from zero to a deflection, J: the integral of `get_gas_force`.
-   pure function get_gas_energy(shell, deflection) result(energy)
-      class(shell_type), intent(in) :: shell
-      !> Deflection, m; below the closing deflection.
-      real(wp), intent(in) :: deflection
-      !> Energy, J.
-      real(wp) :: energy
-      real(wp) :: volume, ratio, exponent, compression_work
-
-      volume = 4.0_wp/3.0_wp*pi*shell%radius**3
-      ratio = get_volume_ratio(shell, deflection)
-      exponent = shell%heat_capacity_ratio - 1
-      if (exponent > epsilon(exponent)) then
-         compression_work = (ratio**(-exponent) - 1)/exponent
-      else
-         compression_work = -log(ratio)
-      end if
-      energy = volume*(shell%initial_pressure*compression_work - shell%ambient_pressure*(1 - ratio))
-   end function get_gas_energy
 
    !> Right-hand side of the equation of motion, m a = s (M/2R) v^2 - F_B - F_G, with
    !> m = M (1 - deflection/2R).

@@ -8,19 +8,16 @@ module thud_shell_samples
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
-   use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_history, only: force_history_type, holds_impulse, max_residual, has_quantity
-   use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, &
-      restitution_weights, solve_hollow_sphere
-   use thud_impact_batch, only: impact_batch_type
+   use thud_force_history, only: holds_impulse
+   use thud_hollow_sphere, only: compression_weights, get_shell_stiffness, restitution_weights
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_new_field, only: in_group
    use thud_power, only: not_a_number
    use thud_sampling, only: get_sample_count, min_contact_samples, sampling_type
-   use thud_shell_batch, only: batch_size
-   use thud_shell_impacts, only: solve_impacts
+   use thud_shell_impacts, only: impact_batch_type, solve_impacts
+   use thud_shell_series, only: batch_size
    implicit none (type, external)
    private
 
@@ -51,13 +48,13 @@ module thud_shell_samples
       real(wp) :: max_deflection = not_a_number
       !> Velocity at release divided by velocity at first touch.
       real(wp) :: restitution = not_a_number
-      !> Impulse on the floor, N s: the change of momentum, confirmed by the sum of the forces.
+      !> Impulse on the floor, N s: the change of momentum.
       real(wp) :: impulse = not_a_number
    end type sample_outcome_type
 
-   !> Residual of the balances of impulse and energy above which the single solver checks them, because the sums of the batch
-   !> have up to about twenty times the error of those of the single solver.
-   real(wp), parameter :: max_batch_residual = 0.1_wp*max_residual
+   !> Minimum number of steps in the time in which the maximum deceleration would stop the ball. From there on the balances
+   !> of impulse and energy miss by less than 1e-7 and need no check; otherwise the single solver checks them.
+   real(wp), parameter :: min_stop_steps = 50.0_wp
 
 contains
 
@@ -170,7 +167,7 @@ contains
       type(impact_batch_type), pointer :: impacts
       real(wp), target :: buffer(c_sizeof(impacts)/c_sizeof(1.0_wp) + line_length)
       real(wp) :: sampled(block_size)
-      real(wp) :: step
+      real(wp) :: step, restitution, impulse, max_deceleration
       integer :: i
 
       call c_f_pointer(c_loc(buffer(get_aligned_start(buffer))), impacts)
@@ -185,21 +182,20 @@ contains
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, n_written)
       sampled = sum(force(block_size + 1:, :n_written), dim=2)/sampling%sample_rate
       do i = 1, size(samples)
-         outcomes(i)%computed = is_computed(impacts, i, samples(i), sampling)
-         if (.not. outcomes(i)%computed) cycle
-         associate (diameter => 2*samples(i)%ball%outer_radius)
-            outcomes(i)%contact_time = impacts%contact_steps(i)*step
-            outcomes(i)%peak_elastic_force = impacts%peak_elastic_force(i)
-            outcomes(i)%peak_force = impacts%peak_force(i)
-            outcomes(i)%max_deflection = impacts%max_deflection(i)*diameter
-            outcomes(i)%restitution = -impacts%states(impacts%now)%velocity(i)/impacts%impact_velocity(i)
-            outcomes(i)%impulse = samples(i)%ball%mass*(1 + outcomes(i)%restitution)*get_impact_velocity(samples(i)%drop)
+         associate (ball => samples(i)%ball, v0 => impacts%impact_velocity(i), max_deflection => impacts%max_deflection(i), &
+            outcome => outcomes(i))
+            restitution = -impacts%state%velocity(i)/v0
+            impulse = ball%mass*(1 + restitution)*get_impact_velocity(samples(i)%drop)
+            max_deceleration = impacts%peak_elastic_force(i)/impacts%shell%force_unit(i)/(1 - max_deflection)
+            outcome%computed = impacts%contact_steps(i) >= min_contact_samples*sampling%substeps &
+               .and. min_stop_steps*max_deceleration <= v0 .and. holds_impulse(sampled(i), impulse)
+            if (outcome%computed) outcome = sample_outcome_type(.true., impacts%contact_steps(i)*step, &
+               impacts%peak_elastic_force(i), impacts%peak_force(i), 2*ball%outer_radius*max_deflection, restitution, impulse)
          end associate
-         outcomes(i)%computed = holds_impulse(sampled(i), outcomes(i)%impulse)
       end do
    end subroutine solve_block
 
-   !> Sets equation and initial values of one ball; see `thud_shell_batch` for the units.
+   !> Sets equation and initial values of one ball; see `thud_shell_series` for the units.
    pure subroutine initialize_ball(impacts, i, sample, step)
       type(impact_batch_type), intent(inout) :: impacts
       !> Index of the ball.
@@ -220,31 +216,5 @@ contains
          shell%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
       end associate
    end subroutine initialize_ball
-
-   !> Whether a ball has a result, by the checks of `solve_lumped`.
-   function is_computed(impacts, i, sample, sampling) result(computed)
-      type(impact_batch_type), intent(in) :: impacts
-      integer, intent(in) :: i
-      type(sample_type), intent(in) :: sample
-      type(sampling_type), intent(in) :: sampling
-      logical :: computed
-      type(force_history_type) :: history
-      type(error_type), allocatable :: error
-      real(wp) :: impulse_residual, energy_residual
-
-      computed = impacts%released(i) .and. .not. impacts%out_of_domain(i)
-      if (computed) computed = impacts%contact_steps(i) >= min_contact_samples*sampling%substeps
-      if (.not. computed) return
-      associate (state => impacts%states(impacts%now), v0 => impacts%impact_velocity(i))
-         impulse_residual = abs(state%impulse(i) - (v0 - state%velocity(i)))/(v0 - state%velocity(i))
-         energy_residual = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
-      end associate
-      if (max(impulse_residual, energy_residual) <= max_batch_residual) return
-      ! The sums of the single solver, which include the stages of each step, decide. If it shortens the steps, the result is
-      ! its own.
-      call solve_hollow_sphere(hollow_sphere_type(momentum_flux=flux_choices(sample%flux)), sample%ball, sample%drop, &
-         sampling, history, error)
-      computed = .not. allocated(error) .and. .not. has_quantity(history, 'shortened_time_step')
-   end function is_computed
 
 end module thud_shell_samples

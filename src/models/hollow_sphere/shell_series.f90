@@ -1,4 +1,13 @@
-!> The Runge-Kutta step of `thud_shell_batch` with forces from Taylor series.
+!> The equation of motion of the shell model (see `thud_hollow_sphere`) for a batch of balls, one per lane of the processor's
+!> vectors, and its Runge-Kutta step with forces from Taylor series.
+!>
+!> With the deflection y in diameters 2R and the time in steps h, z = dy/dt, the equation
+!> m a = s (M/2R) v**2 - F_B - F_G becomes
+!>
+!>    dz/dt = s z**2/(1 - y) - y c,   c = K/(1 - y) + A x**(-gamma) - B,   x = (1 - y)**2 (1 + 2y)
+!>
+!> with K = k h**2/M, A = 2 pi R (p_a + p_g) h**2/M, B = 2 pi R p_a h**2/M; forces are in 2 R M/h**2.
+!> x is the ratio of volumes; written as a product it has no cancellation where the shell closes.
 !>
 !> Powers and quotients are slow, and a ball moves little in a step: c and 1/(1 - y) are expanded about a deflection, the
 !> expansion point of the ball, and only multiplications and additions are needed while the ball stays near this point.
@@ -16,20 +25,47 @@
 module thud_shell_series
    use thud_kinds, only: wp
    use thud_power, only: not_a_number, vector_power
-   use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
    implicit none (type, external)
    private
 
-   public :: expand_series, get_flows, series_batch_type, series_steps, take_step, will_last
+   public :: batch_size, expand_series, series_batch_type, series_steps, shell_batch_type
+   public :: state_batch_type, take_step
+
+   !> Balls of a batch: several vectors, so that the latency of one is filled by the others, and few enough that the forces
+   !> of all balls stay in cache.
+   integer, parameter :: batch_size = 32
+
+   !> The equations, one ball per lane.
+   type, bind(c) :: shell_batch_type
+      !> K, stiffness of the shell: [batch_size].
+      real(wp) :: stiffness(batch_size)
+      !> A, absolute pressure of the gas in the undeformed ball: [batch_size].
+      real(wp) :: gas_pressure(batch_size)
+      !> B, pressure of the air: [batch_size].
+      real(wp) :: air_pressure(batch_size)
+      !> -gamma: [batch_size].
+      real(wp) :: exponent(batch_size)
+      !> Deflection at which the shell closes, 1 - (wall thickness)/R: [batch_size].
+      real(wp) :: closing(batch_size)
+      !> Unit of the forces, N: [batch_size].
+      real(wp) :: force_unit(batch_size)
+      !> Factor s of the flux term in the present phase.
+      real(wp) :: weight
+   end type shell_batch_type
+
+   !> States; units are diameters and steps.
+   type, bind(c) :: state_batch_type
+      !> y: [batch_size].
+      real(wp) :: deflection(batch_size)
+      !> z: [batch_size].
+      real(wp) :: velocity(batch_size)
+   end type state_batch_type
 
    !> Highest power of the series.
    integer, parameter :: degree = 7
 
    !> Maximum distance at which a series is used, as a fraction of the distance to the nearest root of x.
    real(wp), parameter :: near = 1.0_wp/64
-
-   !> A series is kept as long as its ball will stay within this fraction of the reach until the next check.
-   real(wp), parameter :: inner = 0.6_wp
 
    !> Steps between two checks of the series; with the default step, a ball dropped from 2.7 m stays in reach for that long.
    integer, parameter :: series_steps = 16
@@ -48,17 +84,6 @@ module thud_shell_series
 
 contains
 
-   !> Whether a ball stays in the inner part of the reach of its series for the next `series_steps`.
-   elemental function will_last(expansion_point, reach, deflection, velocity) result(lasts)
-      real(wp), intent(in) :: expansion_point
-      !> Reach of the series; y; z.
-      real(wp), intent(in) :: reach, deflection, velocity
-      logical :: lasts
-
-      lasts = max(abs(deflection - expansion_point), abs(deflection + series_steps*velocity - expansion_point)) <= &
-         inner*reach
-   end function will_last
-
    !> Expands the series about the middle of the path of the next steps; the present deflection stays in reach.
    pure subroutine expand_series(shell, state, wanted, series)
       type(shell_batch_type), intent(in) :: shell
@@ -66,10 +91,10 @@ contains
       !> Whether to expand the ball again: [batch_size].
       logical, intent(in) :: wanted(batch_size)
       type(series_batch_type), intent(inout) :: series
-      real(wp), dimension(batch_size) :: expansion_point, inverse, power
-      real(wp) :: term(batch_size, 0:degree)
-      real(wp) :: x1, x2, x3, lead, p0, p1, p2, p3, p4, p5, p6, p7
-      integer :: i
+      real(wp), dimension(batch_size) :: expansion_point, inverse, power, spring, x1, x2, x3
+      real(wp) :: p(batch_size, -2:degree)
+      real(wp) :: lead
+      integer :: i, n
 
       !$omp simd private(lead)
       do i = 1, batch_size
@@ -80,34 +105,22 @@ contains
          end associate
       end do
       call vector_power(batch_size, get_ratio(expansion_point), shell%exponent, power)
-      !$omp simd private(x1, x2, x3, p0, p1, p2, p3, p4, p5, p6, p7)
-      do i = 1, batch_size
-         inverse(i) = 1/(1 - expansion_point(i))
-         associate (e => shell%exponent(i), r => inverse(i), k => shell%stiffness(i))
-            ! Taylor coefficients of x divided by x.
-            x3 = 2/get_ratio(expansion_point(i))
-            x1 = -3*expansion_point(i)*(1 - expansion_point(i))*x3
-            x2 = (3*expansion_point(i) - 1.5_wp)*x3
-            p0 = shell%gas_pressure(i)*power(i)
-            p1 = e*x1*p0
-            p2 = ((e - 1)*x1*p1 + 2*e*x2*p0)*(1/2.0_wp)
-            p3 = ((e - 2)*x1*p2 + (2*e - 1)*x2*p1 + 3*e*x3*p0)*(1/3.0_wp)
-            p4 = ((e - 3)*x1*p3 + (2*e - 2)*x2*p2 + (3*e - 1)*x3*p1)*(1/4.0_wp)
-            p5 = ((e - 4)*x1*p4 + (2*e - 3)*x2*p3 + (3*e - 2)*x3*p2)*(1/5.0_wp)
-            p6 = ((e - 5)*x1*p5 + (2*e - 4)*x2*p4 + (3*e - 3)*x3*p3)*(1/6.0_wp)
-            p7 = ((e - 6)*x1*p6 + (2*e - 5)*x2*p5 + (3*e - 4)*x3*p4)*(1/7.0_wp)
-            term(i, 0) = r*k + p0 - shell%air_pressure(i)
-            term(i, 1) = r**2*k + p1
-            term(i, 2) = r**3*k + p2
-            term(i, 3) = r**4*k + p3
-            term(i, 4) = r**5*k + p4
-            term(i, 5) = r**6*k + p5
-            term(i, 6) = r**7*k + p6
-            term(i, 7) = r**8*k + p7
+      inverse = 1/(1 - expansion_point)
+      ! Taylor coefficients of x divided by x.
+      x3 = 2/get_ratio(expansion_point)
+      x1 = -3*expansion_point*(1 - expansion_point)*x3
+      x2 = (3*expansion_point - 1.5_wp)*x3
+      p(:, :-1) = 0.0_wp
+      p(:, 0) = shell%gas_pressure*power
+      spring = inverse*shell%stiffness
+      series%term(:, 0) = merge(spring + p(:, 0) - shell%air_pressure, series%term(:, 0), wanted)
+      do n = 1, degree
+         spring = spring*inverse
+         associate (e => shell%exponent)
+            p(:, n) = ((e - (n - 1))*x1*p(:, n - 1) + (2*e - (n - 2))*x2*p(:, n - 2) + (3*e - (n - 3))*x3*p(:, n - 3)) &
+               *(1.0_wp/n)
          end associate
-      end do
-      do i = 0, degree
-         series%term(:, i) = merge(term(:, i), series%term(:, i), wanted)
+         series%term(:, n) = merge(spring + p(:, n), series%term(:, n), wanted)
       end do
       series%expansion_point = merge(expansion_point, series%expansion_point, wanted)
       series%inverse = merge(inverse, series%inverse, wanted)
@@ -156,137 +169,69 @@ contains
       acceleration = acceleration + acceleration*(square*square)
    end function get_flux_acceleration
 
-   !> Force on the floor, dissipated power, and their rates of change.
-   pure subroutine get_flows(shell, series, state, force, force_rate, power, power_rate)
-      type(shell_batch_type), intent(in) :: shell
-      !> The series; the states are in reach.
-      type(series_batch_type), intent(in) :: series
-      type(state_batch_type), intent(in) :: state
-      !> Force on the floor: [batch_size].
-      real(wp), intent(out) :: force(batch_size)
-      !> Rate of the force: [batch_size].
-      real(wp), intent(out) :: force_rate(batch_size)
-      !> Dissipated power: [batch_size].
-      real(wp), intent(out) :: power(batch_size)
-      !> Rate of the dissipated power: [batch_size].
-      real(wp), intent(out) :: power_rate(batch_size)
-      real(wp), dimension(batch_size) :: d, c, c_rate, a
-      integer :: n
+   !> Acceleration of a ball, with or without the flux.
+   elemental function get_acceleration(with_flux, s, y, z, d, inverse, c0, c1, c2, c3, c4, c5, c6, c7) result(acceleration)
+      logical, intent(in) :: with_flux
+      !> s, y, z, and the arguments of `get_flux_acceleration` and `get_deceleration`.
+      real(wp), intent(in) :: s, y, z, d, inverse, c0, c1, c2, c3, c4, c5, c6, c7
+      real(wp) :: acceleration
 
-      associate (y => state%deflection, z => state%velocity, s => shell%weight)
-         d = y - series%expansion_point
-         c = 0.0_wp
-         c_rate = 0.0_wp
-         do n = degree, 0, -1
-            c_rate = c_rate*d + c
-            c = c*d + series%term(:, n)
-         end do
-         a = s*get_flux_acceleration(z, d, series%inverse) - y*c
-         force = y*(1 - y)*c + (1 - s)*z**2
-         force_rate = z*((1 - 2*y)*c + y*(1 - y)*c_rate) + 2*(1 - s)*z*a
-         power = (0.5_wp - s)*z**3
-         power_rate = 3*(0.5_wp - s)*z**2*a
-      end associate
-   end subroutine get_flows
+      acceleration = -get_deceleration(y, d, c0, c1, c2, c3, c4, c5, c6, c7)
+      if (with_flux) acceleration = acceleration + s*get_flux_acceleration(z, d, inverse)
+   end function get_acceleration
 
-   !> Whole or shortened step of `rk4_step`, with the forces at its beginning; adds these to the sums of impulse and loss.
-   pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force, missed)
+   !> Whole or shortened step of `rk4_step`, with the forces at its beginning.
+   pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force)
       type(shell_batch_type), intent(in) :: shell
       type(series_batch_type), intent(in) :: series
       type(state_batch_type), intent(in) :: state
       !> Length of the step, in whole steps: [batch_size].
       real(wp), intent(in) :: length(batch_size)
-      !> State at the end; the velocity is NaN if a stage was out of reach.
+      !> State at the end; NaN if a stage was out of reach.
       type(state_batch_type), intent(inout) :: new
       !> Force of shell and gas, N: [batch_size].
       real(wp), intent(out) :: elastic_force(batch_size)
       !> Force on the floor, N: [batch_size].
       real(wp), intent(out) :: floor_force(batch_size)
-      !> Whether a ball was out of reach.
-      logical, intent(out) :: missed
-      real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, total, outside, outsides
+
+      real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, outside
+      logical :: with_flux
       integer :: i
 
-      outsides = 0.0_wp
-      if (abs(shell%weight) > 0.0_wp) then
-         !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, total, outside) &
-         !$omp& reduction(+: outsides)
-         do i = 1, batch_size
-            associate (y => state%deflection(i), z => state%velocity(i), s => shell%weight, h => length(i), &
-               point => series%expansion_point(i), inverse => series%inverse(i), c0 => series%term(i, 0), c1 => &
-               series%term(i, 1), &
-               c2 => series%term(i, 2), c3 => series%term(i, 3), c4 => series%term(i, 4), c5 => series%term(i, 5), &
-               c6 => series%term(i, 6), c7 => series%term(i, 7))
-               half = h/2
-               d1 = y - point
-               a1 = s*get_flux_acceleration(z, d1, inverse) - get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
-               y2 = y + half*z
-               z2 = z + half*a1
-               d2 = y2 - point
-               a2 = s*get_flux_acceleration(z2, d2, inverse) - get_deceleration(y2, d2, c0, c1, c2, c3, c4, c5, c6, c7)
-               y3 = y + half*z2
-               z3 = z + half*a2
-               d3 = y3 - point
-               a3 = s*get_flux_acceleration(z3, d3, inverse) - get_deceleration(y3, d3, c0, c1, c2, c3, c4, c5, c6, c7)
-               y4 = y + h*z3
-               z4 = z + h*a3
-               d4 = y4 - point
-               a4 = s*get_flux_acceleration(z4, d4, inverse) - get_deceleration(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
+      ! gfortran makes a second loop without the flux (`max-unswitch-insns`), which it would otherwise compute for s = 0 too.
+      with_flux = abs(shell%weight) > 0.0_wp
+      !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, outside)
+      do i = 1, batch_size
+         associate (y => state%deflection(i), z => state%velocity(i), s => shell%weight, h => length(i), &
+            point => series%expansion_point(i), r => series%inverse(i), &
+            c0 => series%term(i, 0), c1 => series%term(i, 1), c2 => series%term(i, 2), c3 => series%term(i, 3), &
+            c4 => series%term(i, 4), c5 => series%term(i, 5), c6 => series%term(i, 6), c7 => series%term(i, 7))
+            half = h/2
+            d1 = y - point
+            a1 = get_acceleration(with_flux, s, y, z, d1, r, c0, c1, c2, c3, c4, c5, c6, c7)
+            y2 = y + half*z
+            z2 = z + half*a1
+            d2 = y2 - point
+            a2 = get_acceleration(with_flux, s, y2, z2, d2, r, c0, c1, c2, c3, c4, c5, c6, c7)
+            y3 = y + half*z2
+            z3 = z + half*a2
+            d3 = y3 - point
+            a3 = get_acceleration(with_flux, s, y3, z3, d3, r, c0, c1, c2, c3, c4, c5, c6, c7)
+            y4 = y + h*z3
+            z4 = z + h*a3
+            d4 = y4 - point
+            a4 = get_acceleration(with_flux, s, y4, z4, d4, r, c0, c1, c2, c3, c4, c5, c6, c7)
 
-               ! Added, since a branch would not be vectorized.
-               outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
-               outsides = outsides + outside
-               sixth = h*(1/6.0_wp)
-               new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4)
-               new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
-               elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
-               total = elastic + (1 - s)*(z*z)
-               new%impulse(i) = state%impulse(i) + total
-               new%loss(i) = state%loss(i) + (0.5_wp - s)*(z*z*z)
-               elastic_force(i) = shell%force_unit(i)*elastic
-               floor_force(i) = shell%force_unit(i)*total
-            end associate
-         end do
-      else
-         ! The same without the flux, which gfortran would otherwise compute for s = 0 too.
-         !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, total, outside) &
-         !$omp& reduction(+: outsides)
-         do i = 1, batch_size
-            associate (y => state%deflection(i), z => state%velocity(i), h => length(i), &
-               point => series%expansion_point(i), c0 => series%term(i, 0), c1 => series%term(i, 1), &
-               c2 => series%term(i, 2), c3 => series%term(i, 3), c4 => series%term(i, 4), c5 => series%term(i, 5), &
-               c6 => series%term(i, 6), c7 => series%term(i, 7))
-               half = h/2
-               d1 = y - point
-               a1 = -get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
-               y2 = y + half*z
-               z2 = z + half*a1
-               d2 = y2 - point
-               a2 = -get_deceleration(y2, d2, c0, c1, c2, c3, c4, c5, c6, c7)
-               y3 = y + half*z2
-               z3 = z + half*a2
-               d3 = y3 - point
-               a3 = -get_deceleration(y3, d3, c0, c1, c2, c3, c4, c5, c6, c7)
-               y4 = y + h*z3
-               z4 = z + h*a3
-               d4 = y4 - point
-               a4 = -get_deceleration(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
-
-               outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
-               outsides = outsides + outside
-               sixth = h*(1/6.0_wp)
-               new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4)
-               new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
-               elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
-               total = elastic + z*z
-               new%impulse(i) = state%impulse(i) + total
-               new%loss(i) = state%loss(i) + 0.5_wp*(z*z*z)
-               elastic_force(i) = shell%force_unit(i)*elastic
-               floor_force(i) = shell%force_unit(i)*total
-            end associate
-         end do
-      end if
-      missed = .not. outsides <= 0.0_wp
+            ! Added, since a branch would not be vectorized.
+            outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
+            sixth = h*(1/6.0_wp)
+            new%deflection(i) = y + sixth*(z + 2*(z2 + z3) + z4) + outside
+            new%velocity(i) = z + sixth*(a1 + 2*(a2 + a3) + a4) + outside
+            elastic = (1 - y)*get_deceleration(y, d1, c0, c1, c2, c3, c4, c5, c6, c7)
+            elastic_force(i) = shell%force_unit(i)*elastic
+            floor_force(i) = shell%force_unit(i)*(elastic + (1 - s)*(z*z))
+         end associate
+      end do
    end subroutine take_step
 
 end module thud_shell_series
