@@ -8,6 +8,7 @@ module thud_case_answers
    use thud_compute, only: compress_case, compute, results_type, scope_type
    use thud_constants, only: get_compiler, version
    use thud_error, only: error_type, input_error
+   use thud_field, only: name_length
    use thud_finite_element, only: finite_element_type
    use thud_kinds, only: wp
    use thud_progress_line, only: begin_progress, end_progress
@@ -16,7 +17,7 @@ module thud_case_answers
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
    use thud_system, only: is_forked
-   use thud_text, only: newline, split
+   use thud_text, only: newline
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
@@ -139,10 +140,16 @@ contains
       type(column_type), allocatable :: columns(:)
       type(sweep_type), allocatable :: sweep
       character(len=:), allocatable :: keys
+      character(len=name_length), allocatable :: names(:)
+      character(len=128) :: message
       real(wp), allocatable :: values(:)
+      integer :: status
 
       call request%get_text('keys', keys)
-      call find_columns(case, split(keys, nint(request%get_number('key_count'))), columns, error)
+      allocate (names(nint(request%get_number('key_count'))))
+      names = ''
+      read (keys, *, iostat=status, iomsg=message) names
+      call find_columns(case, names, columns, error)
       if (allocated(error)) return
       call acquire_sweep(sweep)
       call new_sweep(case, request%get_number('levels') > 0.0_wp, sweep)

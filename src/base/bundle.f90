@@ -66,8 +66,7 @@ contains
       integer, intent(in) :: extents(:)
       real(wp), intent(in) :: values(*)
 
-      call add_line(self, name, get_form(extents))
-      call new_item(self)
+      call new_item(self, name, extents)
       self%items(self%n_item)%values = reshape(values(:product(extents)), [product(extents), 1, 1])
    end subroutine add_array
 
@@ -78,20 +77,9 @@ contains
       !> The array, unallocated afterwards: [:, :, :].
       real(wp), allocatable, intent(inout) :: values(:, :, :)
 
-      call add_line(self, name, get_form(shape(values)))
-      call new_item(self)
+      call new_item(self, name, shape(values))
       call move_alloc(values, self%items(self%n_item)%values)
    end subroutine move_array
-
-   !> Extents of an array as in the header.
-   pure function get_form(extents) result(form)
-      !> Extents of an array: [rank].
-      integer, intent(in) :: extents(:)
-      !> The extents, each followed by a comma, then blanks.
-      character(len=12*size(extents)) :: form
-
-      write (form, '(*(i0,","))') extents
-   end function get_form
 
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
@@ -103,12 +91,18 @@ contains
       self%header = self%header//trim(name)//tab//trim(form)//newline
    end subroutine add_line
 
-   !> Adds an empty item.
-   subroutine new_item(self)
+   !> Adds an item without values.
+   subroutine new_item(self, name, extents)
       type(bundle_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      !> Extents of its array: [rank].
+      integer, intent(in) :: extents(:)
       type(item_type), allocatable :: more(:)
+      character(len=12*size(extents)) :: form
       integer :: i
 
+      write (form, '(*(i0,","))') extents
+      call add_line(self, name, form)
       if (.not. allocated(self%items)) allocate (self%items(4))
       if (self%n_item == size(self%items)) then
          allocate (more(2*self%n_item))

@@ -2,7 +2,7 @@
 !> checked, written and documented by this description.
 module thud_field
    use thud_error, only: error_type, input_error
-   use thud_interval, only: get_range_text, interval_type, new_interval
+   use thud_interval, only: get_range_text, interval_type, key_length, new_interval
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
    use thud_text, only: is_number, join, join_quoted, lower_case, shortened, to_text
@@ -35,9 +35,6 @@ module thud_field
       !> The entries; the first `count` are used: [text_list_length].
       character(len=name_length) :: values(text_list_length) = ''
    end type text_list_type
-
-   !> Length of the name of a key or a group.
-   integer, parameter :: key_length = 24
 
    !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
@@ -163,7 +160,7 @@ contains
       integer :: j
 
       interval = new_interval(fields(i)%range)
-      if (interval%lower_expression == '' .and. interval%upper_expression == '') return
+      if (interval%lower_key == '' .and. interval%upper_key == '') return
       group = pack([(j, j=1, size(fields))], fields%group == fields(i)%group)
       call interval%resolve(fields(group)%key, [(fields(group(j))%get_number(), j=1, size(group))])
    end function get_interval
@@ -200,7 +197,7 @@ contains
          if (valid) call self%set_number(numbers%values(1), 0, error)
          valid = valid .and. .not. allocated(error)
       end select
-      if (.not. valid) error = self%get_error(text, new_interval(self%range))
+      if (.not. valid) error = self%get_error(text)
    end subroutine set_from_text
 
    !> Reads numbers between commas or blanks, some perhaps with repeats such as `3*0.1`. The namelist reader would skip other
@@ -235,14 +232,14 @@ contains
       end do
    end subroutine read_numbers
 
-   !> Reads texts in quotes, with commas or blanks between them.
+   !> Reads texts in quotes, with commas or blanks between them; a doubled quote stands for one.
    subroutine read_texts(text, list, valid)
       character(len=*), intent(in) :: text
       type(text_list_type), intent(out) :: list
       !> False if there are too many texts, one is too long, or something else stands between them.
       logical, intent(out) :: valid
       character(len=:), allocatable :: entry
-      integer :: first, last
+      integer :: first, last, length
 
       last = 0
       do
@@ -250,38 +247,22 @@ contains
          valid = first == last
          if (valid .or. list%count == text_list_length) return
          if (scan(text(first:first), '''"') == 0) return
-         call read_quoted(text, first, entry, last)
-         if (last == 0 .or. len_trim(entry) > name_length) return
+         entry = ''
+         last = first
+         do
+            length = index(text(last + 1:), text(first:first))
+            if (length == 0) return
+            entry = entry//text(last + 1:last + length)
+            last = last + length
+            if (index(text(last + 1:), text(first:first)) /= 1) exit
+            last = last + 1
+         end do
+         entry = entry(:len(entry) - 1)
+         if (len_trim(entry) > name_length) return
          list%count = list%count + 1
          list%values(list%count) = entry
       end do
    end subroutine read_texts
-
-   !> Reads a text in quotes; a doubled quote stands for one.
-   pure subroutine read_quoted(text, first, entry, last)
-      character(len=*), intent(in) :: text
-      !> Position of the opening quote.
-      integer, intent(in) :: first
-      !> The text between the quotes.
-      character(len=:), allocatable, intent(out) :: entry
-      !> Position of the closing quote; 0 if there is none.
-      integer, intent(out) :: last
-      logical :: is_doubled
-
-      entry = ''
-      last = first + 1
-      do while (last <= len(text))
-         if (text(last:last) == text(first:first)) then
-            is_doubled = last < len(text)
-            if (is_doubled) is_doubled = text(last + 1:last + 1) == text(first:first)
-            if (.not. is_doubled) return
-            last = last + 1
-         end if
-         entry = entry//text(last:last)
-         last = last + 1
-      end do
-      last = 0
-   end subroutine read_quoted
 
    !> Value as a number: the index of a choice, 0 or 1 for a flag.
    pure function get_number(self) result(number)
@@ -357,7 +338,7 @@ contains
          valid = valid .and. number >= 1 .and. number <= self%n_choice
          if (valid) value = self%choices(nint(number))
       end select
-      if (.not. valid) error = self%get_error(to_text(number), new_interval(self%range))
+      if (.not. valid) error = self%get_error(to_text(number))
    end subroutine set_number
 
    !> Whether a number is an integer.
@@ -373,7 +354,8 @@ contains
       class(field_type), intent(in) :: self
       !> The value as text.
       character(len=*), intent(in) :: value
-      type(interval_type), intent(in) :: interval
+      !> The range with resolved ends (default: unresolved).
+      type(interval_type), intent(in), optional :: interval
       !> A word that may be meant, from `get_suggestion`.
       character(len=*), intent(in), optional :: suggestion
       type(error_type) :: error
@@ -400,7 +382,7 @@ contains
       case ('whole')
          text = to_text(nint(self%get_number()))
       case ('flag')
-         text = to_text(self%get_number() > 0.0_wp)
+         text = trim(merge('.true. ', '.false.', self%get_number() > 0.0_wp))
       case default
          text = join(self%get_entries())
       end select

@@ -1,11 +1,11 @@
 !> Progress of long work: the library reports it, its caller may show it.
 module thud_progress
-   !$ use omp_lib, only: omp_get_thread_num, omp_in_parallel
+   !$ use omp_lib, only: omp_get_thread_num
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: latest_progress, let_first_thread_report, report_progress, set_progress_handler
+   public :: latest_progress, report_progress, set_progress_handler
 
    abstract interface
       !> Shows the progress.
@@ -23,9 +23,6 @@ module thud_progress
    !> Fraction done at the latest report of this process, 0 to 1; other threads may read it.
    real(wp), volatile, protected :: latest_progress = 0.0_wp
 
-   !> Whether the first of several threads reports.
-   logical, volatile :: first_thread_reports = .false.
-
    !> Procedure that shows the progress; null unless the executable or the driver sets it.
    procedure(handler), pointer :: show => null()
 
@@ -40,13 +37,6 @@ contains
       if (present(new_handler)) show => new_handler
    end subroutine set_progress_handler
 
-   !> Sets whether the first of several threads reports; otherwise none does.
-   subroutine let_first_thread_report(yes)
-      logical, intent(in) :: yes
-
-      first_thread_reports = yes
-   end subroutine let_first_thread_report
-
    !> Reports the progress.
    subroutine report_progress(done, whole, unit)
       !> Amount of work done.
@@ -54,11 +44,10 @@ contains
       !> Upper bound of the total amount; 0 if unknown.
       real(wp), intent(in) :: whole
       character(len=*), intent(in) :: unit
-
       procedure(handler), pointer :: current
 
-      ! Of drops that are computed in parallel at most one reports.
-      !$ if (omp_in_parallel() .and. .not. (first_thread_reports .and. omp_get_thread_num() == 0)) return
+      ! Of drops that are computed in parallel one reports.
+      !$ if (omp_get_thread_num() > 0) return
       latest_progress = 0.0_wp
       if (whole > 0.0_wp) latest_progress = min(1.0_wp, done/whole)
       ! Another thread may change `show` meanwhile.

@@ -30,15 +30,13 @@ contains
       if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
    end subroutine get_suggestion
 
-   !> Number of insertions, deletions, replacements and swaps of adjacent letters that turn one word into the other
-   !> (Damerau-Levenshtein distance, adjacent swaps only).
+   !> Number of insertions, deletions and replacements of letters that turn one word into the other (Levenshtein distance).
    pure function get_distance(first, second) result(distance)
       character(len=*), intent(in) :: first, second
       integer :: distance
       ! Element (j, i): distance between the first i letters of `first` and the first j letters of `second`.
       integer :: table(0:len(second), 0:len(first))
-      integer :: i, j, p, q
-      logical :: swapped
+      integer :: i, j
 
       table(:, 0) = [(j, j=0, len(second))]
       do i = 1, len(first)
@@ -46,10 +44,6 @@ contains
          do j = 1, len(second)
             table(j, i) = min(table(j, i - 1) + 1, table(j - 1, i) + 1, &
                table(j - 1, i - 1) + merge(0, 1, first(i:i) == second(j:j)))
-            p = max(i - 1, 1)
-            q = max(j - 1, 1)
-            swapped = min(i, j) > 1 .and. first(i:i) == second(q:q) .and. first(p:p) == second(j:j)
-            if (swapped) table(j, i) = min(table(j, i), table(q - 1, p - 1) + 1)
          end do
       end do
       distance = table(len(second), len(first))

@@ -9,7 +9,7 @@ module thud_text
    private
 
    public :: byte_order_mark, fixed, flush_right, is_number, is_utf8, join, join_quoted, lower_case, newline, padded
-   public :: quoted, replaced, shortened, significant, split, tab, to_text, wrap_lines
+   public :: quoted, replaced, shortened, significant, tab, to_text, wrap_lines
 
    !> Width of the screen, characters.
    integer, parameter, public :: screen_width = 80
@@ -35,7 +35,6 @@ module thud_text
    !> Shortest text from which the same value is read.
    interface to_text
       module procedure :: integer_to_text
-      module procedure :: logical_to_text
       module procedure :: real_to_text
    end interface to_text
 
@@ -54,15 +53,6 @@ contains
 
       text = format_integer(value)
    end function integer_to_text
-
-   !> Logical value in namelist syntax.
-   pure function logical_to_text(value) result(text)
-      logical, intent(in) :: value
-      !> `.true.` or `.false.`.
-      character(len=merge(6, 7, value)) :: text
-
-      text = merge('.true. ', '.false.', value)
-   end function logical_to_text
 
    !> Shortest decimal text from which exactly the same number is read.
    pure function real_to_text(value) result(text)
@@ -143,54 +133,32 @@ contains
       character(len=number_length) :: buffer
       character(len=12) :: form
       real(wp) :: read_back
-      integer :: digits
+      integer :: digits, exponent
 
       if (ieee_is_nan(value)) then
          buffer = 'NaN'
+         return
       else if (.not. ieee_is_finite(value)) then
          buffer = merge('-Infinity', 'Infinity ', value < 0.0_wp)
-      else
-         do digits = 0, 16
-            write (form, '(a,i0,a)') '(es40.', digits, 'e3)'
-            write (buffer, form) value
-            read (buffer, form) read_back
-            ! Compilers warn of == between reals.
-            if (.not. abs(read_back - value) > 0.0_wp) exit
-         end do
-         buffer = tidy_exponent(adjustl(buffer))
+         return
       end if
+      ! Digits behind the first.
+      do digits = 0, 16
+         write (form, '(a,i0,a)') '(es40.', digits, 'e3)'
+         write (buffer, form) value
+         read (buffer, form) read_back
+         ! Compilers warn of == between reals.
+         if (.not. abs(read_back - value) > 0.0_wp) exit
+      end do
+      read (buffer(number_length - 3:), *) exponent
+      if (exponent >= -4 .and. exponent < 7) then
+         write (form, '(a,i0,a)') '(f40.', max(digits - exponent, 1), ')'
+         write (buffer, form) value
+      else
+         buffer = adjustl(buffer(:number_length - 5)//trim(merge('0e', 'e ', digits == 0))//format_integer(exponent))
+      end if
+      buffer = adjustl(buffer)
    end function format_real
-
-   !> Rewrites `1.25E+001` as `12.5`, and `1.E-010` as `1.0e-10`.
-   pure function tidy_exponent(scientific) result(text)
-      !> Number in `es` format with three exponent digits.
-      character(len=*), intent(in) :: scientific
-      !> The same number, readable.
-      character(len=number_length) :: text
-      character(len=:), allocatable :: digits, sign
-      integer :: exponent, mark
-
-      mark = scan(scientific, 'E')
-      read (scientific(mark + 1:), *) exponent
-      sign = ''
-      digits = scientific(:mark - 1)
-      if (digits(1:1) == '-') then
-         sign = '-'
-         digits = digits(2:)
-      end if
-      digits = digits(1:1)//digits(3:)
-      if (verify(digits, '0') == 0) exponent = 0
-
-      if (exponent >= 0 .and. exponent < 7) then
-         if (len(digits) < exponent + 2) digits = digits//repeat('0', exponent + 2 - len(digits))
-         text = sign//digits(:exponent + 1)//'.'//digits(exponent + 2:)
-      else if (exponent < 0 .and. exponent >= -4) then
-         text = sign//'0.'//repeat('0', -exponent - 1)//digits
-      else
-         if (len(digits) == 1) digits = digits//'0'
-         text = sign//digits(1:1)//'.'//digits(2:)//'e'//trim(format_integer(exponent))
-      end if
-   end function tidy_exponent
 
    !> ASCII letters in lower case; everything else unchanged.
    pure function lower_case(text) result(lower)
@@ -283,16 +251,14 @@ contains
       character(len=quoted_length(text)) :: constant
       integer :: i, at
 
-      constant = "'"
-      at = 2
+      constant = "''"
+      at = 1
       do i = 1, len_trim(text)
-         constant(at:at) = text(i:i)
-         at = at + 1
-         if (text(i:i) /= "'") cycle
-         constant(at:at) = "'"
-         at = at + 1
+         associate (n => merge(2, 1, text(i:i) == "'"))
+            constant(at + 1:) = repeat(text(i:i), n)//"'"
+            at = at + n
+         end associate
       end do
-      constant(at:) = "'"
    end function quoted
 
    !> Length of a text as a namelist character constant.
@@ -345,22 +311,6 @@ contains
       text = join_words(format_real(values))
    end function join_numbers
 
-   !> Words of a comma-separated list: [n_word].
-   pure function split(list, n_word) result(words)
-      character(len=*), intent(in) :: list
-      integer, intent(in) :: n_word
-      character(len=32) :: words(n_word)
-      integer :: i, at, length
-
-      words = ''
-      at = 1
-      do i = 1, n_word
-         length = index(list(at:)//',', ',') - 1
-         words(i) = list(at:at + length - 1)
-         at = at + length + 1
-      end do
-   end function split
-
    !> A text padded with blanks on the right.
    pure function padded(text, width) result(cell)
       character(len=*), intent(in) :: text
@@ -387,43 +337,35 @@ contains
       !> Lines of UTF-8.
       character(len=*), intent(in) :: text
       character(len=:), allocatable, intent(out) :: wrapped
-      integer :: first, last, indentation
+      ! First characters of the line of `text`, and of what is not yet in `wrapped`; last blank; characters since `begin`.
+      integer :: line, begin, blank, width
+      integer :: i, indentation
 
-      allocate (character(len=0) :: wrapped)
-      first = 1
-      do while (first <= len(text))
-         last = index(text(first:), newline) + first - 1
-         if (last < first) last = len(text)
-         ! Further lines of a comment in a namelist are comments, too.
-         indentation = max(verify(text(first:last), ' !') - 1, 0)
-         call wrap_line(text(first:last), text(first:first + indentation - 1)//'  ', wrapped)
-         first = last + 1
-      end do
-   end subroutine wrap_lines
-
-   !> Adds a line, broken at blanks.
-   pure subroutine wrap_line(line, indentation, wrapped)
-      !> The line, with its line feed if it has one.
-      character(len=*), intent(in) :: line
-      !> Beginning of further lines.
-      character(len=*), intent(in) :: indentation
-      character(len=:), allocatable, intent(inout) :: wrapped
-      integer :: i, begin, width, blank
-
+      wrapped = ''
+      line = 1
       begin = 1
       blank = 0
       width = 0
-      do i = 1, len(line)
-         if (line(i:i) == newline) exit
-         width = width + get_width(line(i:i))
-         if (line(i:i) == ' ' .and. verify(line(:i), ' ') > 0) blank = i
+      do i = 1, len(text)
+         width = width + get_width(text(i:i))
+         if (text(i:i) == newline) then
+            wrapped = wrapped//text(begin:i)
+            line = i + 1
+            begin = line
+            blank = 0
+            width = 0
+         else if (text(i:i) == ' ' .and. verify(text(line:i), ' ') > 0) then
+            blank = i
+         end if
          if (width <= screen_width .or. blank <= begin) cycle
-         wrapped = wrapped//trim(line(begin:blank))//newline//indentation
+         ! Further lines of a comment in a namelist are comments, too.
+         indentation = verify(text(line:), ' !') - 1
+         wrapped = wrapped//trim(text(begin:blank))//newline//text(line:line + indentation - 1)//'  '
          begin = blank + 1
-         width = len(indentation) + get_width(line(begin:i))
+         width = indentation + 2 + get_width(text(begin:i))
       end do
-      wrapped = wrapped//line(begin:)
-   end subroutine wrap_line
+      wrapped = wrapped//text(begin:)
+   end subroutine wrap_lines
 
    !> Number of characters of a text.
    pure function get_width(text) result(width)

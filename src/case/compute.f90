@@ -14,7 +14,6 @@ module thud_compute
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
    use thud_memory, only: require_memory
-   use thud_progress, only: let_first_thread_report
    use thud_receiver, only: is_rigid
    use thud_refined_drop, only: solve_drop
    use thud_room, only: room_level_type
@@ -146,7 +145,6 @@ contains
          if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, state, on_floor, error)
          return
       end if
-      call let_first_thread_report(.true.)
       !$omp parallel do num_threads(n_thread) schedule(static, 1)
       do i = 1, 2
          if (i == 1) call compute_impact(case, scope, impact, error)
@@ -154,7 +152,6 @@ contains
          if (i == 2 .and. .not. allocated(floor_error)) call drop_on_floor(case, state, on_floor, floor_error)
       end do
       !$omp end parallel do
-      call let_first_thread_report(.false.)
       if (.not. allocated(error)) call move_alloc(floor_error, error)
    end subroutine compute_drops
 

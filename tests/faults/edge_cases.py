@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import fields, replace
 from functools import cache
 from typing import TYPE_CHECKING
@@ -108,15 +107,8 @@ def _draw(key: Key, values: dict[str, object], chance: random.Random) -> object:
 
 
 def _end(end: float | str, values: dict[str, object]) -> float:
-    """Return the end of a range; a text is a product or quotient of numbers and keys."""
-    if isinstance(end, float):
-        return end
-    known = {word: str(value) for word, value in values.items()}
-    first, *rest = re.split(r"([*/])", end)
-    value = float(known.get(first, first))
-    for sign, word in zip(rest[::2], rest[1::2], strict=True):
-        value *= float(known.get(word, word)) ** (1 if sign == "*" else -1)
-    return value
+    """Return the end of a range; a text is the key whose value it is."""
+    return float(str(values[end])) if isinstance(end, str) else end
 
 
 def log_uniform(chance: random.Random, low: float, high: float) -> float:

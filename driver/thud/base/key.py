@@ -36,8 +36,7 @@ class Key:
     choices : tuple of str
         Allowed values of a choice.
     lower, upper : float or str
-        Limits of the allowed range; a limit that depends on other keys of the group is a product or
-        quotient of numbers and names of keys.
+        Limits of the allowed range; a text is the key of the group whose value is the limit.
     whole : bool
         Whether only whole numbers are allowed.
     needs : tuple of str

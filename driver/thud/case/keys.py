@@ -148,14 +148,5 @@ def limits(key: Key, case: Case) -> tuple[float, float]:
 
 
 def _limit(limit: float | str, group: object) -> float:
-    """Return a limit; a text is a product or quotient of numbers and names of keys."""
-    if not isinstance(limit, str):
-        return limit
-    value, operator = 1.0, "*"
-    for term in re.split(r"([*/])", limit):
-        if term in "*/":
-            operator = term
-            continue
-        factor = float(getattr(group, term) if hasattr(group, term) else term)
-        value = value * factor if operator == "*" else value / factor
-    return value
+    """Return a limit; a text is the key of the group whose value it is."""
+    return float(getattr(group, limit)) if isinstance(limit, str) else limit

@@ -150,8 +150,8 @@ contains
          //text_value(field%meaning)//', "needs": '//list_of(pack(field%needs, field%needs /= ''))
       if (field%range /= '') then
          interval = new_interval(field%range)
-         text = text//', "lower": '//end_value(interval%lower, interval%lower_expression)//', "upper": ' &
-            //end_value(interval%upper, interval%upper_expression)//', "lower_open": ' &
+         text = text//', "lower": '//end_value(interval%lower, interval%lower_key)//', "upper": ' &
+            //end_value(interval%upper, interval%upper_key)//', "lower_open": ' &
             //trim(merge('true ', 'false', interval%lower_open))//', "upper_open": ' &
             //trim(merge('true ', 'false', interval%upper_open))//', "whole": ' &
             //trim(merge('true ', 'false', field%whole_entries .or. field%kind == 'whole'))
@@ -182,15 +182,15 @@ contains
       end select
    end function json_value
 
-   !> One end of a range: a number, or an expression in quotes.
-   function end_value(number, expression) result(value)
+   !> One end of a range: a number, or a key in quotes.
+   function end_value(number, key) result(value)
       real(wp), intent(in) :: number
-      !> The expression; blank for a number.
-      character(len=*), intent(in) :: expression
+      !> The key; blank for a number.
+      character(len=*), intent(in) :: key
       character(len=:), allocatable :: value
 
       value = to_text(number)
-      if (expression /= '') value = text_value(expression)
+      if (key /= '') value = text_value(key)
    end function end_value
 
    !> Text as a JSON string.

@@ -117,7 +117,7 @@ contains
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
-         //line('conforms', to_text(is_conforming(case, assessment)), '')
+         //line('conforms', trim(merge('.true. ', '.false.', is_conforming(case, assessment))), '')
       associate (criteria => assessment%criteria(:, get_assessed_force(case)))
          text = text//line('result', quoted(get_verdict(criteria)), '') &
             //line('criterion', join_quoted(criteria%name), '') &
