@@ -4,12 +4,12 @@ module thud_floor_answers
    use thud_ascending, only: get_ascending_order
    use thud_band, only: band_type, find_bands
    use thud_bundle, only: bundle_type
-   use thud_case, only: case_type, get_floor_number
+   use thud_case, only: case_type
    use thud_compute, only: drop_on_floor, prepare_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_floor_model, only: floor_state_type
-   use thud_floor_modes, only: floor_modes_type
+   use thud_floor_model, only: check_radiator, floor_state_type, get_plate_conductance, get_transfer, has_own_modes
+   use thud_floor_modes, only: floor_modes_type, get_selected_modes
    use thud_floor_result, only: get_point_velocity
    use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
@@ -19,7 +19,7 @@ module thud_floor_answers
    use thud_modal_radiation, only: get_modal_radiation, modal_radiation_type
    use thud_modal_room, only: box_type, get_crossover, get_modal_room, modal_room_type
    use thud_modes, only: get_mode_values
-   use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
+   use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss
    use thud_receiver, only: get_mobility, receiver_type
    use thud_request, only: request_type
    use thud_result_bundle, only: add_history, add_room_level
@@ -49,8 +49,7 @@ contains
       if (allocated(error)) return
       receiver = state%receiver
       associate (point => request%get_array('point'))
-         if (size(point) == 2) call case%floors(get_floor_number(case))%model%get_transfer(state, point(1), point(2), &
-            receiver, error)
+         if (size(point) == 2) call get_transfer(state, point(1), point(2), receiver, error)
       end associate
       if (allocated(error)) return
       mobility = get_mobility(receiver, request%get_array('frequency'))
@@ -98,8 +97,8 @@ contains
       call prepare_floor(case, state, error)
       associate (force => request%get_array('force'), point => request%get_array('point'))
          allocate (velocity(size(force)))
-         if (.not. allocated(error)) call get_point_velocity(case%floors(get_floor_number(case))%model, state, force, &
-            request%get_number('sample_rate'), point(1), point(2), velocity, error)
+         if (.not. allocated(error)) call get_point_velocity(state, force, request%get_number('sample_rate'), point(1), &
+            point(2), velocity, error)
       end associate
       if (.not. allocated(error)) call bundle%add_array('velocity', shape(velocity), velocity)
    end subroutine answer_point_velocity
@@ -149,18 +148,17 @@ contains
       !> Set if the floor has no modes.
       type(error_type), allocatable, intent(out) :: error
       type(modal_room_type) :: room
-      type(floor_modes_type) :: modes
-      type(plate_type) :: plate
+      type(floor_state_type) :: state
       type(box_type) :: box
 
-      call get_modes_and_box(case, modes, plate, box, error)
+      call prepare_with_room(case, state, box, error)
       if (allocated(error)) return
       associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
          call place(use_standard_positions(case%room, get_rating_index(case%room)), box)
          if (size(stated_ball) > 0) box%ball = reshape(stated_ball, [2, size(stated_ball)/2])
          if (size(stated_microphone) > 0) box%microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
       end associate
-      call get_modal_room(modes, box, request%get_array('force'), request%get_number('sample_rate'), &
+      call get_modal_room(state%modes, box, request%get_array('force'), request%get_number('sample_rate'), &
          request%get_number('pressure') > 0.0_wp, .true., room, request%get_number('highest', get_crossover(box)))
       if (.not. all(ieee_is_finite(room%mean))) then
          error = input_error('balls: all positions lie on rigid supports, which do not move; allowed: at least one ' &
@@ -192,18 +190,17 @@ contains
       !> Set if the floor has no modes.
       type(error_type), allocatable, intent(out) :: error
       type(modal_radiation_type) :: radiation
-      type(floor_modes_type) :: modes
-      type(plate_type) :: plate
+      type(floor_state_type) :: state
       type(box_type) :: box
 
-      call get_modes_and_box(case, modes, plate, box, error)
+      call prepare_with_room(case, state, box, error)
       if (allocated(error)) return
-      associate (x => request%get_array('x'), y => request%get_array('y'), area => get_area(case%room, plate))
+      associate (x => request%get_array('x'), y => request%get_array('y'), area => get_area(case%room, state%plate))
          if (size(x) > 0) then
-            call get_modal_radiation(modes, plate, box%air, box%bands, area, radiation, &
+            call get_modal_radiation(state%modes, state%plate, box%air, box%bands, area, radiation, &
                reshape([x, y], [2, size(x)], order=[2, 1]))
          else
-            call get_modal_radiation(modes, plate, box%air, box%bands, area, radiation)
+            call get_modal_radiation(state%modes, state%plate, box%air, box%bands, area, radiation)
          end if
       end associate
       call bundle%add_array('frequency', shape(box%bands), box%bands%nominal)
@@ -221,77 +218,56 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
       type(floor_modes_type) :: modes
-      type(plate_type) :: plate
       real(wp), allocatable :: shapes(:, :)
       integer, allocatable :: order(:)
-      integer :: i
 
-      associate (floor => case%floors(get_floor_number(case))%model)
-         ! Without shapes, all modes; for shapes, no more than needed, because a large floor has many.
-         if (size(request%get_array('x')) == 0 .or. floor%get_support() == '') then
-            call prepare_floor(case, state, error)
-            if (.not. allocated(error)) call get_own_modes(state, plate, modes, error)
-         else
-            call floor%get_room_modes(state, floor%get_support(), plate, modes, error, 2*request%get_number('highest'))
-         end if
-      end associate
+      call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call check_modes(state, error)
       if (allocated(error)) return
-      order = pack([(i, i=1, size(modes%omega))], modes%omega < min(2*pi*request%get_number('highest'), modes%limit))
-      order = order(get_ascending_order(modes%omega(order)))
-      call bundle%add_array('frequency', [size(order)], modes%omega(order)/(2*pi))
-      call bundle%add_array('loss_factor', [size(order)], modes%loss_factor(order))
-      call bundle%add_number('limit', modes%limit/(2*pi))
-      call bundle%add_number('length', modes%stack%length)
-      call bundle%add_number('width', modes%stack%width)
-      associate (x => request%get_array('x'), y => request%get_array('y'))
+      ! No more than needed, because a large floor has many.
+      modes = get_selected_modes(state%modes, state%modes%omega < min(2*pi*request%get_number('highest'), &
+         state%modes%limit))
+      associate (x => request%get_array('x'))
+         order = get_ascending_order(modes%omega)
+         call bundle%add_array('frequency', [size(order)], modes%omega(order)/(2*pi))
+         call bundle%add_array('loss_factor', [size(order)], modes%loss_factor(order))
+         call bundle%add_number('limit', modes%limit/(2*pi))
+         call bundle%add_number('length', modes%stack%length)
+         call bundle%add_number('width', modes%stack%width)
          if (size(x) == 0) return
-         shapes = get_mode_values(modes%modes, modes%stack%radiator, x, y)
+         shapes = get_mode_values(modes%modes, modes%stack%radiator, x, request%get_array('y'))
          shapes = shapes(order, :)
          call bundle%add_array('shape', shape(shapes), shapes)
       end associate
    end subroutine answer_floor_modes
 
-   !> Modes of a case's floor, the plate that radiates, and the room below as a box.
-   subroutine get_modes_and_box(case, modes, plate, box, error)
+   !> A case's floor, prepared, and the room below as a box.
+   subroutine prepare_with_room(case, state, box, error)
       type(case_type), intent(in) :: case
-      type(floor_modes_type), intent(out) :: modes
-      type(plate_type), intent(out) :: plate
+      type(floor_state_type), intent(out) :: state
       type(box_type), intent(out) :: box
       !> Set if the floor has no modes or cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
-      type(floor_state_type) :: state
       type(band_type), allocatable :: bands(:)
-      real(wp), allocatable :: conductance(:)
 
       call get_room_bands(bands, error)
-      if (allocated(error)) return
-      allocate (conductance(size(bands)))
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call prepare_floor(case, state, error)
-         if (.not. allocated(error)) call floor%get_radiator(state, bands%center, plate, conductance, error)
-         if (.not. allocated(error)) call check_below(plate, case%room, error)
-         if (allocated(error)) return
-         box = get_box(case%room, plate, bands)
-         call get_own_modes(state, plate, modes, error)
-      end associate
-   end subroutine get_modes_and_box
+      if (.not. allocated(error)) call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call check_radiator(state, error)
+      if (.not. allocated(error)) call check_below(state%plate, case%room, error)
+      if (.not. allocated(error)) call check_modes(state, error)
+      if (.not. allocated(error)) box = get_box(case%room, state%plate, bands)
+   end subroutine prepare_with_room
 
-   !> Modes of a floor as it is supported, and the plate that radiates.
-   subroutine get_own_modes(state, plate, modes, error)
+   !> Checks that a floor has modes.
+   subroutine check_modes(state, error)
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
-      type(plate_type), intent(out) :: plate
-      type(floor_modes_type), intent(out) :: modes
-      !> Set if the floor has no modes.
+      !> Set if it has none.
       type(error_type), allocatable, intent(out) :: error
 
-      if (allocated(state%modes%omega)) then
-         plate = state%plate
-         modes = state%modes
-      else
-         error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
-      end if
-   end subroutine get_own_modes
+      if (.not. has_own_modes(state)) error = input_error('&floor: name: this floor has no modes; allowed: a rectangular ' &
+         //'floor')
+   end subroutine check_modes
 
    !> The plate of a floor that radiates into the room below, at the frequencies `frequency`, Hz.
    subroutine answer_radiator(case, request, bundle, error)
@@ -301,20 +277,16 @@ contains
       !> Set if the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
-      type(plate_type) :: plate
-      real(wp), allocatable :: conductance(:)
 
-      associate (air => case%room%air, frequency => request%get_array('frequency'))
-         allocate (conductance(size(frequency)))
-         call prepare_floor(case, state, error)
-         if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_radiator(state, frequency, plate, &
-            conductance, error)
-         if (allocated(error)) return
+      call prepare_floor(case, state, error)
+      if (.not. allocated(error)) call check_radiator(state, error)
+      if (allocated(error)) return
+      associate (air => case%room%air, frequency => request%get_array('frequency'), plate => state%plate)
          call bundle%add_number('surface_mass', get_surface_mass(plate))
          call bundle%add_number('critical_frequency', get_critical_frequency(plate, air))
          call bundle%add_number('length', plate%length)
          call bundle%add_number('width', plate%width)
-         call bundle%add_array('conductance', shape(frequency), conductance)
+         call bundle%add_array('conductance', shape(frequency), get_plate_conductance(state, frequency))
          call bundle%add_array('loss_factor', shape(frequency), get_total_loss(plate, air, frequency))
          call bundle%add_array('radiation_factor', shape(frequency), get_plate_radiation(plate, air, frequency))
       end associate

@@ -11,7 +11,8 @@ module thud_case
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, in_group, text_field
    use thud_plate, only: plate_type
-   use thud_registry, only: floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
+   use thud_rectangular_floor, only: rectangular_floor_type
+   use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
    use thud_room, only: check_below_subceiling, check_room, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
@@ -293,20 +294,16 @@ contains
    subroutine check_floor(case, error)
       type(case_type), intent(in) :: case
       type(error_type), allocatable, intent(out) :: error
-      integer :: i
 
       associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%check(error)
-         if (.not. allocated(error)) call floor%check_points(case%floor, error)
+         call floor%check(case%has_room, error)
          if (allocated(error) .or. .not. case%has_room) return
-         if (.not. floor%has_radiator()) then
-            error = input_error('&floor: name = '//quoted(trim(case%floor))//' has no plate that radiates into a room; ' &
-               //'allowed: no &room, or '//join_quoted(pack(floor_names, [(case%floors(i)%model%has_radiator(), &
-               i=1, size(floor_names))])))
-            return
-         end if
-         call floor%check_radiator(error)
-         if (.not. allocated(error) .and. floor%has_subceiling()) call check_below_subceiling(case%room, error)
+         if (get_floor_number(case) < first_radiating) error = input_error('&floor: name = '//quoted(trim(case%floor)) &
+            //' has no plate that radiates into a room; allowed: no &room, or '//join_quoted(floor_names(first_radiating:)))
+         select type (floor)
+         class is (rectangular_floor_type)
+            if (floor%subceiling%thickness > 0.0_wp) call check_below_subceiling(case%room, error)
+         end select
       end associate
    end subroutine check_floor
 

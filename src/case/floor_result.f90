@@ -3,7 +3,7 @@ module thud_floor_result
    use thud_band, only: band_type, get_level_bands
    use thud_case, only: case_type, get_floor_number
    use thud_error, only: error_type
-   use thud_floor_model, only: floor_model_type, floor_state_type
+   use thud_floor_model, only: floor_state_type, get_transfer
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
@@ -62,7 +62,7 @@ contains
          floor_result%conductance = get_mean_conductances(receiver, floor_result%bands)
          allocate (floor_result%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count
-            call get_point_velocity(floor, state, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
+            call get_point_velocity(state, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
                floor%point_y%values(i), floor_result%point_velocity(:, i), error)
             if (allocated(error)) return
          end do
@@ -70,8 +70,7 @@ contains
    end subroutine get_floor_result
 
    !> Velocity of a point of a floor.
-   subroutine get_point_velocity(floor, state, force, sample_rate, x, y, velocity, error)
-      class(floor_model_type), intent(in) :: floor
+   subroutine get_point_velocity(state, force, sample_rate, x, y, velocity, error)
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       !> The contact force, N: [n_sample].
@@ -90,7 +89,7 @@ contains
       integer :: i
 
       velocity = 0.0_wp
-      call floor%get_transfer(state, x, y, transfer, error)
+      call get_transfer(state, x, y, transfer, error)
       if (allocated(error)) return
       motion = new_receiver_motion(transfer)
       step = new_receiver_step(transfer, 1/sample_rate)

@@ -4,22 +4,20 @@ module thud_registry
    use thud_floor_model, only: floor_model_type
    use thud_hollow_sphere, only: hollow_sphere_type
    use thud_hunt_crossley, only: hunt_crossley_type
-   use thud_infinite_plate_floor, only: infinite_plate_floor_type
    use thud_joist_floor, only: joist_floor_type
    use thud_laminate_floor, only: laminate_floor_type
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
    use thud_measured_modes, only: measured_modes_type
    use thud_modal_ball, only: modal_ball_type
    use thud_modal_floor, only: modal_floor_type
-   use thud_oscillator_floor, only: oscillator_floor_type
    use thud_plate_floor, only: plate_floor_type
-   use thud_rigid_floor, only: rigid_floor_type
+   use thud_point_floors, only: infinite_plate_floor_type, oscillator_floor_type, rigid_floor_type
    use thud_source_model, only: source_model_type
    use thud_two_mass, only: two_mass_type
    implicit none (type, external)
    private
 
-   public :: floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
+   public :: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
 
    !> Names of the models and of the namelist groups with their options; the first is the default.
    character(len=24), parameter :: model_names(*) = [character(len=24) :: 'modal_ball', 'finite_element', &
@@ -28,6 +26,9 @@ module thud_registry
    !> Names of the floors and of their namelist groups; the first, the default, is rigid.
    character(len=24), parameter :: floor_names(*) = [character(len=24) :: 'rigid', 'infinite_plate', 'oscillator', &
       'plate', 'laminate_floor', 'joist_floor', 'measured_mobility', 'modal_floor']
+
+   !> Index of the first floor with a plate that radiates into a room; those before it have none.
+   integer, parameter :: first_radiating = 4
 
    !> Element of a list of models of different types.
    type :: model_slot_type

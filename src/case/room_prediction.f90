@@ -4,16 +4,17 @@
 !> edges: the mean over many dwellings whose edges lie between the two deviates from it by less than 0.5 dB.
 module thud_room_prediction
    use thud_band, only: band_type
-   use thud_case, only: case_type, get_floor_number
+   use thud_case, only: case_type
    use thud_constants, only: pi
    use thud_error, only: error_type
-   use thud_floor_model, only: floor_state_type, uncoupled_support, unknown_support
-   use thud_floor_modes, only: floor_modes_type
+   use thud_floor_model, only: check_radiator, floor_state_type, get_plate_conductance
+   use thud_floor_modes, only: floor_modes_type, get_floor_modes
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_modal_radiation, only: get_modal_radiation, get_strike_points, modal_radiation_type
    use thud_modal_room, only: box_type, get_crossover, get_highest_frequency, get_modal_room, modal_room_type, place_standard
    use thud_plate, only: get_plate_radiation, plate_type
+   use thud_plate_stack, only: get_simplified, with_clamped_edges
    use thud_room, only: add_ratings, check_below, get_completed_room, get_rating_index, get_reverberation_times, &
       get_room_bands, get_room_level, modal_radiation, positions_of_rating, room_level_type, room_type, &
       use_standard_positions
@@ -27,16 +28,15 @@ module thud_room_prediction
    integer, parameter :: n_even = 16
    real(wp), parameter :: even_distance = 0.5_wp
 
-   !> The force on a floor and the plate that radiates, whatever the support of the edges.
+   !> The force on a floor, whatever the support of the edges.
    type :: excitation_type
       !> Force, N: [n_sample], and samples per second, Hz.
       real(wp), allocatable :: force(:)
       real(wp) :: sample_rate = 0.0_wp
       !> Bands from `get_room_bands`: [n_band].
       type(band_type), allocatable :: bands(:)
-      !> Force exposure levels, dB, and conductance of the plate, m/(N s): [n_band].
-      real(wp), allocatable :: level(:), conductance(:)
-      type(plate_type) :: plate
+      !> Force exposure levels, dB: [n_band].
+      real(wp), allocatable :: level(:)
    end type excitation_type
 
 contains
@@ -54,31 +54,28 @@ contains
       type(room_level_type), intent(out) :: prediction
       !> Set if a level cannot be computed, or the floor cannot radiate into the room.
       type(error_type), allocatable, intent(out) :: error
-      type(floor_modes_type) :: modes, clamped_modes
+      type(floor_modes_type) :: clamped_modes
       type(modal_radiation_type) :: radiation, clamped_radiation
-      type(plate_type) :: plate
       type(room_level_type) :: clamped
       type(excitation_type) :: excitation
       type(band_type), allocatable :: bands(:)
       integer :: shown
-      logical :: edges_are_known
 
-      associate (floor => case%floors(get_floor_number(case))%model, room => case%room)
-         call floor%get_radiating_modes(state, plate, modes, error)
+      associate (room => case%room, plate => state%plate)
+         call check_radiator(state, error)
          if (.not. allocated(error)) call check_below(plate, room, error)
          if (.not. allocated(error)) call get_room_bands(bands, error)
-         if (.not. allocated(error)) call get_radiation(case, state, plate, modes, bands, radiation, error)
-         if (.not. allocated(error)) call get_excitation(case, state, bands, force, sample_rate, excitation, error)
+         if (.not. allocated(error)) call get_radiation(case, state, state%modes, bands, radiation, error)
+         if (.not. allocated(error)) call get_excitation(case, bands, force, sample_rate, excitation, error)
          if (allocated(error)) return
-         call predict_supported(case, state, excitation, modes, radiation, prediction)
-         edges_are_known = floor%get_support() /= unknown_support
+         call predict_supported(case, state, excitation, state%modes, radiation, prediction)
          shown = min(get_rating_index(room), 2)
          prediction%edge_level = spread(prediction%rated_level(:, shown), 2, 2)
-         if (.not. edges_are_known .and. prediction%n_modal > 0) then
-            call floor%get_room_modes(state, 'clamped', plate, clamped_modes, error, &
-               get_highest_frequency(get_box(room, plate, bands)))
-            if (.not. allocated(error)) call get_radiation(case, state, plate, clamped_modes, bands, &
-               clamped_radiation, error, radiation)
+         if (.not. state%edges_are_known .and. prediction%n_modal > 0) then
+            call get_floor_modes(trim(state%group), with_clamped_edges(state%modes%stack), plate, state%air, clamped_modes, &
+               error, get_highest_frequency(get_box(room, plate, bands)))
+            if (.not. allocated(error)) call get_radiation(case, state, clamped_modes, bands, clamped_radiation, error, &
+               radiation)
             if (allocated(error)) return
             call predict_supported(case, state, excitation, clamped_modes, clamped_radiation, clamped)
             ! The modes of clamped edges may be resolved in fewer bands.
@@ -90,16 +87,14 @@ contains
          end if
          prediction%level = prediction%rated_level(:, shown)
          call add_ratings(prediction)
-         call add_uncertainty(modes%stack, edges_are_known, prediction)
+         call add_uncertainty(state%modes%stack, state%edges_are_known, prediction)
          if (room%required > 0.0_wp) prediction%probability = get_probability(room, prediction)
       end associate
    end subroutine predict_room
 
-   !> Levels of a force, and the plate that radiates with its conductance.
-   subroutine get_excitation(case, state, bands, force, sample_rate, excitation, error)
+   !> A force and its levels.
+   subroutine get_excitation(case, bands, force, sample_rate, excitation, error)
       type(case_type), intent(in) :: case
-      !> The floor, prepared.
-      type(floor_state_type), intent(in) :: state
       !> Bands from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Force on the floor, N: [n_sample].
@@ -107,17 +102,14 @@ contains
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       type(excitation_type), intent(out) :: excitation
-      !> Set if a level cannot be computed, or the floor has no plate that radiates.
+      !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
 
       excitation%force = force
       excitation%sample_rate = sample_rate
       excitation%bands = bands
-      allocate (excitation%level(size(bands)), excitation%conductance(size(bands)))
+      allocate (excitation%level(size(bands)))
       call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), excitation%level, error)
-      if (allocated(error)) return
-      call case%floors(get_floor_number(case))%model%get_radiator(state, bands%center, excitation%plate, &
-         excitation%conductance, error)
    end subroutine get_excitation
 
    !> Level in the room below a floor with known edges. Walls, a ceiling and a covering change modal levels as much as
@@ -137,19 +129,18 @@ contains
       type(box_type) :: box
       integer :: i
 
-      associate (floor => case%floors(get_floor_number(case))%model, room => case%room, plate => excitation%plate, &
-         bands => excitation%bands, level => excitation%level)
+      associate (room => case%room, plate => state%plate, bands => excitation%bands, level => excitation%level)
          used = radiation
          if (room%radiation /= modal_radiation) then
             used%radiation_factor = get_plate_radiation(plate, room%air, bands%center)
             used%upper_factor = used%radiation_factor
          end if
-         if (.not. state%has_modal_conductance) used%conductance = excitation%conductance
-         call get_room_level(plate, used, room, bands, level - floor%get_improvement(size(bands)), prediction)
+         if (.not. state%has_modal_conductance) used%conductance = get_plate_conductance(state, bands%center)
+         call get_room_level(plate, used, room, bands, level - state%improvement, prediction)
          box = get_box(room, plate, bands)
          prediction%crossover = get_crossover(box)
          ! A floor whose mobility is measured has the modes of its plate alone.
-         if (.not. floor%has_room_modes()) used%conductance = radiation%conductance
+         if (state%is_measured) used%conductance = radiation%conductance
          call get_room_level(plate, used, get_bare_room(room), bands, level, bare)
       end associate
       do i = 1, 2
@@ -167,12 +158,11 @@ contains
    !> Radiation of a floor in bands. Those that its modes do not reach, because coupled functions resolve few waves, have
    !> that of the simply supported floor without further supports: its waves are so short that these matter little. The
    !> middle of the floor represents it if not all of it is resolved.
-   subroutine get_radiation(case, state, plate, modes, bands, radiation, error, known)
+   subroutine get_radiation(case, state, modes, bands, radiation, error, known)
       type(case_type), intent(in) :: case
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
-      type(plate_type), intent(in) :: plate
-      !> Modes of the floor as it is supported.
+      !> Its modes as it is supported.
       type(floor_modes_type), intent(in) :: modes
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
@@ -183,27 +173,28 @@ contains
       type(modal_radiation_type), intent(in), optional :: known
       type(floor_modes_type) :: simple_modes
       type(modal_radiation_type) :: beyond
-      type(plate_type) :: simple_plate
       real(wp) :: area(4)
       integer :: n
 
       n = count(bands%upper <= modes%limit/(2*pi))
-      area = get_area(case%room, plate)
-      call get_modal_radiation(modes, plate, case%room%air, bands(:n), area, radiation)
+      area = get_area(case%room, state%plate)
+      call get_modal_radiation(modes, state%plate, case%room%air, bands(:n), area, radiation)
       if (n == size(bands)) return
       if (present(known)) then
          beyond = known
       else
-         call case%floors(get_floor_number(case))%model%get_room_modes(state, uncoupled_support, simple_plate, &
-            simple_modes, error)
+         simple_modes = modes
+         ! Beyond the modes of a file the plate takes their place.
+         if (.not. modes%known_limit < huge(1.0_wp)) call get_floor_modes(trim(state%group), get_simplified(modes%stack), &
+            state%plate, state%air, simple_modes, error)
          if (allocated(error)) return
          ! Of a floor whose middle represents it, as much of the middle as the room covers; losses keep energy near the
          ! strike.
          associate (stack => simple_modes%stack)
-            if (stack%length*stack%width < plate%length*plate%width*(1 - 1.0e-9_wp)) area = &
+            if (stack%length*stack%width < product([state%plate%length, state%plate%width])*(1 - 1.0e-9_wp)) area = &
                [0.0_wp, min(area(2) - area(1), stack%length), 0.0_wp, min(area(4) - area(3), stack%width)]
          end associate
-         call get_modal_radiation(simple_modes, plate, case%room%air, bands, area, beyond)
+         call get_modal_radiation(simple_modes, state%plate, case%room%air, bands, area, beyond)
          if (n > 0) beyond%energy_beyond = max(beyond%energy_beyond, radiation%energy_beyond(n))
       end if
       radiation%radiation_factor = [radiation%radiation_factor, beyond%radiation_factor(n + 1:)]

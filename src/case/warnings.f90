@@ -2,14 +2,13 @@
 module thud_warnings
    use thud_ball, only: ball_type, get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
-   use thud_case, only: case_type, get_active_fields, get_floor_number, get_model_number, get_unstated_fields
+   use thud_case, only: case_type, get_active_fields, get_model_number, get_unstated_fields
    use thud_error, only: error_type
    use thud_field, only: field_type, key_length
    use thud_floor_model, only: floor_state_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_plate, only: plate_type
    use thud_refined_drop, only: finer_quantities, get_resolution_keys
    use thud_registry, only: floor_names
    use thud_room, only: get_completed_room, room_level_type, room_type
@@ -238,23 +237,15 @@ contains
       type(floor_state_type), intent(in) :: state
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      type(band_type) :: bands(octave_count)
-      type(plate_type) :: plate
-      type(error_type), allocatable :: error
       type(room_type) :: room
-      real(wp) :: conductance(octave_count)
 
-      bands = get_octaves()
-      associate (floor => case%floors(get_floor_number(case))%model)
-         call floor%get_radiator(state, bands%center, plate, conductance, error)
-      end associate
-      if (allocated(error)) return
-      room = get_completed_room(case%room, plate)
+      room = get_completed_room(case%room, state%plate)
       call add_limit_warnings([validity_limit_type('room', 'height in m', room%height, usual_height(1), usual_height(2), &
          'check volume, length and width', 'most rooms have')], warnings)
-      if (abs(room%length*room%width/(plate%length*plate%width) - 1) > same_area) call add(warnings, '&room: a room of ' &
-         //fixed(room%length*room%width, 1)//' m2 below a floor of '//fixed(plate%length*plate%width, 1) &
-         //' m2: only the part of the floor above the room radiates into it')
+      associate (room_area => room%length*room%width, area => state%plate%length*state%plate%width)
+         if (abs(room_area/area - 1) > same_area) call add(warnings, '&room: a room of '//fixed(room_area, 1) &
+            //' m2 below a floor of '//fixed(area, 1)//' m2: only the part of the floor above the room radiates into it')
+      end associate
    end subroutine add_height_warning
 
    !> Limits of density, modulus and Poisson's ratio of a ball of rubber.

@@ -2,12 +2,12 @@
 module thud_joist_floor
    use thud_constants, only: pi
    use thud_field, only: field_type, name_length
+   use thud_floor_model, only: floor_state_type
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, real_field
    use thud_plate, only: plate_type
-   use thud_plate_stack, only: ribs_type
-   use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
-   use thud_screed, only: new_orthotropic
+   use thud_plate_stack, only: get_spaced_positions, new_orthotropic, orthotropic_type, ribs_type
+   use thud_rectangular_floor, only: rectangular_floor_type
    implicit none (type, external)
    private
 
@@ -34,7 +34,7 @@ module thud_joist_floor
       character(len=name_length) :: source_on = 'sheathing'
    contains
       procedure :: get_fields
-      procedure :: get_base
+      procedure :: get_bearing
       procedure :: get_source
    end type joist_floor_type
 
@@ -66,27 +66,27 @@ contains
          choice_field('source_on', self%source_on, &
          'impact location: midway between the next joists, on the next joist, or exactly the position', &
          [character(len=9) :: 'sheathing', 'joist', 'position']), &
-         self%get_build_up_fields(on_joists=.true.), self%get_point_fields()]
+         self%get_build_up_fields(.true.), self%get_point_fields()]
    end function get_fields
 
    !> The smeared plate, and the sheathing with its joists.
-   function get_base(self) result(base)
+   subroutine get_bearing(self, state, bearing)
       class(joist_floor_type), intent(in) :: self
-      type(base_floor_type) :: base
+      type(floor_state_type), intent(out) :: state
+      type(orthotropic_type), intent(out) :: bearing
       type(ribs_type) :: joists
 
-      base%group = 'joist_floor'
-      base%is_homogeneous = .false.
-      base%plate = get_smeared(self)
-      base%stiffness = new_orthotropic(plate_type(length=self%length, width=self%width, &
+      state%group = 'joist_floor'
+      state%has_modal_conductance = .true.
+      state%plate = get_smeared(self)
+      bearing = new_orthotropic(plate_type(length=self%length, width=self%width, &
          thickness=self%sheathing_thickness, density=self%sheathing_density, &
          wave_speed=sqrt(self%sheathing_modulus/self%sheathing_density), loss_factor=self%loss_factor))
-      base%highest_frequency = (2*pi/(6*self%sheathing_thickness))**2 &
-         *sqrt(base%stiffness%along/base%stiffness%mass)/(2*pi)
-      base%validity_reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
+      state%highest_frequency = (2*pi/(6*self%sheathing_thickness))**2*sqrt(bearing%along/bearing%mass)/(2*pi)
+      state%validity_reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
       associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
          arm => (self%joist_height + self%sheathing_thickness)/2)
-         joists%position = get_positions(self)
+         joists%position = get_spaced_positions(self%width, self%spacing, b)
          joists%bending = e*b*h**3/12
          call get_composite(self, joists%composite, joists%slip)
          ! Shear coefficient of a rectangle: 5/6.
@@ -95,26 +95,14 @@ contains
          joists%mass = self%joist_density*b*h
          joists%inertia = joists%mass*(b**2 + h**2)/12
          ! A free joist swings about the sheathing, and bends sideways where it twists; a subceiling holds it.
-         if (.not. self%has_subceiling()) then
+         if (.not. self%subceiling%thickness > 0.0_wp) then
             joists%inertia = joists%inertia + joists%mass*arm**2
             joists%warping = e*h*b**3/12*arm**2
          end if
       end associate
       joists%loss_factor = self%loss_factor
-      allocate (base%stiffness%ribs, source=joists)
-   end function get_base
-
-   !> Positions of the joists' axes across the width, symmetric about the center, m: [n_joist].
-   pure function get_positions(self) result(position)
-      class(joist_floor_type), intent(in) :: self
-      real(wp), allocatable :: position(:)
-      integer :: i, n
-
-      n = max(1, int(self%width/self%spacing*(1 + epsilon(1.0_wp))))
-      ! A joist at the edge itself would not move.
-      if ((n - 1)*self%spacing > self%width - self%joist_width) n = n - 1
-      position = self%width/2 + self%spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
-   end function get_positions
+      allocate (bearing%ribs, source=joists)
+   end subroutine get_bearing
 
    !> Relative position of the source.
    function get_source(self) result(source)
@@ -122,7 +110,7 @@ contains
       real(wp) :: source(2)
 
       source = [self%source_x, self%source_y]
-      associate (joists => get_positions(self), y => self%source_y*self%width)
+      associate (joists => get_spaced_positions(self%width, self%spacing, self%joist_width), y => self%source_y*self%width)
          associate (n => size(joists))
             select case (self%source_on)
              case ('joist')
@@ -173,7 +161,7 @@ contains
       real(wp) :: across, along, torsion, mass, composite, slip
 
       call get_composite(self, composite, slip)
-      across = get_sheathing_stiffness(self)
+      across = self%sheathing_modulus*self%sheathing_thickness**3/12
       associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
          t => self%sheathing_thickness, a => self%spacing)
          along = across + (e*b*h**3/12 + composite/(1 + slip*composite*(pi/self%length)**2))/a
@@ -185,14 +173,6 @@ contains
          loss_factor=self%loss_factor, edges='absorption')
       plate%wave_speed = sqrt(12*sqrt(along*across)/mass)/plate%thickness
    end function get_smeared
-
-   !> Bending stiffness of the sheathing per unit width, N m.
-   pure function get_sheathing_stiffness(self) result(stiffness)
-      class(joist_floor_type), intent(in) :: self
-      real(wp) :: stiffness
-
-      stiffness = self%sheathing_modulus*self%sheathing_thickness**3/12
-   end function get_sheathing_stiffness
 
    !> Torsion constant of a rectangle, within 0.5 % (Roark).
    pure function get_torsion_constant(width, height) result(constant)

@@ -1,13 +1,13 @@
 !> A plate of crossed layers that yield in shear, as cross-laminated timber.
 module thud_laminate_floor
-   use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
+   use thud_floor_model, only: floor_state_type
    use thud_kinds, only: wp
    use thud_legendre, only: get_gauss_legendre
    use thud_new_field, only: list_field, real_field
    use thud_plate, only: plate_type
-   use thud_rectangular_floor, only: base_floor_type, rectangular_floor_type
-   use thud_text, only: to_text
+   use thud_plate_stack, only: orthotropic_type
+   use thud_rectangular_floor, only: rectangular_floor_type
    implicit none (type, external)
    private
 
@@ -34,8 +34,7 @@ module thud_laminate_floor
       real(wp) :: loss_factor = 0.03_wp
    contains
       procedure :: get_fields
-      procedure :: check
-      procedure :: get_base
+      procedure :: get_bearing
    end type laminate_floor_type
 
 contains
@@ -64,35 +63,8 @@ contains
          'mass without stiffness on the plate, as gravel', '[0, 1000]'), &
          real_field('loss_factor', self%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
-         self%get_source_fields(), self%get_build_up_fields(), self%get_point_fields()]
+         self%get_source_fields(), self%get_build_up_fields(.false.), self%get_point_fields()]
    end function get_fields
-
-   !> Checks the layers, then what all rectangular floors have.
-   subroutine check(self, error)
-      class(laminate_floor_type), intent(in) :: self
-      type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
-
-      base = self%get_base()
-      if (min(base%stiffness%along, base%stiffness%across) > 0.0_wp) then
-         call self%check_build_up(error)
-      else
-         error = input_error('&laminate_floor: cross_modulus = '//to_text(self%cross_modulus)//' Pa leaves a single ' &
-            //'layer without stiffness across it; allowed: a modulus above 0, or more layers')
-      end if
-   end subroutine check
-
-   !> Thicknesses, m, and whether the grain runs along the length: [n_layer].
-   pure subroutine get_layers(self, thickness, is_along)
-      class(laminate_floor_type), intent(in) :: self
-      real(wp), allocatable, intent(out) :: thickness(:)
-      logical, allocatable, intent(out) :: is_along(:)
-      integer :: i
-
-      thickness = default_thickness
-      if (self%layer_thickness%count > 0) thickness = self%layer_thickness%values(:self%layer_thickness%count)
-      is_along = [(mod(i, 2) == 1, i=1, size(thickness))]
-   end subroutine get_layers
 
    !> Bending and shear stiffness per width in one direction.
    !>
@@ -128,33 +100,37 @@ contains
    end subroutine get_section
 
    !> The equivalent homogeneous plate, and the stiffnesses of the layers.
-   function get_base(self) result(base)
+   subroutine get_bearing(self, state, bearing)
       class(laminate_floor_type), intent(in) :: self
-      type(base_floor_type) :: base
+      type(floor_state_type), intent(out) :: state
+      type(orthotropic_type), intent(out) :: bearing
       real(wp), allocatable :: thickness(:)
       logical, allocatable :: is_along(:)
       real(wp) :: mean
+      integer :: i
 
-      base%group = 'laminate_floor'
-      base%is_homogeneous = .false.
-      call get_layers(self, thickness, is_along)
+      state%group = 'laminate_floor'
+      state%has_modal_conductance = .true.
+      thickness = default_thickness
+      if (self%layer_thickness%count > 0) thickness = self%layer_thickness%values(:self%layer_thickness%count)
+      is_along = [(mod(i, 2) == 1, i=1, size(thickness))]
       associate (e => self%youngs_modulus, e_cross => self%cross_modulus, g => self%shear_modulus, &
-         g_rolling => self%rolling_shear_modulus, total => sum(thickness), layers => base%stiffness)
-         call get_section(thickness, merge(e, e_cross, is_along), merge(g, g_rolling, is_along), layers%along, &
-            layers%shear(1))
-         call get_section(thickness, merge(e_cross, e, is_along), merge(g_rolling, g, is_along), layers%across, &
-            layers%shear(2))
-         layers%torsion = self%torsion_factor*g*total**3/12
-         layers%mass = self%density*total + self%added_mass
-         layers%inertia = self%density*total**3/12
-         layers%loss_factor = self%loss_factor
-         mean = sqrt(layers%along*layers%across)
-         base%plate = plate_type(length=self%length, width=self%width, thickness=total, density=layers%mass/total, &
-            wave_speed=sqrt(12*mean/layers%mass)/total, stiffness_ratio=layers%across/layers%along, &
-            torsion_ratio=min(2*layers%torsion/mean, 1.0_wp), loss_factor=self%loss_factor, edges='absorption')
+         g_rolling => self%rolling_shear_modulus, total => sum(thickness))
+         call get_section(thickness, merge(e, e_cross, is_along), merge(g, g_rolling, is_along), bearing%along, &
+            bearing%shear(1))
+         call get_section(thickness, merge(e_cross, e, is_along), merge(g_rolling, g, is_along), bearing%across, &
+            bearing%shear(2))
+         bearing%torsion = self%torsion_factor*g*total**3/12
+         bearing%mass = self%density*total + self%added_mass
+         bearing%inertia = self%density*total**3/12
+         bearing%loss_factor = self%loss_factor
+         mean = sqrt(bearing%along*bearing%across)
+         state%plate = plate_type(length=self%length, width=self%width, thickness=total, density=bearing%mass/total, &
+            wave_speed=sqrt(12*mean/bearing%mass)/total, stiffness_ratio=bearing%across/bearing%along, &
+            torsion_ratio=min(2*bearing%torsion/mean, 1.0_wp), loss_factor=self%loss_factor, edges='absorption')
+         state%highest_frequency = sqrt(minval(bearing%shear)/bearing%mass)/(2*total)
       end associate
-      base%highest_frequency = sqrt(minval(base%stiffness%shear)/base%stiffness%mass)/(2*base%plate%thickness)
-      base%validity_reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
-   end function get_base
+      state%validity_reason = 'shear waves are shorter than two thicknesses, and layers deform by themselves'
+   end subroutine get_bearing
 
 end module thud_laminate_floor

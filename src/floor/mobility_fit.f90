@@ -68,7 +68,7 @@ contains
          floor%lowest_frequency = frequency(1)
          floor%highest_frequency = frequency(size(frequency))
          call check_fields(in_group('measured_mobility', floor%get_fields()), error)
-         if (.not. allocated(error)) call floor%check(error)
+         if (.not. allocated(error)) call floor%check(.false., error)
       end if
    end subroutine fit_mobility
 

@@ -57,14 +57,13 @@ module thud_plate
 contains
 
    !> Keys and allowed ranges of the group `&plate`.
-   function get_plate_fields(plate, optional_plate) result(fields)
+   function get_plate_fields(plate, is_optional) result(fields)
       !> The plate that the fields read and set.
       type(plate_type), intent(in), target :: plate
-      !> A thickness of 0 means that there is no plate (default: false).
-      logical, intent(in), optional :: optional_plate
+      !> A thickness of 0 means that there is no plate.
+      logical, intent(in) :: is_optional
       !> One field per key: [10].
       type(field_type), allocatable :: fields(:)
-      integer :: i
 
       fields = [ &
          real_field('length', plate%length, 'm', 'length of the floor', '[0.5, 100]'), &
@@ -81,11 +80,8 @@ contains
          [character(len=10) :: 'building', 'laboratory', 'absorption']), &
          real_field('edge_absorption', plate%edge_absorption, 'm', &
          'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
-      if (.not. present(optional_plate)) return
-      if (.not. optional_plate) return
-      i = findloc(fields%key, 'thickness', dim=1)
-      fields(i)%range = '[0, 2]'
-      fields(i)%meaning = 'thickness of the plate that radiates into a room; 0: none'
+      if (is_optional) fields(3) = real_field('thickness', plate%thickness, 'm', &
+         'thickness of the plate that radiates into a room; 0: none', '[0, 2]')
    end function get_plate_fields
 
    !> Mass per unit area, kg/m2.

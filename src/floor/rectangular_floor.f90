@@ -1,23 +1,26 @@
 !> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length, list_type, name_length
-   use thud_floor_model, only: check_point, floor_model_type, floor_state_type, reason_length, uncoupled_support, &
-      unknown_support
-   use thud_floor_modes, only: floor_modes_type, get_floor_modes, get_mode_limit, new_floor_receiver
+   use thud_field, only: field_type, list_type, name_length
+   use thud_floor_model, only: floor_model_type, floor_state_type, third_bands
+   use thud_floor_modes, only: get_floor_modes, get_mode_limit, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
-   use thud_plate, only: get_resistance, get_thin_limit, plate_type
-   use thud_plate_stack, only: edge_type, get_resolved_part, orthotropic_type, plate_stack_type, rigid_support
+   use thud_plate, only: get_resistance, get_thin_limit
+   use thud_plate_stack, only: edge_type, get_spaced_positions, layer_type, new_orthotropic, orthotropic_type, &
+      plate_stack_type, rigid_support
    use thud_receiver, only: receiver_type
-   use thud_screed, only: get_screed_fields, get_screed_layer, get_screed_plate, new_orthotropic, screed_type
-   use thud_subceiling, only: get_cavity_limit, get_spaced_positions, get_subceiling_fields, get_subceiling_layer, &
-      get_subceiling_plate, subceiling_type
+   use thud_screed, only: get_screed_fields, get_screed_plate, screed_type
+   use thud_subceiling, only: get_cavity_limit, get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, &
+      subceiling_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: base_floor_type, rectangular_floor_type
+   public :: rectangular_floor_type
+
+   !> Edges of which nothing is known, see `floor_state_type`.
+   character(len=*), parameter :: unknown_support = 'unknown'
 
    !> Supports of the edges.
    character(len=*), parameter :: supports(*) = [character(len=7) :: unknown_support, 'simple', 'clamped', 'free', 'elastic']
@@ -25,37 +28,18 @@ module thud_rectangular_floor
    !> Minimum distance of the source from a rigid line, m: the radius of the contact.
    real(wp), parameter :: min_distance = 0.05_wp
 
-   !> Minimum distance of two rigid lines, m: less than any wall or beam is thick.
+   !> Minimum distance of two rigid lines, m: less than any wall or beam is thick. Closer ones would support the floor once,
+   !> but count twice.
    real(wp), parameter :: min_line_distance = 0.01_wp
 
    !> Thickness of the thinnest floating plate or subceiling, m: a metal sheet.
    real(wp), parameter :: min_sheet = 0.0005_wp
 
-   !> Frequency that uncoupled functions resolve, Hz: above the highest band of a rating.
-   real(wp), parameter :: resolved_limit = 800.0_wp
-
-   !> Numbers of octaves and one-third-octave bands of a rating.
-   integer, parameter :: octave_bands = 4, third_bands = 12
-
-   !> A floor without supports, floating plate and subceiling.
-   type :: base_floor_type
-      !> Namelist group of the floor.
-      character(len=key_length) :: group = ''
-      !> The plate with homogeneous stiffness.
-      type(plate_type) :: plate
-      !> Stiffnesses, masses and ribs.
-      type(orthotropic_type) :: stiffness
-      !> Whether the homogeneous plate represents the mean power into the floor.
-      logical :: is_homogeneous = .true.
-      !> Frequency up to which the model of the plate is valid, Hz, and the reason, as the end of a message.
-      real(wp) :: highest_frequency = huge(1.0_wp)
-      character(len=reason_length) :: validity_reason = ''
-   end type base_floor_type
+   !> Number of octaves of a rating.
+   integer, parameter :: octave_bands = 4
 
    !> The floor; all plates have the same length and width.
    type, abstract, extends(floor_model_type) :: rectangular_floor_type
-      !> Relative position of the source along length and width.
-      real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
       !> Support of the edges.
       character(len=name_length) :: support = unknown_support
       !> Springs along the edges x = 0, x = length, y = 0 and y = width, or one value for all: stiffness against deflection
@@ -72,55 +56,35 @@ module thud_rectangular_floor
       !> Reduction of the heavy impact sound by a covering, dB: one for each octave or one-third-octave band; empty: none.
       type(list_type) :: covering_improvement
    contains
-      procedure :: get_source_fields
       procedure :: get_build_up_fields
       procedure :: check
-      procedure :: check_build_up
       procedure :: prepare
-      procedure :: get_sides
-      procedure :: get_transfer
       procedure :: get_source
-      procedure :: get_radiator
-      procedure :: get_room_modes
-      procedure :: get_support
-      procedure :: get_improvement
-      procedure :: has_subceiling
-      procedure(get_base), deferred :: get_base
+      procedure(get_bearing), deferred :: get_bearing
    end type rectangular_floor_type
 
    abstract interface
-      !> The floor without supports, floating plate and subceiling.
-      function get_base(self) result(base)
-         import :: base_floor_type, rectangular_floor_type
+      !> The plate that bears, without supports: its group, the plate with homogeneous stiffness, and up to which frequency
+      !> and why the model of the plate is valid.
+      subroutine get_bearing(self, state, bearing)
+         import :: floor_state_type, orthotropic_type, rectangular_floor_type
          implicit none (type, external)
          class(rectangular_floor_type), intent(in) :: self
-         type(base_floor_type) :: base
-      end function get_base
+         !> What is not stated of the bearing plate has its default.
+         type(floor_state_type), intent(out) :: state
+         !> Stiffnesses, masses and ribs.
+         type(orthotropic_type), intent(out) :: bearing
+      end subroutine get_bearing
    end interface
 
 contains
 
-   !> Fields of the position of the source: [2].
-   function get_source_fields(self) result(fields)
-      class(rectangular_floor_type), intent(in), target :: self
-      type(field_type) :: fields(2)
-
-      fields = [ &
-         real_field('source_x', self%source_x, '', 'relative source position along the length; ' &
-         //'levels in the room are means over positions', '(0, 1)'), &
-         real_field('source_y', self%source_y, '', 'relative source position along the width', '(0, 1)')]
-   end function get_source_fields
-
    !> Fields of supports, floating plate, subceiling and covering.
    function get_build_up_fields(self, on_joists) result(fields)
       class(rectangular_floor_type), intent(in), target :: self
-      !> The subceiling hangs on joists (default: on the plate).
-      logical, intent(in), optional :: on_joists
+      !> The subceiling hangs on joists, not on the plate.
+      logical, intent(in) :: on_joists
       type(field_type), allocatable :: fields(:)
-      logical :: has_joists
-
-      has_joists = .false.
-      if (present(on_joists)) has_joists = on_joists
 
       fields = [ &
          choice_field('support', self%support, 'support of the edges', supports), &
@@ -133,7 +97,7 @@ contains
          list_field('line_y', self%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
          '(0, 100)'), &
          get_screed_fields(self%screed), &
-         get_subceiling_fields(self%subceiling, has_joists), &
+         get_subceiling_fields(self%subceiling, on_joists), &
          real_field('covering_stiffness', self%covering_stiffness, 'N/m', &
          'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
          real_field('covering_loss_factor', self%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
@@ -142,136 +106,123 @@ contains
          //'by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz', '[-30, 60]')]
    end function get_build_up_fields
 
-   !> Checks supports and positions.
-   subroutine check(self, error)
+   !> Checks plate, supports, positions and covering.
+   subroutine check(self, has_room, error)
       class(rectangular_floor_type), intent(in) :: self
+      logical, intent(in) :: has_room
       type(error_type), allocatable, intent(out) :: error
+      type(floor_state_type) :: state
+      type(orthotropic_type) :: bearing
+      type(edge_type) :: edge(4)
+      character(len=:), allocatable :: group
 
-      call self%check_build_up(error)
-   end subroutine check
-
-   !> Checks what all rectangular floors have: supports and positions.
-   subroutine check_build_up(self, error)
-      class(rectangular_floor_type), intent(in) :: self
-      type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
-
-      base = self%get_base()
-      call check_edges(self%support_stiffness, 'support_stiffness')
-      call check_edges(self%support_rotation, 'support_rotation')
-      call check_positions(self%line_x, 'line_x', base%plate%length)
-      call check_positions(self%line_y, 'line_y', base%plate%width)
-      call check_distances(self%line_x, 'line_x')
-      call check_distances(self%line_y, 'line_y')
-      associate (source => self%get_source())
-         call check_source(self%line_x, 'line_x', source(1)*base%plate%length)
-         call check_source(self%line_y, 'line_y', source(2)*base%plate%width)
+      call self%get_bearing(state, bearing)
+      group = '&'//trim(state%group)//': '
+      edge = get_edges(self)
+      if (.not. min(bearing%along, bearing%across) > 0.0_wp) then
+         error = input_error(group//'cross_modulus = 0 Pa leaves a single layer without stiffness across it; allowed: a ' &
+            //'modulus above 0, or more layers')
+         return
+      end if
+      call check_springs(self%support_stiffness, 'support_stiffness')
+      call check_springs(self%support_rotation, 'support_rotation')
+      associate (plate => state%plate, source => self%get_source())
+         call check_lines(self%line_x, 'line_x', plate%length, source(1)*plate%length)
+         call check_lines(self%line_y, 'line_y', plate%width, source(2)*plate%width)
       end associate
       if (allocated(error)) return
       if (all(self%covering_improvement%count /= [0, octave_bands, third_bands])) then
-         error = input_error('&'//trim(base%group)//': covering_improvement has ' &
-            //to_text(self%covering_improvement%count)//' values; allowed: 4, one for each octave from 63 to 500 Hz, ' &
-            //'or 12, one for each one-third-octave band')
+         error = input_error(group//'covering_improvement has '//to_text(self%covering_improvement%count)//' values; ' &
+            //'allowed: 4, one for each octave from 63 to 500 Hz, or 12, one for each one-third-octave band')
       else if (self%covering_improvement%count > 0 .and. self%covering_stiffness > 0.0_wp) then
-         error = input_error('&'//trim(base%group)//': covering_stiffness and covering_improvement describe the same ' &
-            //'covering twice; allowed: one of them')
-      else if (self%support == 'elastic' .and. self%support_stiffness%count == 0 &
-         .and. self%support_rotation%count == 0) then
-         error = input_error('&'//trim(base%group)//': support = elastic without support_stiffness and support_rotation; ' &
-            //'allowed: at least one of them')
-      else if (self%support /= 'elastic' .and. self%support_stiffness%count + self%support_rotation%count > 0) then
-         error = input_error('&'//trim(base%group)//': support_stiffness and support_rotation with support = ' &
-            //trim(self%support)//'; allowed: with support = elastic')
-      else if (is_loose() .and. self%line_x%count + self%line_y%count == 0) then
-         error = input_error('&'//trim(base%group)//': support = '//trim(self%support) &
-            //' without any stiffness needs supports at line_x or line_y; allowed: at least one')
-      else if (self%screed%thickness > 0.0_wp .and. self%screed%thickness < min_sheet) then
-         error = input_error('&'//trim(base%group)//': screed_thickness = '//to_text(self%screed%thickness) &
-            //' m; allowed: 0, or 0.0005 to 0.5 m')
-      else if (self%has_subceiling() .and. self%subceiling%thickness < min_sheet) then
-         error = input_error('&'//trim(base%group)//': subceiling_thickness = '//to_text(self%subceiling%thickness) &
-            //' m; allowed: 0, or 0.0005 to 0.2 m')
+         error = input_error(group//'covering_stiffness and covering_improvement describe the same covering twice; ' &
+            //'allowed: one of them')
+      else if ((self%support == 'elastic') .neqv. (self%support_stiffness%count + self%support_rotation%count > 0)) then
+         error = input_error(group//'support = '//trim(self%support)//' with '//to_text(self%support_stiffness%count) &
+            //' values of support_stiffness and '//to_text(self%support_rotation%count)//' of support_rotation; ' &
+            //'allowed: some with support = elastic, none with others')
+      else if (all(edge%deflection <= 0.0_wp) .and. self%line_x%count + self%line_y%count == 0) then
+         error = input_error(group//'support = '//trim(self%support)//' without any stiffness needs supports at line_x or ' &
+            //'line_y; allowed: at least one')
       end if
+      call check_sheet(self%screed%thickness, 'screed_thickness', '0.5')
+      call check_sheet(self%subceiling%thickness, 'subceiling_thickness', '0.2')
+      if (.not. allocated(error)) call self%check_points(trim(state%group), [state%plate%length, state%plate%width], error)
    contains
 
       !> Checks the number of values of an elastic edge.
-      subroutine check_edges(list, key)
+      subroutine check_springs(list, key)
          type(list_type), intent(in) :: list
          character(len=*), intent(in) :: key
 
          if (allocated(error) .or. any(list%count == [0, 1, 4])) return
-         error = input_error('&'//trim(base%group)//': '//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
-      end subroutine check_edges
+         error = input_error(group//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
+      end subroutine check_springs
 
-      !> Whether no edge is held against deflection.
-      function is_loose() result(yes)
-         logical :: yes
-         type(edge_type) :: edge(4)
-
-         edge = get_edges(self, self%support)
-         yes = all(edge%deflection <= 0.0_wp)
-      end function is_loose
-
-      !> Checks that no two lines coincide, which would support the floor once, but count twice.
-      subroutine check_distances(list, key)
+      !> Checks that lines lie between two edges, apart from each other and from the source.
+      subroutine check_lines(list, key, side, source)
          type(list_type), intent(in) :: list
          character(len=*), intent(in) :: key
+         !> Distance of the edges, and position of the source across the lines, m.
+         real(wp), intent(in) :: side, source
          integer :: i
 
-         if (allocated(error)) return
-         do i = 2, list%count
+         do i = 1, list%count
+            if (allocated(error)) return
             associate (line => list%values(i))
-               if (all(abs(list%values(:i - 1) - line) >= min_line_distance)) cycle
-               error = input_error('&'//trim(base%group)//': '//key//' = '//to_text(line)//' m is stated twice, or within ' &
-                  //to_text(1000*min_line_distance)//' mm of another value; allowed: each line once')
-               return
+               if (line >= side) then
+                  error = input_error(group//key//' = '//to_text(line)//' m lies outside the floor; allowed: below ' &
+                     //to_text(side)//' m')
+               else if (any(abs(list%values(:i - 1) - line) < min_line_distance)) then
+                  error = input_error(group//key//' = '//to_text(line)//' m is stated twice, or within ' &
+                     //to_text(1000*min_line_distance)//' mm of another value; allowed: each line once')
+               else if (abs(line - source) < min_distance) then
+                  error = input_error(group//'the source, at '//to_text(source)//' m, lies on a support of '//key &
+                     //'; allowed: sources at least '//to_text(min_distance)//' m from it')
+               end if
             end associate
          end do
-      end subroutine check_distances
+      end subroutine check_lines
 
-      !> Checks that the source does not lie on a rigid line.
-      subroutine check_source(list, key, source)
-         type(list_type), intent(in) :: list
-         character(len=*), intent(in) :: key
-         !> Position of the source across the lines, m.
-         real(wp), intent(in) :: source
+      !> Checks that a plate above or below the floor is no thinner than a sheet.
+      subroutine check_sheet(thickness, key, highest)
+         !> Thickness, m.
+         real(wp), intent(in) :: thickness
+         !> Its key, and the upper end of its range.
+         character(len=*), intent(in) :: key, highest
 
-         if (allocated(error) .or. all(abs(list%values(:list%count) - source) >= min_distance)) return
-         error = input_error('&'//trim(base%group)//': the source, at '//to_text(source)//' m, lies on a support of '//key &
-            //'; allowed: sources at least '//to_text(min_distance)//' m from it')
-      end subroutine check_source
-
-      !> Checks that positions lie between two edges.
-      subroutine check_positions(list, key, side)
-         type(list_type), intent(in) :: list
-         character(len=*), intent(in) :: key
-         !> Distance of the edges, m.
-         real(wp), intent(in) :: side
-
-         if (allocated(error)) return
-         if (any(list%values(:list%count) >= side)) error = input_error('&'//trim(base%group)//': '//key//' = ' &
-            //to_text(maxval(list%values(:list%count)))//' m lies outside the floor; allowed: below '//to_text(side)//' m')
-      end subroutine check_positions
-   end subroutine check_build_up
+         if (allocated(error) .or. .not. thickness > 0.0_wp .or. thickness >= min_sheet) return
+         error = input_error(group//key//' = '//to_text(thickness)//' m; allowed: 0, or 0.0005 to '//highest//' m')
+      end subroutine check_sheet
+   end subroutine check
 
    !> Modes of the floor as it is supported, and its mobility at the source.
    subroutine prepare(self, state, error)
       class(rectangular_floor_type), intent(in) :: self
       type(floor_state_type), intent(out) :: state
       type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
+      type(orthotropic_type) :: bearing
       type(plate_stack_type) :: stack
+      integer :: i
 
-      base = self%get_base()
-      stack = get_stack(self, base, self%support)
-      state%plate = base%plate
-      call get_floor_modes(trim(base%group), stack, base%plate, self%air, state%modes, error)
-      if (allocated(error)) return
-      state%has_modal_conductance = .not. base%is_homogeneous
-      call add_validity(self, base, stack, state)
-      associate (source => self%get_source())
-         call get_mobility_at(self, base, state, source, source, state%receiver, error)
+      call self%get_bearing(state, bearing)
+      stack = get_stack(self, state, bearing)
+      state%source = self%get_source()
+      state%air = self%air
+      state%edges_are_known = self%support /= unknown_support
+      state%resistance = get_resistance(state%plate)
+      if (self%screed%thickness > 0.0_wp) then
+         state%resistance = get_resistance(get_screed_plate(self%screed, state%plate))
+         if (.not. state%has_modal_conductance) state%screed = self%screed
+      end if
+      associate (stated => self%covering_improvement)
+         if (stated%count > 0) state%improvement = &
+            [(stated%values(1 + (i - 1)*stated%count/third_bands), i=1, third_bands)]
       end associate
+      call add_validity(self, stack, state)
+      call get_floor_modes(trim(state%group), stack, state%plate, self%air, state%modes, error)
+      if (.not. allocated(error)) call new_floor_receiver(trim(state%group), state%modes, state%resistance, state%source, &
+         state%source, state%receiver, error)
       if (.not. allocated(error) .and. self%covering_stiffness > 0.0_wp) call add_covering(self, state%receiver)
    end subroutine prepare
 
@@ -288,53 +239,6 @@ contains
       end associate
    end subroutine add_covering
 
-   !> Length and width.
-   subroutine get_sides(self, sides, error)
-      class(rectangular_floor_type), intent(in) :: self
-      real(wp), intent(out) :: sides(2)
-      type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
-
-      base = self%get_base()
-      sides = [base%plate%length, base%plate%width]
-   end subroutine get_sides
-
-   !> Transfer mobility to another point; a point outside the floor is an error.
-   subroutine get_transfer(self, state, x, y, transfer, error)
-      class(rectangular_floor_type), intent(in) :: self
-      type(floor_state_type), intent(in) :: state
-      real(wp), intent(in) :: x, y
-      type(receiver_type), intent(out) :: transfer
-      type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
-
-      base = self%get_base()
-      associate (sides => [base%plate%length, base%plate%width])
-         call check_point(base%group, sides, x, y, error)
-         if (.not. allocated(error)) call get_mobility_at(self, base, state, self%get_source(), &
-            [x, y]/sides, transfer, error)
-      end associate
-   end subroutine get_transfer
-
-   !> Transfer mobility from a source to a point of the upper plate, without covering.
-   subroutine get_mobility_at(self, base, state, source, point, receiver, error)
-      class(rectangular_floor_type), intent(in) :: self
-      type(base_floor_type), intent(in) :: base
-      !> The floor, with its modes.
-      type(floor_state_type), intent(in) :: state
-      !> Positions of source and point, as fractions of length and width: [2].
-      real(wp), intent(in) :: source(2), point(2)
-      !> The transfer mobility, as poles and residues.
-      type(receiver_type), intent(out) :: receiver
-      !> Set if the losses are too high.
-      type(error_type), allocatable, intent(out) :: error
-      type(plate_type) :: plate
-
-      plate = base%plate
-      if (self%screed%thickness > 0.0_wp) plate = get_screed_plate(self%screed, plate)
-      call new_floor_receiver(trim(base%group), state%modes, get_resistance(plate), source, point, receiver, error)
-   end subroutine get_mobility_at
-
    !> Relative position of the source.
    function get_source(self) result(source)
       class(rectangular_floor_type), intent(in) :: self
@@ -344,114 +248,48 @@ contains
    end function get_source
 
    !> The plates above each other.
-   function get_stack(self, floor, support) result(stack)
+   function get_stack(self, state, bearing) result(stack)
       class(rectangular_floor_type), intent(in) :: self
-      !> The floor without supports, floating plate and subceiling.
-      type(base_floor_type), intent(in) :: floor
-      !> Support of the edges, or `uncoupled_support`.
-      character(len=*), intent(in) :: support
+      type(floor_state_type), intent(in) :: state
+      !> The bearing plate without supports.
+      type(orthotropic_type), intent(in) :: bearing
       type(plate_stack_type) :: stack
-      logical :: is_uncoupled
-      type(base_floor_type) :: base
+      type(orthotropic_type) :: lower
+      real(wp), allocatable :: channels(:)
 
-      is_uncoupled = support == uncoupled_support
-      base = floor
-      associate (lower => base%stiffness)
-         lower%edge = get_edges(self, support)
-         if (.not. is_uncoupled) then
-            lower%line_x = self%line_x%values(:self%line_x%count)
-            lower%line_y = self%line_y%values(:self%line_y%count)
-         end if
-      end associate
-      associate (plate => base%plate)
+      lower = bearing
+      lower%edge = get_edges(self)
+      lower%line_x = self%line_x%values(:self%line_x%count)
+      lower%line_y = self%line_y%values(:self%line_y%count)
+      associate (plate => state%plate, screed => self%screed)
          stack%length = plate%length
          stack%width = plate%width
-         if (self%screed%thickness > 0.0_wp) then
-            stack%plate = [new_orthotropic(get_screed_plate(self%screed, plate)), base%stiffness]
-            stack%layer = [get_screed_layer(self%screed)]
+         if (screed%thickness > 0.0_wp) then
+            stack%plate = [new_orthotropic(get_screed_plate(screed, plate)), lower]
+            stack%layer = [layer_type(screed%layer_stiffness, screed%layer_loss_factor)]
          else
-            stack%plate = [base%stiffness]
+            stack%plate = [lower]
             allocate (stack%layer(0))
          end if
          stack%bearing = size(stack%plate)
-         if (self%has_subceiling()) then
+         if (self%subceiling%thickness > 0.0_wp) then
+            ! Joists hold it, or lines as stated.
+            channels = get_spaced_positions(plate%width, self%subceiling%channel_spacing, 0.0_wp)
+            if (allocated(bearing%ribs)) channels = bearing%ribs%position
             stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(self%subceiling, plate))]
-            stack%layer = [stack%layer, get_subceiling_layer(self%subceiling, self%air, &
-               get_channels(self, base))]
+            stack%layer = [stack%layer, get_subceiling_layer(self%subceiling, self%air, channels)]
          end if
          stack%radiator = size(stack%plate)
       end associate
-      if (is_uncoupled) stack = get_resolved_part(stack, resolved_limit)
    end function get_stack
 
-   !> Whether a subceiling radiates into the room.
-   pure function has_subceiling(self) result(yes)
-      class(rectangular_floor_type), intent(in) :: self
-      logical :: yes
-
-      yes = self%subceiling%thickness > 0.0_wp
-   end function has_subceiling
-
-   !> Positions of the lines along the length that hold the subceiling: those of the joists, or as stated, m: [n_line].
-   pure function get_channels(self, base) result(position)
-      class(rectangular_floor_type), intent(in) :: self
-      type(base_floor_type), intent(in) :: base
-      real(wp), allocatable :: position(:)
-
-      if (allocated(base%stiffness%ribs)) then
-         position = base%stiffness%ribs%position
-      else
-         position = get_spaced_positions(base%plate%width, self%subceiling%channel_spacing)
-      end if
-   end function get_channels
-
-   !> Modes of the floor with another support of its edges.
-   subroutine get_room_modes(self, state, support, plate, modes, error, max_frequency)
-      class(rectangular_floor_type), intent(in) :: self
-      type(floor_state_type), intent(in) :: state
-      character(len=*), intent(in) :: support
-      type(plate_type), intent(out) :: plate
-      type(floor_modes_type), intent(out) :: modes
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), intent(in), optional :: max_frequency
-      type(base_floor_type) :: base
-
-      base = self%get_base()
-      plate = base%plate
-      call get_floor_modes(trim(base%group), get_stack(self, base, support), plate, self%air, modes, error, &
-         max_frequency)
-   end subroutine get_room_modes
-
-   !> Support of the edges.
-   pure function get_support(self) result(support)
-      class(rectangular_floor_type), intent(in) :: self
-      character(len=name_length) :: support
-
-      support = self%support
-   end function get_support
-
-   !> Reduction of the levels in the room by a covering, dB: [n_band].
-   pure function get_improvement(self, n_band) result(improvement)
-      class(rectangular_floor_type), intent(in) :: self
-      integer, intent(in) :: n_band
-      real(wp) :: improvement(n_band)
-      integer :: i
-
-      improvement = 0.0_wp
-      associate (stated => self%covering_improvement)
-         if (stated%count > 0) improvement = [(stated%values(1 + (i - 1)*stated%count/n_band), i=1, n_band)]
-      end associate
-   end function get_improvement
-
    !> Supports of the edges: [4].
-   pure function get_edges(self, support) result(edge)
+   pure function get_edges(self) result(edge)
       class(rectangular_floor_type), intent(in) :: self
-      !> One of `supports`, or `uncoupled_support`.
-      character(len=*), intent(in) :: support
       type(edge_type) :: edge(4)
 
-      select case (support)
-       case (unknown_support, 'simple', uncoupled_support)
+      select case (self%support)
+       case (unknown_support, 'simple')
          edge = edge_type(rigid_support, 0.0_wp)
        case ('clamped')
          edge = edge_type(rigid_support, rigid_support)
@@ -476,48 +314,33 @@ contains
       if (list%count == 4) values = list%values(:4)
    end function get_four
 
-   !> The plate, and its conductance if it were infinite.
-   subroutine get_radiator(self, state, frequency, plate, conductance, error)
-      class(rectangular_floor_type), intent(in) :: self
-      type(floor_state_type), intent(in) :: state
-      real(wp), intent(in) :: frequency(:)
-      type(plate_type), intent(out) :: plate
-      real(wp), intent(out) :: conductance(:)
-      type(error_type), allocatable, intent(out) :: error
-      type(base_floor_type) :: base
-
-      base = self%get_base()
-      plate = base%plate
-      conductance = 1/get_resistance(plate)
-   end subroutine get_radiator
-
    !> Adds the frequency up to which the model is valid: that of the plate, the modes, the subceiling or its cavity.
-   subroutine add_validity(self, base, stack, state)
+   subroutine add_validity(self, stack, state)
       class(rectangular_floor_type), intent(in) :: self
-      type(base_floor_type), intent(in) :: base
       !> The plates above each other.
       type(plate_stack_type), intent(in) :: stack
       type(floor_state_type), intent(inout) :: state
 
-      state%highest_frequency = base%highest_frequency
-      state%validity_reason = base%validity_reason
-      associate (modes => get_mode_limit(stack))
-         if (modes < state%highest_frequency) then
-            state%highest_frequency = modes
-            state%validity_reason = 'the modes of the floor are not resolved, and the mean mobility of the construction ' &
-               //'takes their place'
-         end if
-      end associate
-      if (.not. self%has_subceiling()) return
-      associate (cavity => get_cavity_limit(self%subceiling, self%air), &
-         thin => get_thin_limit(get_subceiling_plate(self%subceiling, base%plate)))
-         if (min(cavity, thin) >= state%highest_frequency) return
-         state%highest_frequency = min(cavity, thin)
-         state%validity_reason = 'the cavity above the subceiling is deeper than a quarter of a wavelength, and no mere ' &
-            //'stiffness'
-         if (thin < cavity) state%validity_reason = &
-            'bending waves are shorter than six thicknesses of the subceiling, and it is not thin'
-      end associate
+      call limit(get_mode_limit(stack), 'the modes of the floor are not resolved, and the mean mobility of the construction ' &
+         //'takes their place')
+      if (.not. self%subceiling%thickness > 0.0_wp) return
+      call limit(get_cavity_limit(self%subceiling, self%air), 'the cavity above the subceiling is deeper than a quarter of ' &
+         //'a wavelength, and no mere stiffness')
+      call limit(get_thin_limit(get_subceiling_plate(self%subceiling, state%plate)), &
+         'bending waves are shorter than six thicknesses of the subceiling, and it is not thin')
+   contains
+
+      !> Lowers the limit.
+      subroutine limit(frequency, reason)
+         !> Frequency, Hz.
+         real(wp), intent(in) :: frequency
+         !> The reason, as the end of a message.
+         character(len=*), intent(in) :: reason
+
+         if (frequency >= state%highest_frequency) return
+         state%highest_frequency = frequency
+         state%validity_reason = reason
+      end subroutine limit
    end subroutine add_validity
 
 end module thud_rectangular_floor

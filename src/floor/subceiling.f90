@@ -9,8 +9,7 @@ module thud_subceiling
    implicit none (type, external)
    private
 
-   public :: get_cavity_limit, get_spaced_positions, get_subceiling_fields, get_subceiling_layer, get_subceiling_plate
-   public :: subceiling_type
+   public :: get_cavity_limit, get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, subceiling_type
 
    !> The subceiling; no thickness means none. The other defaults are those of a gypsum board on resilient channels.
    type :: subceiling_type
@@ -79,17 +78,6 @@ contains
       layer%line_stiffness = subceiling%channel_stiffness
       layer%line_loss_factor = subceiling%channel_loss_factor
    end function get_subceiling_layer
-
-   !> As many positions a distance apart as fit into a width, symmetric about its middle, m: [n].
-   pure function get_spaced_positions(width, spacing) result(position)
-      !> Width and distance, m.
-      real(wp), intent(in) :: width, spacing
-      real(wp), allocatable :: position(:)
-      integer :: i, n
-
-      n = max(1, int(width/spacing*(1 + epsilon(1.0_wp))))
-      position = width/2 + spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
-   end function get_spaced_positions
 
    !> Frequency at which the cavity is a quarter of a wavelength deep, Hz; above it, the air is no mere stiffness.
    pure function get_cavity_limit(subceiling, air) result(frequency)

@@ -205,8 +205,7 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
     count = len(frequency)
     x, y = np.linspace(0, modes["length"], POINTS), np.linspace(0, modes["width"], POINTS)
     points = [coordinate.ravel() for coordinate in np.meshgrid(x, y)]
-    # Fewer functions for the shapes change frequencies a little.
-    highest = frequency[-1] * (1 + 1e-3)
+    highest = frequency[-1] * (1 + 1e-9)
     shapes = ask("floor_modes", case=case, highest=highest, x=points[0], y=points[1])["shape"]
     columns = min(columns, count)
     rows = -(-count // columns)

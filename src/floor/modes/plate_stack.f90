@@ -5,12 +5,13 @@
 module thud_plate_stack
    use thud_constants, only: pi
    use thud_kinds, only: wp
+   use thud_plate, only: get_bending_stiffness, get_surface_mass, plate_type
    implicit none (type, external)
    private
 
    public :: edge_type, layer_type, orthotropic_type, plate_stack_type, ribs_type, rigid_support
-   public :: get_counts, get_degree, get_lines, get_resolved_frequency, get_resolved_part, has_shear, has_sines, &
-      is_uncoupled, with_rigid_edges
+   public :: get_counts, get_degree, get_lines, get_resolved_frequency, get_simplified, get_spaced_positions, has_shear, &
+      has_sines, is_uncoupled, new_orthotropic, with_clamped_edges, with_rigid_edges
 
    !> A spring of this stiffness or more is a rigid support.
    real(wp), parameter :: rigid_support = 1.0e15_wp
@@ -20,6 +21,9 @@ module thud_plate_stack
    integer, parameter :: max_coupled(0:2) = [700, 1100, 1700]
    integer, parameter :: max_half_coupled = 6000, max_uncoupled = 100000
 
+   !> Frequency that the functions of a simplified stack resolve, Hz: above the highest band of a rating.
+   real(wp), parameter :: simplified_limit = 800.0_wp
+
    !> Lowest frequency that functions resolve, Hz: far below all bands; the few waves up to it are resolved by the fewest.
    real(wp), parameter :: min_resolved = 1.0_wp
 
@@ -28,6 +32,9 @@ module thud_plate_stack
 
    !> Longer side of the smallest part of a floor that represents it, m.
    real(wp), parameter :: min_part = 1.0_wp
+
+   !> Poisson's ratio of plates; it affects only edges that are not held.
+   real(wp), parameter :: poisson = 0.2_wp
 
    !> Springs along an edge of a plate.
    type :: edge_type
@@ -87,6 +94,45 @@ module thud_plate_stack
 
 contains
 
+   !> Stiffnesses and mass of a homogeneous thin plate.
+   pure function new_orthotropic(plate) result(thin)
+      type(plate_type), intent(in) :: plate
+      type(orthotropic_type) :: thin
+
+      associate (mean => get_bending_stiffness(plate), root => sqrt(plate%stiffness_ratio))
+         thin%along = mean/root
+         thin%across = mean*root
+         ! H = coupling + 2 torsion.
+         thin%coupling = poisson*plate%torsion_ratio*mean
+         thin%torsion = (1 - poisson)/2*plate%torsion_ratio*mean
+      end associate
+      thin%mass = get_surface_mass(plate)
+      thin%loss_factor = plate%loss_factor
+   end function new_orthotropic
+
+   !> As many positions of lines a distance apart as fit into a width, symmetric about its middle, m: [n].
+   pure function get_spaced_positions(width, spacing, thickness) result(position)
+      !> Width and distance, m.
+      real(wp), intent(in) :: width, spacing
+      !> Thickness of what lies on the lines, m: at an edge itself it would not move.
+      real(wp), intent(in) :: thickness
+      real(wp), allocatable :: position(:)
+      integer :: i, n
+
+      n = max(1, int(width/spacing*(1 + epsilon(1.0_wp))))
+      if (thickness > 0.0_wp .and. (n - 1)*spacing > width - thickness) n = n - 1
+      position = width/2 + spacing*[(i - (n + 1)/2.0_wp, i=1, n)]
+   end function get_spaced_positions
+
+   !> A stack whose bearing plate has clamped edges.
+   pure function with_clamped_edges(stack) result(clamped)
+      type(plate_stack_type), intent(in) :: stack
+      type(plate_stack_type) :: clamped
+
+      clamped = stack
+      clamped%plate(clamped%bearing)%edge = edge_type(rigid_support, rigid_support)
+   end function with_clamped_edges
+
    !> A stack whose stiffest edges are rigid: springs against rotation from 1e7 B/l and against deflection from 1e10 B/l**3
    !> on change frequencies by less than 1e-6, but would be lost in the rounding of the largest stiffness.
    pure function with_rigid_edges(stack) result(held)
@@ -138,16 +184,20 @@ contains
       end function get_all_counts
    end function get_resolved_frequency
 
-   !> The middle of a stack without further supports, as large as functions resolve its waves up to a frequency: as a rule
-   !> all of it.
-   pure function get_resolved_part(stack, frequency) result(part)
+   !> The middle of a stack with simply supported edges and no further supports, as large as functions resolve its waves up
+   !> to the bands of a rating: as a rule all of it.
+   pure function get_simplified(stack) result(part)
       type(plate_stack_type), intent(in) :: stack
-      !> Frequency, Hz.
-      real(wp), intent(in) :: frequency
       type(plate_stack_type) :: part
 
       part = stack
-      do while (get_resolved_frequency(part, frequency) < frequency .and. max(part%length, part%width) > min_part)
+      associate (bearing => part%plate(part%bearing))
+         bearing%edge = edge_type()
+         bearing%line_x = [real(wp) ::]
+         bearing%line_y = [real(wp) ::]
+      end associate
+      do while (get_resolved_frequency(part, simplified_limit) < simplified_limit &
+         .and. max(part%length, part%width) > min_part)
          if (part%length > part%width) then
             part%length = 0.9_wp*part%length
          else
@@ -178,7 +228,7 @@ contains
 
          position = pack(position - cut, position > cut .and. position < cut + part%width)
       end subroutine move
-   end function get_resolved_part
+   end function get_simplified
 
    !> Whether each mode of a stack has one number of half waves along the length and one along the width.
    pure function is_uncoupled(stack) result(yes)
