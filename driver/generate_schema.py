@@ -290,6 +290,8 @@ def python_module(schema: Entry) -> str:
               "LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]]",
               [f"{quoted(source)}: ({', '.join(map(limits_entry, limits))})"
                for source, limits in schema["limits"].items()]),
+        "\n# Verdicts on a criterion, a source or a room.\n",
+        f"VERDICTS = ({', '.join(map(quoted, schema['verdicts']))})\n",
         "\n# Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.\n",
         f"CLASS_LIMITS = {tuple(schema['class_limits'])!r}\n",
         table("Single-number ratings of a level in a room, with symbols, bands and standards.",

@@ -22,8 +22,8 @@ module thud
    use thud_registry, only: model_names
    use thud_run, only: load_case
    use thud_sampling, only: sampling_type
-   use thud_source_limits, only: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, &
-      is_undecided, source_limits_type, source_names
+   use thud_source_limits, only: combine_verdicts, conforms, criterion_type, get_criteria, get_peak_count, get_verdict, &
+      source_names, verdict_conforms, verdict_fails, verdict_names, verdict_undecided
    use thud_source_model, only: source_model_type
    use thud_two_mass, only: two_mass_type
    implicit none (type, external)

@@ -2,7 +2,7 @@
 module thud_floor_answers
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_ascending, only: get_ascending_order
-   use thud_band, only: band_type, find_bands
+   use thud_band, only: band_type, get_bands
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type
    use thud_compute, only: drop_on_floor, prepare_floor
@@ -62,7 +62,7 @@ contains
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> Set if the band set is unknown, or a level cannot be computed.
+      !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       type(floor_state_type) :: state
@@ -70,8 +70,8 @@ contains
       real(wp), allocatable :: energy(:)
 
       call request%get_text('bands', set)
-      call find_bands(set, bands, error)
-      if (.not. allocated(error)) call prepare_floor(case, state, error)
+      bands = get_bands(set)
+      call prepare_floor(case, state, error)
       if (allocated(error)) return
       allocate (energy(size(bands)))
       call get_injected_energies(state%receiver, request%get_array('force'), request%get_number('sample_rate'), bands, &

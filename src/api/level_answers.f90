@@ -1,6 +1,6 @@
 !> Answers on levels and ratings of any record; see `thud_answer`.
 module thud_level_answers
-   use thud_band, only: band_type, find_bands, octave_set
+   use thud_band, only: band_type, get_bands, octave_set
    use thud_bundle, only: bundle_type
    use thud_error, only: error_type
    use thud_force_exposure, only: get_force_exposure_levels
@@ -22,7 +22,7 @@ contains
    subroutine answer_levels(request, bundle, error)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> Set if the band set is unknown, or a level cannot be computed.
+      !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       character(len=:), allocatable :: set, method
@@ -30,8 +30,7 @@ contains
 
       call request%get_text('bands', set)
       call request%get_text('method', method)
-      call find_bands(set, bands, error)
-      if (allocated(error)) return
+      bands = get_bands(set)
       allocate (levels(size(bands)))
       call get_force_exposure_levels(request%get_array('force'), request%get_number('sample_rate'), bands, method, &
          levels, error)

@@ -19,8 +19,8 @@ module thud_compute
    use thud_room, only: room_level_type
    use thud_room_prediction, only: predict_room
    use thud_sampling, only: get_sample_count
-   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, is_undecided, source_limits_type
+   use thud_source_limits, only: combine_verdicts, conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
+      get_verdict, verdict_conforms
    use thud_system, only: is_forked
    use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings, warning_length
    implicit none (type, external)
@@ -228,15 +228,12 @@ contains
       type(assessment_type), intent(out) :: assessment
       !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
-      type(source_limits_type) :: limits
       real(wp), allocatable :: force(:)
       integer :: i
 
       call get_level_bands(case%bands, assessment%bands, assessment%first_band)
       allocate (assessment%level(size(assessment%bands), force_count))
-      call get_source_limits(case%source, limits, error)
       do i = 1, force_count
-         if (allocated(error)) return
          associate (level => assessment%level(:, i), criteria => assessment%criteria(:, i))
             force = history%elastic_force
             if (force_names(i) == 'floor') force = history%floor_force
@@ -248,9 +245,10 @@ contains
             end if
             call get_force_exposure_levels(force, history%sample_rate, assessment%bands, trim(case%level_method), level, &
                error)
+            if (.not. allocated(error)) call get_criteria(case%source, criteria, error)
             if (allocated(error)) return
-            criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
-               get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
+            criteria%value = [level(:octave_count), history%contact_time, history%restitution, &
+               real(get_peak_count(force, history%sample_rate), wp), case%ball%mass, case%drop%height]
             criteria(:octave_count + 2)%error = ieee_value(1.0_wp, ieee_quiet_nan)
             if (history%numerical_error%known) criteria(:octave_count + 2)%error = [history%numerical_error%octave, &
                history%numerical_error%contact_time, history%numerical_error%restitution]
@@ -274,9 +272,7 @@ contains
       !> The assessed force meets all criteria.
       logical :: yes
 
-      associate (criteria => assessment%criteria(:, get_assessed_force(case)))
-         yes = all(conforms(criteria) .and. .not. is_undecided(criteria))
-      end associate
+      yes = combine_verdicts(get_verdict(assessment%criteria(:, get_assessed_force(case)))) == verdict_conforms
    end function is_conforming
 
 end module thud_compute

@@ -14,7 +14,7 @@ module thud_room
    use thud_modal_radiation, only: modal_radiation_type
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
-   use thud_rating, only: find_rated_bands, get_a_weighted_level, get_standardization, rating_names
+   use thud_rating, only: get_a_weighted_level, get_rated_bands, get_standardization, rating_names
    use thud_text, only: to_text
    use thud_transient_energy, only: get_fast_maximum
    implicit none (type, external)
@@ -299,7 +299,7 @@ contains
       !> Never set.
       type(error_type), allocatable, intent(out) :: error
 
-      call find_rated_bands(third_set, bands, error)
+      bands = get_rated_bands(third_set)
    end subroutine get_room_bands
 
    !> Statistical level in the room.
@@ -411,12 +411,11 @@ contains
       type(band_energies_type), intent(in) :: energies(:)
       !> Prediction with statistical levels.
       type(room_level_type), intent(inout) :: prediction
-      type(error_type), allocatable :: error
       real(wp), allocatable :: loss_matrix(:, :), initial_energy(:), weight(:), sums(:)
       real(wp) :: maximum
       integer :: i, j, n, at
 
-      call find_rated_bands(octave_set, prediction%octaves, error)
+      prediction%octaves = get_rated_bands(octave_set)
       n = size(energies(1)%initial_energy)
       allocate (prediction%octave_excess(size(prediction%octaves)))
       sums = get_octave_sums(prediction%level)

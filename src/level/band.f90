@@ -1,12 +1,11 @@
 !> Fractional-octave bands of base 10 (IEC 61260-1) in the range of heavy impacts.
 module thud_band
-   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_text, only: fixed, join_quoted, quoted
+   use thud_text, only: fixed
    implicit none (type, external)
    private
 
-   public :: band_choices, band_set_names, band_type, find_bands, get_band_name, get_bands, get_level_bands, get_octaves
+   public :: band_choices, band_set_names, band_type, get_band_name, get_bands, get_level_bands, get_octaves
    public :: octave_count, octave_set
 
    !> Adjacent bands of one width.
@@ -78,19 +77,6 @@ contains
       bands = pack(all_bands, all_bands%set == name)
    end function get_bands
 
-   !> Bands of a set, or an error.
-   subroutine find_bands(name, bands, error)
-      character(len=*), intent(in) :: name
-      !> The bands, ascending: [n_band].
-      type(band_type), allocatable, intent(out) :: bands(:)
-      !> Set if no set has this name.
-      type(error_type), allocatable, intent(out) :: error
-
-      bands = get_bands(name)
-      if (size(bands) == 0) error = input_error('bands = '//quoted(name)//' is not known; allowed: ' &
-         //join_quoted(band_set_names))
-   end subroutine find_bands
-
    !> Bands of the levels of a case: the octaves, which assessments use, then the other bands of the case.
    pure subroutine get_level_bands(choice, bands, first)
       !> One of `band_choices`.
@@ -108,18 +94,10 @@ contains
    !> Nominal frequency of a band as text: `31.5`, `63`.
    pure function get_band_name(band) result(name)
       type(band_type), intent(in) :: band
-      character(len=len(fixed(band%nominal, get_decimals(band)))) :: name
+      character(len=len(fixed(band%nominal, mod(nint(2*band%nominal), 2)))) :: name
 
-      name = fixed(band%nominal, get_decimals(band))
+      ! Only the half in 31.5 needs a decimal.
+      name = fixed(band%nominal, mod(nint(2*band%nominal), 2))
    end function get_band_name
-
-   !> Number of decimals of a nominal frequency.
-   pure function get_decimals(band) result(decimals)
-      type(band_type), intent(in) :: band
-      !> 0 or 1.
-      integer :: decimals
-
-      decimals = merge(1, 0, abs(band%nominal - nint(band%nominal)) > 0.01_wp)
-   end function get_decimals
 
 end module thud_band

@@ -2,38 +2,23 @@
 !> (ISO 717-2 annex D, KS F 2863-2).
 module thud_rating
    use thud_band, only: band_type, get_bands
-   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_text, only: join_quoted, quoted
    implicit none (type, external)
    private
 
-   public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_class
-   public :: get_inverse_a_rating, get_rounded, get_standardization, rated_set_names, rating_names, rating_titles
+   public :: class_limits, correct_for_background, fast_reverberation, get_a_weighted_level, get_class, get_inverse_a_rating
+   public :: get_rated_bands, get_rounded, get_standardization, rated_set_names, rating_names, rating_titles
 
-   !> Maximum number of bands in a rating.
-   integer, parameter :: max_rated = 12
+   !> Sets of bands that have a rating: [n_set]. One-third-octave bands are not summed into octaves first: the maximum of a sum
+   !> is not the sum of the maxima.
+   character(len=24), parameter :: rated_set_names(*) = [character(len=24) :: 'octave', 'third']
 
-   !> A set of bands that a rating uses.
-   type :: rated_set_type
-      !> Name of the set of bands.
-      character(len=24) :: name
-      !> Nominal mid frequency of the lowest band, Hz.
-      real(wp) :: lowest
-      !> Number of bands.
-      integer :: n_band
-      !> A-weighting as ISO 717-2 annex D rounds it, dB; only the first n_band values are used.
-      real(wp) :: a_weighting(max_rated)
-   end type rated_set_type
+   !> Nominal mid frequency of the lowest one-third-octave band that is rated, Hz.
+   real(wp), parameter :: lowest_rated = 50.0_wp
 
-   !> All sets. One-third-octave bands are not summed into octaves first: the maximum of a sum is not the sum of the maxima.
-   type(rated_set_type), parameter :: rated_sets(*) = [ &
-      rated_set_type('octave', 63.0_wp, 4, [-26.2_wp, -16.2_wp, -8.7_wp, -3.2_wp, spread(0.0_wp, 1, max_rated - 4)]), &
-      rated_set_type('third', 50.0_wp, 12, [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, &
-      -8.7_wp, -6.6_wp, -4.8_wp, -3.2_wp, -1.9_wp])]
-
-   !> Names of the sets: [n_set].
-   character(len=24), parameter :: rated_set_names(*) = rated_sets%name
+   !> A-weighting of the one-third-octave bands 50 to 630 Hz as ISO 717-2 annex D rounds it, dB; those of octaves are the same.
+   real(wp), parameter :: a_weighting(*) = [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, -8.7_wp, &
+      -6.6_wp, -4.8_wp, -3.2_wp, -1.9_wp]
 
    !> Single-number ratings of a prediction: A-weighted maximum levels of octaves or one-third octaves in the room, and of
    !> standardized one-third octaves.
@@ -74,26 +59,16 @@ module thud_rating
 
 contains
 
-   !> Bands that a rating uses.
-   subroutine find_rated_bands(name, bands, error)
+   !> Bands that a rating uses: octaves from 63 Hz, one-third-octave bands from 50 Hz.
+   pure function get_rated_bands(name) result(bands)
       !> One of `rated_set_names`.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
-      type(band_type), allocatable, intent(out) :: bands(:)
-      !> Set if there is no rating in bands of this name.
-      type(error_type), allocatable, intent(out) :: error
-      integer :: at, first
+      type(band_type), allocatable :: bands(:)
 
-      at = findloc(rated_set_names == name, .true., dim=1)
-      if (at == 0) then
-         error = input_error('bands = '//quoted(name)//' is not known; allowed: '//join_quoted(rated_set_names))
-         allocate (bands(0))
-         return
-      end if
       bands = get_bands(name)
-      first = minloc(abs(bands%nominal - rated_sets(at)%lowest), dim=1)
-      bands = bands(first:first + rated_sets(at)%n_band - 1)
-   end subroutine find_rated_bands
+      bands = pack(bands, bands%nominal >= lowest_rated)
+   end function get_rated_bands
 
    !> A-weighted maximum level from the bands of a set (ISO 717-2 annex D), not rounded, dB.
    pure function get_a_weighted_level(name, level) result(total)
@@ -102,10 +77,12 @@ contains
       !> Levels of its rated bands, dB: [n_band].
       real(wp), intent(in) :: level(:)
       real(wp) :: total
-      integer :: at
 
-      at = findloc(rated_set_names == name, .true., dim=1)
-      total = 10*log10(sum(10**((level + rated_sets(at)%a_weighting(:size(level)))/10)))
+      if (name == 'octave') then
+         total = 10*log10(sum(10**((level + a_weighting(2::3))/10)))
+      else
+         total = 10*log10(sum(10**((level + a_weighting)/10)))
+      end if
    end function get_a_weighted_level
 
    !> A single number as it is stated: rounded, halves upwards.

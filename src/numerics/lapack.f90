@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgbsv, dgeev, dgels, dgemm, dgetf2, dgetrs, dposv, dpotrf, dpstrf, dstevr
+   public :: dgbsv, dgeev, dgels, dgemm, dgesvd, dgetf2, dgetrs, dposv, dpotrf, dpstrf
    public :: dsygvd, dsygvx, dtrsm, zgeev
 
    interface
@@ -89,20 +89,16 @@ module thud_lapack
          real(wp), intent(inout) :: c(ldc, *)
       end subroutine dgemm
 
-      !> Some eigenvectors of a symmetric tridiagonal matrix.
-      pure subroutine dstevr(jobz, range, n, d, e, vl, vu, il, iu, abstol, m, w, z, ldz, isuppz, work, lwork, iwork, &
-         liwork, info)
+      !> Singular value decomposition.
+      pure subroutine dgesvd(jobu, jobvt, m, n, a, lda, s, u, ldu, vt, ldvt, work, lwork, info)
          import :: wp
          implicit none (type, external)
-         character(len=1), intent(in) :: jobz, range
-         integer, intent(in) :: n, il, iu, ldz, lwork, liwork
-         real(wp), intent(in) :: vl, vu, abstol
-         real(wp), intent(inout) :: d(*), e(*)
-         integer, intent(out) :: m, info
-         integer, intent(out) :: isuppz(*), iwork(*)
-         real(wp), intent(out) :: w(*), work(*)
-         real(wp), intent(inout) :: z(ldz, *)
-      end subroutine dstevr
+         character(len=1), intent(in) :: jobu, jobvt
+         integer, intent(in) :: m, n, lda, ldu, ldvt, lwork
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(out) :: s(*), u(ldu, *), vt(ldvt, *), work(*)
+         integer, intent(out) :: info
+      end subroutine dgesvd
 
       !> Least squares.
       pure subroutine dgels(trans, m, n, nrhs, a, lda, b, ldb, work, lwork, info)

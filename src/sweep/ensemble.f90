@@ -5,8 +5,8 @@
 !> own column in arrays of fixed shape. A sample that has no result here is left to the solver of single drops.
 module thud_ensemble
    use thud_band, only: band_type, octave_count
-   use thud_band_projection, only: band_projection_type, get_band_energies, get_window_length, get_window_index, &
-      is_projection_fast, new_band_projection
+   use thud_band_projection, only: band_projection_type, get_band_energies, get_window_index, get_window_length, &
+      new_band_projection
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type
    use thud_constants, only: reference_force, reference_time
@@ -134,7 +134,7 @@ contains
    end subroutine set_projections
 
    !> Quantities, levels and verdicts of one block of samples, and their forces.
-   subroutine solve_drops(samples, sampling, criteria, with_levels, projections, force, folded, block)
+   subroutine solve_drops(samples, sampling, criteria, with_levels, projections, force, block)
       !> The samples, with the same choice of the flux term: [n_sample].
       type(sample_type), intent(in) :: samples(:)
       type(sampling_type), intent(in) :: sampling
@@ -146,8 +146,6 @@ contains
       type(projections_type), intent(inout) :: projections
       !> Elastic forces, then forces on the floor, N: [force_count block_size, length of the longest window].
       real(wp), intent(inout) :: force(force_count*block_size, get_window_length(size(projections%window)))
-      !> Workspace of the same shape.
-      real(wp), intent(inout) :: folded(:, :)
       type(block_result_type), intent(out) :: block
       type(sample_outcome_type) :: outcomes(size(samples))
       type(criterion_type) :: tested(size(criteria))
@@ -170,7 +168,7 @@ contains
       force(:, block%n_written + 1:get_window_length(max(1, maxval(window_index)))) = 0.0_wp
       ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
       do window = minval(window_index, mask=window_index > 0), maxval(window_index)
-         if (any(window_index == window)) call set_levels(projections, window, window_index == window, force, folded, block)
+         if (any(window_index == window)) call set_levels(projections, window, window_index == window, force, block)
       end do
       tested = criteria
       do i = 1, size(samples)
@@ -189,7 +187,7 @@ contains
 
    !> Levels of all samples with the same window; none is computed if the matrices of the window would take too long or
    !> LAPACK fails.
-   subroutine set_levels(projections, window, chosen, force, folded, block)
+   subroutine set_levels(projections, window, chosen, force, block)
       type(projections_type), intent(inout) :: projections
       !> Index of the window.
       integer, intent(in) :: window
@@ -197,7 +195,6 @@ contains
       logical, intent(in) :: chosen(:)
       !> Forces, N: [force_count block_size, n_time].
       real(wp), intent(in), contiguous :: force(:, :)
-      real(wp), intent(inout), contiguous :: folded(:, :)
       !> The block; only levels and `computed` of chosen samples are written.
       type(block_result_type), intent(inout) :: block
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
@@ -206,15 +203,13 @@ contains
 
       !$omp critical (thud_projections)
       associate (projection => projections%window(window), length => get_window_length(window))
-         if (projection%n_sample == 0 .and. is_projection_fast(length, projections%sample_rate, projections%bands)) then
-            call new_band_projection(length, projections%sample_rate, projections%bands, projection)
-         end if
+         if (projection%n_sample == 0) call new_band_projection(length, projections%sample_rate, projections%bands, projection)
          has_matrices = projection%n_sample > 0
       end associate
       !$omp end critical (thud_projections)
       where (chosen) block%computed(:size(chosen)) = has_matrices
       if (.not. has_matrices) return
-      call get_band_energies(projections%window(window), force_count*block_size, force, folded, energy, square_sum)
+      call get_band_energies(projections%window(window), force, energy, square_sum)
       do i = 1, size(chosen)
          if (.not. chosen(i)) cycle
          do j = 1, force_count

@@ -26,8 +26,7 @@ module thud_sweep
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count
    use thud_shell_samples, only: block_size, get_blocks, sample_type
-   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_source_limits, &
-      source_limits_type
+   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -376,15 +375,13 @@ contains
       !> Set if the sampling is invalid, its records do not fit into memory, the source is unknown, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(sample_type) :: samples(size(values, 2))
-      type(source_limits_type) :: limits
       type(criterion_type) :: criteria(criterion_count)
       logical :: valid(size(values, 2))
       integer, allocatable :: order(:), first(:)
 
       call check_sampling(case%sampling, error)
-      if (.not. allocated(error)) call get_source_limits(case%source, limits, error)
+      if (.not. allocated(error)) call get_criteria(case%source, criteria, error)
       if (allocated(error)) return
-      criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
       call fill_samples(case, columns, values, samples)
       call get_blocks(samples, valid, order, first)
       sweep%status = 1
@@ -398,7 +395,7 @@ contains
       subroutine solve_blocks()
          type(block_result_type) :: block
          type(error_type), allocatable :: thread_error
-         real(wp), allocatable :: force(:), folded(:, :)
+         real(wp), allocatable :: force(:)
          character(len=128) :: message
          integer :: i, n_row, n_time, start, status
 
@@ -406,7 +403,6 @@ contains
          n_row = force_count*block_size
          n_time = get_window_length(size(sweep%projections%window))
          allocate (force(n_row*n_time + line_length), stat=status, errmsg=message)
-         if (status == 0) allocate (folded(n_row, n_time), stat=status, errmsg=message)
          if (status /= 0) then
             thread_error = input_error('&sampling: duration = '//to_text(case%sampling%duration) &
                //' s at sample_rate = '//to_text(case%sampling%sample_rate)//' Hz gives the forces of ' &
@@ -420,7 +416,7 @@ contains
             if (allocated(thread_error)) cycle
             associate (indices => order(first(i):first(i + 1) - 1))
                call solve_drops(samples(indices), case%sampling, criteria, sweep%levels, sweep%projections, force(start), &
-                  folded, block)
+                  block)
                call store_block(case, criteria, indices, force(start), block, sweep)
             end associate
          end do

@@ -1174,6 +1174,9 @@ LIMITS: dict[LimitsSource, tuple[tuple[str, str, float, float], ...]] = {
     "tyre": (("octave_31_5", "dB", 46.0, 48.0), ("octave_63", "dB", 38.5, 41.5), ("octave_125", "dB", 20.5, 23.5), ("octave_250", "dB", 9.5, 13.5), ("octave_500", "dB", 3.5, 7.5), ("contact_time", "s", 0.018, 0.022), ("restitution", "", 0.7, 0.9), ("peak_count", "", 1.0, 1.0), ("mass", "kg", 7.1, 7.5), ("drop_height", "m", 0.84, 0.86)),
 }
 
+# Verdicts on a criterion, a source or a room.
+VERDICTS = ("conforms", "does not conform", "undecided")
+
 # Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.
 CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import ask
-from thud.base.checks import require_pair
+from thud.base.checks import require_choice, require_pair
 from thud.base.extras import require_extra
 from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact, impact_fields
 from thud.impact.mobility import mobility
 from thud.impact.quantities import FLOOR_QUANTITIES
-from thud.level.levels import force_exposure_levels
+from thud.level.levels import BANDWIDTHS, force_exposure_levels
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,6 +103,7 @@ class FloorImpact(Impact):
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
         """Return the energy that the force transfers to the floor, in bands."""
+        require_choice("bands", bands, BANDWIDTHS)
         answer = ask(
             "floor_energy", case=case_text(Case(floor=self.floor)), bands=bands,
             force=self.floor_force, sample_rate=self.sample_rate,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import LIMITS, QUANTITIES
+from thud.base._schema import LIMITS, QUANTITIES, VERDICTS
 from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
 
-VERDICTS = ("conforms", "does not conform", "undecided")
 _MAX_PEAKS = 2**31
 _BISECTIONS = 40
 _SPREAD_COLUMNS = (

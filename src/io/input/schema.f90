@@ -1,7 +1,7 @@
 !> Keys, models and results as JSON for other programs. Modules of the Python package and the key reference are generated
 !> from it.
 module thud_schema
-   use thud_band, only: band_set_names, band_type, get_bands, octave_count
+   use thud_band, only: band_set_names, band_type, get_bands
    use thud_case, only: case_type, get_active_fields, get_fields, new_case, set_standard_modulus
    use thud_constants, only: version
    use thud_error, only: error_type
@@ -9,10 +9,9 @@ module thud_schema
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_quantities, only: history_quantity_count, quantities, quantity_type, sample_quantity_count
-   use thud_rating, only: class_limits, find_rated_bands, rated_set_names, rating_names, rating_titles
+   use thud_rating, only: class_limits, get_rated_bands, rated_set_names, rating_names, rating_titles
    use thud_registry, only: floor_names, model_names
-   use thud_source_limits, only: criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type, &
-      source_names
+   use thud_source_limits, only: criterion_count, criterion_type, get_criteria, source_names, verdict_names
    use thud_text, only: join, newline, to_text
    implicit none (type, external)
    private
@@ -28,7 +27,6 @@ contains
       type(case_type), target :: case
       type(field_type), allocatable :: fields(:)
       type(band_type), allocatable :: bands(:)
-      type(error_type), allocatable :: error
       character(len=:), allocatable :: entry
       integer :: i
 
@@ -36,7 +34,7 @@ contains
       allocate (fields, source=get_fields(case))
       text = '{"version": '//text_value(version)//','//newline//'"models": '//list_of(model_names)//','//newline &
          //'"floors": '//list_of(floor_names)//','//newline//'"sources": '//list_of(source_names)//','//newline &
-         //'"band_sets": {'
+         //'"verdicts": '//list_of(verdict_names)//','//newline//'"band_sets": {'
       do i = 1, size(band_set_names)
          bands = get_bands(band_set_names(i))
          text = text//newline//text_value(band_set_names(i))//': {"nominal": ['//join(bands%nominal)//'], "center": [' &
@@ -45,7 +43,7 @@ contains
       end do
       text = text//'},'//newline//'"rated_bands": {'
       do i = 1, size(rated_set_names)
-         call find_rated_bands(rated_set_names(i), bands, error)
+         bands = get_rated_bands(rated_set_names(i))
          text = text//newline//text_value(rated_set_names(i))//': ['//join(bands%nominal)//']' &
             //trim(merge(',', ' ', i < size(rated_set_names)))
       end do
@@ -106,13 +104,11 @@ contains
       character(len=*), intent(in) :: source
       !> A JSON member.
       character(len=:), allocatable, intent(out) :: text
-      type(source_limits_type) :: limits
       type(criterion_type) :: criteria(criterion_count)
       type(error_type), allocatable :: error
       integer :: i
 
-      call get_source_limits(source, limits, error)
-      criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 0, 0.0_wp, 0.0_wp)
+      call get_criteria(source, criteria, error)
       text = text_value(source)//': ['
       do i = 1, criterion_count
          text = text//'{"name": '//text_value(criteria(i)%name)//', "unit": '//text_value(criteria(i)%unit)//', "lower": ' &

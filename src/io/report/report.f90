@@ -9,13 +9,13 @@ module thud_report
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
-   use thud_source_limits, only: conforms, criterion_type, is_undecided
+   use thud_source_limits, only: combine_verdicts, criterion_type, get_verdict, verdict_conforms, verdict_fails, verdict_names
    use thud_text, only: join, join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
    public :: get_model_histories_csv, get_model_quantities, get_force_csv, get_levels_csv, get_quantity_lines
-   public :: get_summary, get_verdict, get_verdict_word, line
+   public :: get_summary, get_verdict_word, line
 
 contains
 
@@ -119,13 +119,13 @@ contains
          //line('level_force', quoted(case%level_force), '') &
          //line('conforms', trim(merge('.true. ', '.false.', is_conforming(case, assessment))), '')
       associate (criteria => assessment%criteria(:, get_assessed_force(case)))
-         text = text//line('result', quoted(get_verdict(criteria)), '') &
+         text = text//line('result', quoted(verdict_names(combine_verdicts(get_verdict(criteria)))), '') &
             //line('criterion', join_quoted(criteria%name), '') &
             //line('unit', join_quoted(criteria%unit), '') &
             //line('value', join(criteria%value), '') &
             //line('lower', join(criteria%lower), '') &
             //line('upper', join(criteria%upper), '') &
-            //line('met', join(merge('.true. ', '.false.', conforms(criteria) .and. .not. is_undecided(criteria))), '')
+            //line('met', join(merge('.true. ', '.false.', get_verdict(criteria) == verdict_conforms)), '')
          if (history%numerical_error%known) text = text//line('numerical_error', join(criteria%error), '')
          text = text//'/'//newline
       end associate
@@ -165,31 +165,14 @@ contains
       text = text//'/'//newline//newline
    end function get_model_quantities
 
-   !> Verdict on all values: `conforms`, `does not conform`, or `undecided` by their numerical errors.
-   pure function get_verdict(criteria) result(word)
-      !> The criteria: [criterion_count].
-      type(criterion_type), intent(in) :: criteria(:)
-      character(len=:), allocatable :: word
-
-      if (any(.not. conforms(criteria) .and. .not. is_undecided(criteria))) then
-         word = 'does not conform'
-      else
-         word = trim(merge('undecided', 'conforms ', any(is_undecided(criteria))))
-      end if
-   end function get_verdict
-
    !> Verdict on one value: `conforms`, `too low` or `too high`, or `undecided` by its numerical error.
    function get_verdict_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
       character(len=:), allocatable :: word
 
-      if (is_undecided(criterion)) then
-         word = 'undecided'
-      else if (conforms(criterion)) then
-         word = 'conforms'
-      else
-         word = trim(merge('too low ', 'too high', criterion%value < criterion%lower))
-      end if
+      word = trim(verdict_names(get_verdict(criterion)))
+      if (get_verdict(criterion) == verdict_fails) word = trim(merge('too low ', 'too high', &
+         criterion%value < criterion%lower))
    end function get_verdict_word
 
    !> One line of a namelist group.

@@ -13,8 +13,9 @@ module thud_table
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count, show
    use thud_refined_drop, only: finer_prefix, finer_quantities, resolution_quantities
-   use thud_report, only: get_verdict, get_verdict_word
-   use thud_source_limits, only: conforms, criterion_type, is_undecided
+   use thud_report, only: get_verdict_word
+   use thud_source_limits, only: combine_verdicts, criterion_type, get_verdict, verdict_conforms, verdict_names, &
+      verdict_undecided
    use thud_text, only: fixed, flush_right, newline, padded, replaced, screen_width, significant, to_text
    implicit none (type, external)
    private
@@ -38,6 +39,7 @@ contains
       character(len=:), allocatable :: resolution
       real(wp) :: values(history_quantity_count)
       character(len=:), allocatable :: verdict, undecided
+      integer, allocatable :: verdicts(:)
       integer :: i, assessed, other
 
       assessed = get_assessed_force(case)
@@ -49,6 +51,7 @@ contains
          screen_width - len(text))
       text = text//newline
       associate (criteria => assessment%criteria(:, assessed))
+         verdicts = get_verdict(criteria)
          do i = 1, octave_count
             text = text//level_row(i, criteria(i))
          end do
@@ -75,21 +78,20 @@ contains
          do i = 1, octave_count
             associate (error => history%numerical_error%octave(i))
                if (.not. history%numerical_error%known) exit
-               if (error > shown_error .or. is_undecided(criteria(i))) text = text//row('error at ' &
+               if (error > shown_error .or. verdicts(i) == verdict_undecided) text = text//row('error at ' &
                   //get_band_name(assessment%bands(i))//' Hz', fixed(error, 2), 'dB')
             end associate
          end do
          if (.not. history%numerical_error%known) text = text//row('numerical error', 'unknown', '')
          text = text//get_verification_rows(history)//newline
-         verdict = 'the source '//get_verdict(criteria)
+         verdict = 'the source '//trim(verdict_names(combine_verdicts(verdicts)))
+         if (combine_verdicts(verdicts) == verdict_undecided) verdict = 'it is undecided whether the source conforms'
          undecided = ''
-         if (any(is_undecided(criteria))) then
-            undecided = '; '//to_text(count(is_undecided(criteria)))//' undecided by the numerical error'
-            if (get_verdict(criteria) == 'undecided') verdict = 'it is undecided whether the source conforms'
-         end if
+         if (any(verdicts == verdict_undecided)) undecided = '; '//to_text(count(verdicts == verdict_undecided)) &
+            //' undecided by the numerical error'
          text = text//'  With these values '//verdict//' to the limits of the ' &
             //replaced(trim(case%source), '_', ' ')//': it meets ' &
-            //to_text(count(conforms(criteria) .and. .not. is_undecided(criteria)))//' of '//to_text(size(criteria)) &
+            //to_text(count(verdicts == verdict_conforms))//' of '//to_text(size(criteria)) &
             //' criteria'//undecided//'.'//newline &
             //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
       end associate
