@@ -1,11 +1,10 @@
 !> Classical fourth-order Runge-Kutta steps for any system of ordinary differential equations.
 module thud_rk4
    use thud_kinds, only: wp
-   use thud_zero_search, only: bisection_type
    implicit none (type, external)
    private
 
-   public :: longest_valid, ode_type, rk4_step
+   public :: ode_type, rk4_step
 
    !> A first-order system of ordinary differential equations.
    type, abstract :: ode_type
@@ -59,27 +58,5 @@ contains
       if (.not. valid) return
       new_state = state + step/6*(k1 + 2*(k2 + k3) + k4)
    end subroutine rk4_step
-
-   !> Longest step that stays in the domain of the equations, by bisection to rounding.
-   pure function longest_valid(ode, time, state, step) result(length)
-      class(ode_type), intent(in) :: ode
-      !> Time at the beginning of the step.
-      real(wp), intent(in) :: time
-      !> State at the beginning, inside the domain: [n_state].
-      real(wp), intent(in) :: state(:)
-      !> Length of a step that leaves the domain.
-      real(wp), intent(in) :: step
-      real(wp) :: length
-      type(bisection_type) :: bracket
-      real(wp) :: new_state(size(state))
-      logical :: valid
-
-      bracket%right = step
-      do while (bracket%is_open())
-         call rk4_step(ode, time, state, bracket%get_middle(), new_state, valid)
-         call bracket%halve(valid)
-      end do
-      length = bracket%left
-   end function longest_valid
 
 end module thud_rk4

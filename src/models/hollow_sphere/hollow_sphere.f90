@@ -242,9 +242,9 @@ contains
          error = coarse_step_error('a step ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses, ' &
-         //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*state(at_deflection), 2) &
-         //' mm; allowed: less than its height, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
+      error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses ' &
+         //fixed(1.0e3_wp*time, 3)//' ms after first touch; allowed: a deflection of less than its height, ' &
+         //fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
    end function get_failure
 
    !> Force history of one drop.

@@ -79,8 +79,6 @@ module thud_coupled_step
       real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
       !> State relative to the floor at the stages, and its rate: [n_state, n_stage].
       real(wp), allocatable :: state(:, :), rate(:, :)
-      !> Derivatives of the rate with respect to displacements and velocities: [n_state, 2*n_mass, n_stage].
-      real(wp), allocatable :: derivative(:, :, :)
    end type trial_type
 
 contains
@@ -119,16 +117,14 @@ contains
       allocate (trial%force(n_stage), source=start%force)
       trial%time = time + stages%interval*radau_node
       trial%acceleration = spread(start%acceleration, 1, n_stage)
-      allocate (trial%state(source%n_state, n_stage), trial%rate(source%n_state, n_stage), &
-         trial%derivative(source%n_state, 2*source%n_mass, n_stage), source=0.0_wp)
+      allocate (trial%state(source%n_state, n_stage), trial%rate(source%n_state, n_stage), source=0.0_wp)
       call get_free_motion(stages, start%receiver_motion, trial%free_velocity, trial%free_displacement)
       converged = .false.
       do iteration = 1, max_iterations
          call evaluate_stages(source, stages, start, trial, valid)
          if (.not. valid) return
          if (mod(iteration, max_reuse) == 1) then
-            call differentiate(source, stages%interval, scale, trial)
-            call set_matrix(source, stages, trial, matrix)
+            call set_matrix(source, stages, scale, trial, matrix)
             call dgetf2(n, n, matrix, n, pivot, info)
             if (info /= 0) return
          end if
@@ -184,29 +180,6 @@ contains
       end associate
    end subroutine evaluate_stages
 
-   !> Derivatives of the rate of the source's state, by finite differences.
-   pure subroutine differentiate(source, interval, scale, trial)
-      class(contact_source_type), intent(in) :: source
-      !> Length of the step, s; scale of velocities, m/s.
-      real(wp), intent(in) :: interval, scale
-      type(trial_type), intent(inout) :: trial
-      real(wp) :: moved(source%n_state), rate(source%n_state)
-      real(wp) :: length
-      integer :: i, j
-      logical :: valid
-
-      do i = 1, n_stage
-         do j = 1, 2*source%n_mass
-            length = difference*merge(abs(trial%state(j, i)) + scale*interval, scale, mod(j, 2) == 1)
-            moved = trial%state(:, i)
-            ! Towards smaller values, because smaller deflections stay inside the domain.
-            moved(j) = moved(j) - length
-            call get_rate(source, trial%time(i), moved, rate, valid)
-            trial%derivative(:, j, i) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
-         end do
-      end do
-   end subroutine differentiate
-
    !> Accelerations, force and loss of the source, all zero for a single mass in flight.
    pure subroutine get_rate(source, time, state, rate, valid)
       class(contact_source_type), intent(in) :: source
@@ -253,45 +226,53 @@ contains
    end function get_cap_mass
 
    !> Derivative of the negative residual with respect to the unknowns.
-   pure subroutine set_matrix(source, stages, trial, matrix)
+   pure subroutine set_matrix(source, stages, scale, trial, matrix)
       class(contact_source_type), intent(in) :: source
       type(receiver_stages_type), intent(in) :: stages
+      !> Scale of velocities, m/s.
+      real(wp), intent(in) :: scale
       type(trial_type), intent(in) :: trial
       !> The derivative: [n_unknown, n_unknown].
       real(wp), intent(out) :: matrix(:, :)
-      real(wp), dimension(n_stage, 2) :: by_force, by_acceleration
+      ! Derivatives of the rate with respect to displacements and velocities, and of these with respect to the unknowns.
+      real(wp) :: by_state(source%n_state, 2*source%n_mass), state_by_unknown(2*source%n_mass, size(matrix, 2))
+      real(wp) :: moved(source%n_state), rate(source%n_state)
       real(wp) :: floor_acceleration_by_force(n_stage, n_stage), cap_mass(n_stage)
-      real(wp) :: slope
-      integer :: i, j, k, row, column, kind, index
+      real(wp) :: length
+      integer :: i, j, k
+      logical :: valid
 
-      matrix = 0.0_wp
       cap_mass = get_cap_mass(source, trial)
       floor_acceleration_by_force = matmul(radau_derivative, stages%velocity)/stages%interval
       do i = 1, n_stage
-         ! Derivatives of relative displacement and velocity at this stage.
-         by_force = -reshape([stages%displacement(i, :), stages%velocity(i, :)], [n_stage, 2])
-         by_acceleration = reshape([stages%interval**2*second_integral(i, :), stages%interval*radau_integral(i, :)], &
-            [n_stage, 2])
-         do k = 0, source%n_mass
-            ! k = 0 is the balance of the forces on the cap; k > 0 is the equation of motion of mass k.
-            row = k*n_stage + i
-            index = merge(2*source%n_mass + 1, 2*k, k == 0)
-            matrix(row, row) = 1.0_wp
-            do j = 1, 2*source%n_mass
-               ! Component j of the state is the displacement (kind 1) or the velocity (kind 2) of mass (j + 1)/2.
-               slope = trial%derivative(index, j, i)
-               ! The mass of the cap grows with the deflection.
-               if (k == 0 .and. j == 1 .and. cap_mass(i) > 0.0_wp) then
-                  slope = slope - source%cap_mass_per_deflection*trial%floor_acceleration(i)
-               end if
-               column = (j + 1)/2*n_stage
-               kind = 2 - mod(j, 2)
-               matrix(row, :n_stage) = matrix(row, :n_stage) - slope*by_force(:, kind)
-               matrix(row, column + 1:column + n_stage) = matrix(row, column + 1:column + n_stage) &
-                  - slope*by_acceleration(:, kind)
-            end do
+         do j = 1, 2*source%n_mass
+            length = difference*merge(abs(trial%state(j, i)) + scale*stages%interval, scale, mod(j, 2) == 1)
+            moved = trial%state(:, i)
+            ! Towards smaller values, because smaller deflections stay inside the domain.
+            moved(j) = moved(j) - length
+            call get_rate(source, trial%time(i), moved, rate, valid)
+            by_state(:, j) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
          end do
+         state_by_unknown = 0.0_wp
+         do k = 1, source%n_mass
+            state_by_unknown(2*k - 1, :n_stage) = -stages%displacement(i, :)
+            state_by_unknown(2*k, :n_stage) = -stages%velocity(i, :)
+            associate (by_acceleration => state_by_unknown(:, k*n_stage + 1:(k + 1)*n_stage))
+               by_acceleration(2*k - 1, :) = stages%interval**2*second_integral(i, :)
+               by_acceleration(2*k, :) = stages%interval*radau_integral(i, :)
+            end associate
+         end do
+         associate (force => 2*source%n_mass + 1)
+            ! The mass of the cap grows with the deflection.
+            if (cap_mass(i) > 0.0_wp) by_state(force, 1) = by_state(force, 1) &
+               - source%cap_mass_per_deflection*trial%floor_acceleration(i)
+            ! The balance of the forces on the cap, then the equations of motion of the masses.
+            matrix(i::n_stage, :) = -matmul(by_state([force, (2*k, k=1, source%n_mass)], :), state_by_unknown)
+         end associate
          matrix(i, :n_stage) = matrix(i, :n_stage) + cap_mass(i)*floor_acceleration_by_force(i, :)
+      end do
+      do i = 1, size(matrix, 1)
+         matrix(i, i) = matrix(i, i) + 1
       end do
    end subroutine set_matrix
 

@@ -12,7 +12,7 @@ module thud_lumped
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_receiver, only: can_strike, get_receiver_velocity, is_rigid, new_receiver_motion, receiver_type
-   use thud_rk4, only: longest_valid, rk4_step
+   use thud_rk4, only: rk4_step
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_text, only: fixed, to_text
    use thud_zero_search, only: advance_search, is_converged, new_zero_search, update_bracket, zero_search_type
@@ -204,18 +204,12 @@ contains
       type(force_history_type), intent(inout) :: history
       !> Set if the equations fail or the step has too many events.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: remaining, longest
+      real(wp) :: remaining
       integer :: k, event
-      logical :: valid
 
       remaining = step
       do k = 1, max_events
-         call take_step(remaining, impact, valid, error)
-         if (.not. valid) then
-            longest = longest_valid(impact%source, impact%time, impact%motion%state, remaining)
-            call rk4_step(impact%source, impact%time, impact%motion%state, longest, impact%end%state, valid)
-            error = impact%source%get_failure(impact%drop, impact%time + longest, impact%end%state)
-         end if
+         call take_step(remaining, impact, error)
          if (allocated(error)) return
          event = get_event(impact)
          if (event == no_event) then
@@ -243,39 +237,34 @@ contains
       !> Set if the equations fail.
       type(error_type), allocatable, intent(out) :: error
       type(zero_search_type) :: search
-      logical :: valid
 
       search = new_zero_search(get_event_function(impact%source, event, impact%motion), remaining, &
          get_event_function(impact%source, event, impact%end))
       do while (.not. is_converged(search))
          call advance_search(search)
-         call take_step(search%trial, impact, valid, error)
+         call take_step(search%trial, impact, error)
          if (allocated(error)) return
          call update_bracket(search, get_event_function(impact%source, event, impact%end))
       end do
-      call take_step(search%right, impact, valid, error)
+      call take_step(search%right, impact, error)
       if (allocated(error)) return
       call accept_step(search%right, impact)
       remaining = remaining - search%right
    end subroutine go_to_event
 
    !> Sets `impact%end`, the motion after a whole or shortened step.
-   subroutine take_step(length, impact, valid, error)
+   subroutine take_step(length, impact, error)
       !> Length of this step, s.
       real(wp), intent(in) :: length
       type(impact_type), intent(inout) :: impact
-      !> False if the step leaves the domain of the equations on a rigid floor; then the end is the present motion.
-      logical, intent(out) :: valid
-      !> Set if a step on a mobile floor leaves the domain or cannot be solved.
+      !> Set if the step leaves the domain of the equations or cannot be solved.
       type(error_type), allocatable, intent(out) :: error
       logical :: inside, converged
 
-      valid = .true.
+      converged = .true.
       if (.not. impact%is_mobile) then
-         call rk4_step(impact%source, impact%time, impact%motion%state, length, impact%end%state, valid)
-         return
-      end if
-      if (length < impact%stages%interval) then
+         call rk4_step(impact%source, impact%time, impact%motion%state, length, impact%end%state, inside)
+      else if (length < impact%stages%interval) then
          call take_coupled_step(impact%source, new_receiver_stages(impact%receiver, length), impact%time, &
             impact%velocity_scale, impact%motion, impact%end, inside, converged)
       else

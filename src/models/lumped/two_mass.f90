@@ -13,7 +13,7 @@ module thud_two_mass
    use thud_lumped, only: solve_lumped
    use thud_new_field, only: real_field
    use thud_receiver, only: is_rigid, receiver_type
-   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -30,8 +30,8 @@ module thud_two_mass
    !> the energy, 4e-11 per radian of motion; on a mobile floor (Radau IIA) angle**6/3600, 3e-9 per radian.
    real(wp), parameter :: step_angle = 0.02_wp, coupled_angle = 0.1_wp
 
-   !> Maximum number of steps of one record; more would take longer than finite elements, and a tyre needs 1e4.
-   real(wp), parameter :: max_steps = 2.0e7_wp
+   !> Maximum number of steps of the tyre in a step of the input.
+   real(wp), parameter :: max_refinement = 1.0e4_wp
 
    !> Deflection d0 at which the carcass stiffness is given, m.
    real(wp), parameter :: carcass_deflection = 0.02_wp
@@ -131,11 +131,19 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(tyre_type) :: tyre
       type(sampling_type) :: finer
+      real(wp) :: refinement
 
       tyre = new_tyre(ball%mass, self)
       finer = sampling
-      call choose_steps(tyre, get_impact_velocity(drop), merge(step_angle, coupled_angle, is_rigid(receiver)), finer, error)
-      if (allocated(error)) return
+      refinement = get_fastest_rate(tyre, get_impact_velocity(drop)) &
+         /(merge(step_angle, coupled_angle, is_rigid(receiver))*sampling%sample_rate)
+      if (refinement > max_refinement) then
+         error = input_error('&two_mass: belt_mass = '//to_text(self%belt_mass)//' kg with the stiffness of patch and ' &
+            //'sidewall needs '//to_text(refinement)//' steps per step of the input; allowed: up to ' &
+            //to_text(max_refinement))
+         return
+      end if
+      finer%substeps = sampling%substeps*ceiling(refinement)
       call solve_lumped(tyre, drop, finer, [character(len=14) :: 'pressure_force', 'carcass_force', 'damping_force'], &
          history, error, receiver, [character(len=19) :: 'belt_displacement_m', 'rim_displacement_m'])
       ! There is no flux of momentum: the "elastic" force is the whole force, including damping.
@@ -159,28 +167,6 @@ contains
          sidewall_stiffness=options%belt_mass*omega**2, &
          sidewall_damping=2*options%belt_damping*options%belt_mass*omega)
    end function new_tyre
-
-   !> Chooses the steps per sampling interval from the fastest rate of the motion.
-   subroutine choose_steps(tyre, impact_velocity, angle, sampling, error)
-      type(tyre_type), intent(in) :: tyre
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
-      !> Angle by which the fastest motion advances in a step, rad.
-      real(wp), intent(in) :: angle
-      !> The sampling; its substeps are raised.
-      type(sampling_type), intent(inout) :: sampling
-      !> Set if the record would take too many steps.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: steps, total
-
-      steps = real(sampling%substeps, wp)*ceiling(min(max_steps, &
-         get_fastest_rate(tyre, impact_velocity)/(angle*sampling%sample_rate)))
-      total = steps*get_sample_count(sampling)
-      sampling%substeps = nint(min(steps, max_steps))
-      if (total > max_steps) error = input_error('&two_mass: belt_mass = '//to_text(tyre%belt_mass) &
-         //' kg with the stiffness of patch and sidewall needs '//to_text(total)//' steps; allowed: up to ' &
-         //to_text(max_steps))
-   end subroutine choose_steps
 
    !> Upper bound of the fastest rate of the motion, rad/s: of natural frequencies (by the trace) and of decay rates.
    pure function get_fastest_rate(tyre, impact_velocity) result(rate)
