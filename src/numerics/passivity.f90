@@ -1,9 +1,10 @@
 !> Passivity of a rational mobility or admittance: its real part must not be negative at any frequency.
 module thud_passivity
+   use thud_ascending, only: get_ascending_order
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
-   use thud_lapack, only: dposv
-   use thud_rational, only: get_basis, get_coefficients, get_eigenvalues, get_residues, get_state_input, get_state_matrix
+   use thud_lapack, only: dposv, zgeev
+   use thud_vector_fit, only: get_basis, get_residues
    implicit none (type, external)
    private
 
@@ -28,7 +29,7 @@ contains
 
    !> Frequencies of the negative minima of the real part, one for each interval in which it is negative.
    !>
-   !> In the real state space A, b, c, d, the squares of the frequencies at which the real part vanishes are eigenvalues of
+   !> In the state space A, b, c, d, here with the poles on a diagonal A, the squares of the frequencies at which the real part vanishes are eigenvalues of
    !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009). Between two such
    !> frequencies the sign of the real part does not change.
    subroutine find_violations(pole, residue, direct, omega, failed)
@@ -40,27 +41,34 @@ contains
       real(wp), allocatable, intent(out) :: omega(:)
       !> True if LAPACK finds no eigenvalues.
       logical, intent(out) :: failed
-      real(wp), allocatable :: state(:, :), input(:), output(:), border(:)
-      complex(wp), allocatable :: square(:)
+      complex(wp), allocatable :: a(:), c(:), matrix(:, :), square(:), work(:)
+      complex(wp) :: none(1, 1)
+      real(wp), allocatable :: border(:), real_work(:)
       real(wp) :: scale
-      integer :: j, n
+      integer :: info, j, n
 
       scale = maxval(abs(pole))
-      allocate (state, source=get_state_matrix(pole/scale))
-      allocate (input, source=get_state_input(pole))
-      allocate (output, source=get_coefficients(pole, residue/scale))
-      n = size(input)
-      allocate (square(n))
-      state = matmul(state, reshape([(input*output(j)/direct, j=1, n)], [n, n]) - state)
-      call get_eigenvalues(state, square, failed)
-      allocate (omega(0))
+      a = [pole, pack(conjg(pole), pole%im > 0.0_wp)]/scale
+      c = merge(residue/2, residue, pole%im > 0.0_wp)
+      c = [c, pack(conjg(c), pole%im > 0.0_wp)]/scale
+      n = size(a)
+      matrix = spread(a, 2, n)*spread(c/direct, 1, n)
+      do j = 1, n
+         matrix(j, j) = matrix(j, j) - a(j)**2
+      end do
+      allocate (omega(0), square(n), work(33*n), real_work(2*n))
+      failed = .not. all(abs(matrix) <= huge(1.0_wp))
+      if (failed) return
+      call zgeev('N', 'N', n, matrix, n, square, none, 1, none, 1, work, size(work), real_work, info)
+      failed = info /= 0
       if (failed) return
       ! Candidates that are no zeros do no harm; zeros that rounding has moved off the real axis must not be missed.
-      border = scale*[0.0_wp, sorted(pack(sqrt(abs(square)), square%re > 0.0_wp))]
+      border = pack(sqrt(abs(square)), square%re > 0.0_wp)
+      border = scale*[0.0_wp, border(get_ascending_order(border))]
       border = [border, 2*max(border(size(border)), scale)]
       do j = 1, size(border) - 1
          associate (middle => get_minimum(pole, residue, direct, border(j), border(j + 1)))
-            if (get_real_part(pole, residue, direct, middle) < 0.0_wp) omega = [omega, middle]
+            if (real(get_response(pole, residue, direct, middle)) < 0.0_wp) omega = [omega, middle]
          end associate
       end do
    end subroutine find_violations
@@ -81,7 +89,7 @@ contains
       real(wp), allocatable :: normal(:, :), omega(:), constrained(:), x(:), length(:)
       complex(wp), allocatable :: basis(:, :)
       real(wp) :: minimum
-      integer :: i, n
+      integer :: i, j, n
 
       call get_basis(pole, cmplx(0.0_wp, frequency, wp), basis)
       n = size(basis, 2)
@@ -96,23 +104,20 @@ contains
       end do
       minimum = margin*sum(abs([(get_response(pole, residue, direct, frequency(i)), i=1, size(frequency))]))/size(frequency)
       allocate (constrained(0))
-      do i = 1, n_round
+      do i = 1, 2*n_round
          direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
          failed = failed .or. is_interrupted()
          if (failed .or. size(omega) == 0) return
-         constrained = [constrained, omega]
-         x = get_correction(pole, residue, direct, constrained, normal, length, minimum)
-         residue = residue + get_residues(pole, x(:n - 1))
-         direct = direct + x(n)
-      end do
-      ! The remaining violations are within the rounding of the corrections; a larger constant part ends them.
-      do i = 1, n_round
-         direct = max(direct, minimum)
-         call find_violations(pole, residue, direct, omega, failed)
-         failed = failed .or. is_interrupted()
-         if (failed .or. size(omega) == 0) return
-         direct = direct + minimum - minval([(get_real_part(pole, residue, direct, omega(n)), n=1, size(omega))])
+         if (i <= n_round) then
+            constrained = [constrained, omega]
+            x = get_correction(pole, residue, direct, constrained, normal, length, minimum)
+            residue = residue + get_residues(pole, x(:n - 1))
+            direct = direct + x(n)
+         else
+            ! The remaining violations are within the rounding of the corrections; a larger constant part ends them.
+            direct = direct + minimum - minval([(real(get_response(pole, residue, direct, omega(j))), j=1, size(omega))])
+         end if
       end do
       failed = .true.
    end subroutine make_passive
@@ -139,7 +144,7 @@ contains
       call get_basis(pole, cmplx(0.0_wp, omega, wp), basis)
       do i = 1, size(omega)
          rows(:, i) = real(basis(i, :))/length
-         deficit(i) = minimum - get_real_part(pole, residue, direct, omega(i))
+         deficit(i) = minimum - real(get_response(pole, residue, direct, omega(i)))
       end do
       factor = normal
       solved = rows
@@ -191,7 +196,8 @@ contains
       do i = 1, n_section
          lower_trial = high - golden*(high - low)
          upper_trial = low + golden*(high - low)
-         if (get_real_part(pole, residue, direct, lower_trial) < get_real_part(pole, residue, direct, upper_trial)) then
+         if (real(get_response(pole, residue, direct, lower_trial)) &
+            < real(get_response(pole, residue, direct, upper_trial))) then
             high = upper_trial
          else
             low = lower_trial
@@ -200,17 +206,7 @@ contains
       omega = (low + high)/2
    end function get_minimum
 
-   !> Real part at a frequency.
-   pure function get_real_part(pole, residue, direct, omega) result(real_part)
-      complex(wp), intent(in) :: pole(:), residue(:)
-      !> Constant part; angular frequency, rad/s.
-      real(wp), intent(in) :: direct, omega
-      real(wp) :: real_part
-
-      real_part = real(get_response(pole, residue, direct, omega))
-   end function get_real_part
-
-   !> Value at a frequency.
+   !> Value at an angular frequency, rad/s.
    pure function get_response(pole, residue, direct, omega) result(response)
       complex(wp), intent(in) :: pole(:), residue(:)
       real(wp), intent(in) :: direct, omega
@@ -220,24 +216,5 @@ contains
          response = direct + sum(residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
       end associate
    end function get_response
-
-   !> Numbers in ascending order: [n].
-   pure function sorted(values) result(rising)
-      !> The numbers: [n].
-      real(wp), intent(in) :: values(:)
-      real(wp) :: rising(size(values))
-      real(wp) :: value
-      integer :: i, j
-
-      rising = values
-      do i = 2, size(rising)
-         value = rising(i)
-         do j = i - 1, 1, -1
-            if (rising(j) <= value) exit
-            rising(j + 1) = rising(j)
-         end do
-         rising(j + 1) = value
-      end do
-   end function sorted
 
 end module thud_passivity

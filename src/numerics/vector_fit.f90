@@ -1,14 +1,15 @@
 !> Relaxed vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14, 1999; Gustavsen, 21, 2006): fits a stable
-!> rational function with real coefficients to values at frequencies.
+!> rational function of frequency with real coefficients, d + sum of r_k/(s - p_k), to values at frequencies.
+!>
+!> Of a pair of conjugate poles only the pole with positive imaginary part is stored, with twice its residue.
 module thud_vector_fit
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
-   use thud_lapack, only: dgels
-   use thud_rational, only: get_basis, get_eigenvalues, get_order, get_residues, get_state_input, get_state_matrix
+   use thud_lapack, only: dgeev, dgels
    implicit none (type, external)
    private
 
-   public :: fit_rational
+   public :: fit_rational, get_basis, get_residues
 
    !> Maximum number of relocations of the poles; good data need about five.
    integer, parameter :: max_relocations = 40
@@ -31,6 +32,51 @@ module thud_vector_fit
    real(wp), parameter :: min_constant = 1.0e-8_wp
 
 contains
+
+   !> Basis functions of a rational function with real coefficients: 1/(s - p) for a real pole, 1/(s - p) + 1/(s - p*) and
+   !> i/(s - p) - i/(s - p*) for a pair, and finally 1.
+   pure subroutine get_basis(pole, s, basis)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> Complex frequencies: [n_frequency].
+      complex(wp), intent(in) :: s(:)
+      !> The functions: [n_frequency, order + 1].
+      complex(wp), allocatable, intent(out) :: basis(:, :)
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+      integer :: j, k, order
+
+      order = size(pole) + count(pole%im > 0.0_wp)
+      allocate (basis(size(s), order + 1))
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         basis(:, j) = 1/(s - pole(k))
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         basis(:, j + 1) = i*basis(:, j) - i/(s - conjg(pole(k)))
+         basis(:, j) = basis(:, j) + 1/(s - conjg(pole(k)))
+         j = j + 1
+      end do
+      basis(:, j + 1) = 1.0_wp
+   end subroutine get_basis
+
+   !> Residues from the coefficients of the basis, doubled for pairs: [n].
+   pure function get_residues(pole, coefficient) result(residue)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> Coefficients of the basis: [order].
+      real(wp), intent(in) :: coefficient(:)
+      complex(wp) :: residue(size(pole))
+      integer :: j, k
+
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         residue(k) = coefficient(j)
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         residue(k) = 2*cmplx(coefficient(j), coefficient(j + 1), wp)
+         j = j + 1
+      end do
+   end function get_residues
 
    !> Fits d + sum of r_k/(s - p_k).
    !>
@@ -124,13 +170,13 @@ contains
       !> True if LAPACK finds no solution.
       logical, intent(out) :: failed
       complex(wp), allocatable :: basis(:, :), zero(:)
-      real(wp), allocatable :: matrix(:, :), right(:), column(:)
+      real(wp), allocatable :: matrix(:, :), right(:)
       real(wp) :: norm
       integer :: j, n, n_frequency
 
-      n = get_order(pole)
       n_frequency = size(s)
       call get_basis(pole, s, basis)
+      n = size(basis, 2) - 1
       allocate (matrix(2*n_frequency + 1, 2*n + 2), right(2*n_frequency + 1), zero(n))
       do j = 1, n + 1
          matrix(:2*n_frequency, j) = real_and_imaginary(weight*basis(:, j))
@@ -145,17 +191,44 @@ contains
       if (failed) return
       associate (c => right(n + 2:2*n + 1), d => right(2*n + 2))
          if (abs(d) < min_constant) d = sign(min_constant, d)
-         deallocate (matrix)
-         allocate (matrix, source=get_state_matrix(pole))
-         allocate (column, source=get_state_input(pole))
-         do j = 1, n
-            matrix(:, j) = matrix(:, j) - column*c(j)/d
-         end do
+         call get_zeros(pole, c/d, zero, failed)
       end associate
-      call get_eigenvalues(matrix, zero, failed)
       pole = pack(zero, zero%im >= 0.0_wp)
       pole%re = -max(abs(pole%re), min_damping*abs(pole))
    end subroutine relocate_poles
+
+   !> Zeros of c.basis + 1: eigenvalues of A - b c with the real state space x' = A x + b u of the basis.
+   pure subroutine get_zeros(pole, c, zero, failed)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> Coefficients: [order].
+      real(wp), intent(in) :: c(:)
+      !> The zeros: [order].
+      complex(wp), intent(out) :: zero(:)
+      !> True if the coefficients are not finite or LAPACK does not find the eigenvalues.
+      logical, intent(out) :: failed
+      real(wp) :: matrix(size(c), size(c)), wr(size(c)), wi(size(c))
+      real(wp) :: left_vector(1, 1), right_vector(1, 1), work(16*size(c))
+      integer :: info, j, k
+
+      matrix = 0.0_wp
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         matrix(j, :) = merge(-2*c, -c, pole(k)%im > 0.0_wp)
+         matrix(j, j) = matrix(j, j) + pole(k)%re
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         matrix(j, j + 1) = matrix(j, j + 1) + pole(k)%im
+         matrix(j + 1, j:j + 1) = [-pole(k)%im, pole(k)%re]
+         j = j + 1
+      end do
+      zero = 0.0_wp
+      failed = .not. all(abs(matrix) <= huge(1.0_wp))
+      if (failed) return
+      call dgeev('N', 'N', size(c), matrix, size(c), wr, wi, left_vector, 1, right_vector, 1, work, size(work), info)
+      zero = cmplx(wr, wi, wp)
+      failed = info /= 0
+   end subroutine get_zeros
 
    !> Fits the coefficients of the basis for given poles.
    subroutine fit_residues(s, response, weight, pole, coefficient, misfit)
