@@ -7,8 +7,7 @@ module thud_answer
    use thud_case_text, only: read_case
    use thud_directory_answers, only: answer_check_results, answer_close_results, answer_open_results
    use thud_error, only: error_type, input_error
-   use thud_floor_answers, only: answer_floor_energy, answer_floor_impact, answer_floor_modes, answer_mobility, &
-      answer_mobility_fit, answer_modal_room, answer_point_velocity, answer_radiation, answer_radiator, answer_room_level
+   use thud_floor_answers, only: answer_floor, answer_mobility_fit
    use thud_level_answers, only: answer_background, answer_levels, answer_low_pass, answer_peak_count, answer_rating, &
       answer_standardization
    use thud_request, only: request_type
@@ -59,24 +58,8 @@ contains
          call answer_loss_factors(case, request, bundle, error)
       case ('samples')
          call answer_samples(case, request, bundle, error)
-      case ('mobility')
-         call answer_mobility(case, request, bundle, error)
-      case ('floor_energy')
-         call answer_floor_energy(case, request, bundle, error)
-      case ('point_velocity')
-         call answer_point_velocity(case, request, bundle, error)
-      case ('floor_impact')
-         call answer_floor_impact(case, bundle, error)
-      case ('room_level')
-         call answer_room_level(case, request, bundle, error)
-      case ('modal_room')
-         call answer_modal_room(case, request, bundle, error)
-      case ('floor_modes')
-         call answer_floor_modes(case, request, bundle, error)
-      case ('radiation')
-         call answer_radiation(case, request, bundle, error)
-      case ('radiator')
-         call answer_radiator(case, request, bundle, error)
+      case ('mobility', 'floor_energy', 'floor_impact', 'room_level', 'modal_room', 'floor_modes', 'radiation')
+         call answer_floor(question, case, request, bundle, error)
       case ('mobility_fit')
          call answer_mobility_fit(request, bundle, error)
       case ('levels')

@@ -5,7 +5,8 @@ module thud_constants
    implicit none (type, external)
    private
 
-   public :: get_compiler, pi, recorded_band, reference_force, reference_time, version
+   public :: decay_of_60_db, fast_time, get_compiler, pi, recorded_band, reference_force, reference_pressure, reference_time
+   public :: version
 
    !> Ratio of a circle's circumference to its diameter.
    real(wp), parameter :: pi = acos(-1.0_wp)
@@ -15,6 +16,15 @@ module thud_constants
 
    !> Reference time of the force exposure level, s (JIS A 1418-2).
    real(wp), parameter :: reference_time = 1.0_wp
+
+   !> Reference sound pressure, Pa.
+   real(wp), parameter :: reference_pressure = 2.0e-5_wp
+
+   !> Time constant of the Fast detector, s (IEC 61672-1).
+   real(wp), parameter :: fast_time = 0.125_wp
+
+   !> Natural logarithm of an energy decay of 60 dB.
+   real(wp), parameter :: decay_of_60_db = 6*log(10.0_wp)
 
    !> Upper limit of the frequency range of force plate records, Hz (paper section 3); the standards' limits end at 707 Hz.
    real(wp), parameter :: recorded_band = 1250.0_wp

@@ -13,7 +13,7 @@ module thud_floor_result
    implicit none (type, external)
    private
 
-   public :: floor_result_type, get_floor_result, get_point_velocity
+   public :: floor_result_type, get_floor_result, get_velocities
 
    !> Results on a mobile floor; bands of several sets follow each other.
    type :: floor_result_type
@@ -45,6 +45,7 @@ contains
       type(floor_result_type), intent(out) :: floor_result
       !> Set if a level cannot be computed, or a point is not on the floor.
       type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: transfer
       integer :: first, n, i
 
       call get_level_bands(case%bands, floor_result%bands, first)
@@ -62,35 +63,26 @@ contains
          floor_result%conductance = get_mean_conductances(receiver, floor_result%bands)
          allocate (floor_result%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count
-            call get_point_velocity(state, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
-               floor%point_y%values(i), floor_result%point_velocity(:, i), error)
+            call get_transfer(state, floor%point_x%values(i), floor%point_y%values(i), transfer, error)
             if (allocated(error)) return
+            floor_result%point_velocity(:, i) = get_velocities(transfer, contact%floor_force, contact%sample_rate)
          end do
       end associate
    end subroutine get_floor_result
 
-   !> Velocity of a point of a floor.
-   subroutine get_point_velocity(state, force, sample_rate, x, y, velocity, error)
-      !> The floor, prepared.
-      type(floor_state_type), intent(in) :: state
-      !> The contact force, N: [n_sample].
+   !> Velocities of a point under a force, m/s: [n_sample].
+   pure function get_velocities(transfer, force, sample_rate) result(velocity)
+      !> The mobility from the force to the point.
+      type(receiver_type), intent(in) :: transfer
+      !> The force, N: [n_sample].
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Position of the point, m.
-      real(wp), intent(in) :: x, y
-      !> Velocity downwards, m/s: [n_sample].
-      real(wp), intent(out) :: velocity(:)
-      !> Set if the floor has no such point.
-      type(error_type), allocatable, intent(out) :: error
-      type(receiver_type) :: transfer
+      real(wp) :: velocity(size(force))
       type(receiver_step_type) :: step
       type(receiver_motion_type) :: motion
       integer :: i
 
-      velocity = 0.0_wp
-      call get_transfer(state, x, y, transfer, error)
-      if (allocated(error)) return
       motion = new_receiver_motion(transfer)
       step = new_receiver_step(transfer, 1/sample_rate)
       velocity(1) = get_receiver_velocity(transfer, force(1), motion)
@@ -98,6 +90,6 @@ contains
          call advance_receiver(step, (force(i - 1) + force(i))/2, motion)
          velocity(i) = get_receiver_velocity(transfer, force(i), motion)
       end do
-   end subroutine get_point_velocity
+   end function get_velocities
 
 end module thud_floor_result

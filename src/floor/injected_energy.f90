@@ -18,7 +18,7 @@ module thud_injected_energy
    implicit none (type, external)
    private
 
-   public :: get_injected_energies, get_mean_conductances, get_total_energy
+   public :: get_injected_energies, get_mean_conductances, get_spectrum, get_total_energy
 
    !> Quadrature nodes of a frequency step.
    integer, parameter :: n_node = 16
@@ -35,18 +35,6 @@ module thud_injected_energy
       real(wp) :: node(n_node), weight(n_node), coefficient(0:n_node - 1, n_node)
    end type rule_type
 
-   !> Force from first touch to its end, and the mobility.
-   type :: record_type
-      !> Samples per second, Hz.
-      real(wp) :: sample_rate = 1.0_wp
-      !> Force, N: [n_sample].
-      real(wp), allocatable :: force(:)
-      !> Direct part of the mobility, m/(N s).
-      real(wp) :: direct = 0.0_wp
-      !> Poles, 1/s, with their conjugates; residues, m/(N s2): [n_pole].
-      complex(wp), allocatable :: pole(:), residue(:)
-   end type record_type
-
 contains
 
    !> Energies injected in bands.
@@ -62,22 +50,26 @@ contains
       real(wp), intent(out) :: energy(:)
       !> Set by an interrupt.
       type(error_type), allocatable, intent(out) :: error
-      type(record_type) :: record
+      type(receiver_type) :: complete
       type(rule_type) :: rule
       real(wp) :: step
-      integer :: i, k, n_step
+      integer :: first, last, i, k, n_step
 
       energy = 0.0_wp
-      if (.not. any(abs(force) > 0.0_wp)) return
-      record = new_record(receiver, force, sample_rate)
+      first = findloc(abs(force) > 0.0_wp, .true., dim=1)
+      last = findloc(abs(force) > 0.0_wp, .true., dim=1, back=.true.)
+      if (first == 0) return
+      complete = with_conjugates(receiver)
+      complete%pole%re = min(complete%pole%re, -min_decay)
       rule = new_rule()
       do i = 1, size(bands)
-         n_step = ceiling((bands(i)%upper - bands(i)%lower)*2*size(record%force)/sample_rate)
+         n_step = ceiling((bands(i)%upper - bands(i)%lower)*2*(last - first + 1)/sample_rate)
          step = (bands(i)%upper - bands(i)%lower)/n_step
          do k = 1, n_step
             call check_interrupt(error)
             if (allocated(error)) return
-            energy(i) = energy(i) + get_step_energy(record, rule, bands(i)%lower + (k - 0.5_wp)*step, step/2)
+            energy(i) = energy(i) + get_step_energy(complete, force(first:last), sample_rate, rule, &
+               bands(i)%lower + (k - 0.5_wp)*step, step/2)
          end do
       end do
    end subroutine get_injected_energies
@@ -113,20 +105,15 @@ contains
       type(band_type), intent(in) :: bands(:)
       !> The averages, m/(N s): [n_band].
       real(wp) :: conductance(size(bands))
-      complex(wp) :: ratio(2)
-      integer :: i, k
+      type(receiver_type) :: complete
+      integer :: i
 
-      conductance = receiver%direct
-      if (.not. allocated(receiver%pole)) return
+      complete = with_conjugates(receiver)
       do i = 1, size(bands)
-         associate (low => cmplx(0.0_wp, 2*pi*bands(i)%lower, wp), high => cmplx(0.0_wp, 2*pi*bands(i)%upper, wp))
-            do k = 1, size(receiver%pole)
-               associate (pole => receiver%pole(k), residue => receiver%residue(k))
-                  ratio = [log(high - pole) - log(low - pole), log(high - conjg(pole)) - log(low - conjg(pole))]
-                  conductance(i) = conductance(i) &
-                     + aimag(residue*ratio(1) + conjg(residue)*ratio(2))/(4*pi*(bands(i)%upper - bands(i)%lower))
-               end associate
-            end do
+         associate (low => cmplx(0.0_wp, 2*pi*bands(i)%lower, wp), high => cmplx(0.0_wp, 2*pi*bands(i)%upper, wp), &
+            pole => complete%pole)
+            conductance(i) = complete%direct + sum(aimag(complete%residue*(log(high - pole) - log(low - pole)))) &
+               /(2*pi*(bands(i)%upper - bands(i)%lower))
          end associate
       end do
    end function get_mean_conductances
@@ -144,50 +131,47 @@ contains
       end do
    end function new_rule
 
-   !> Record of a force and the mobility under it.
-   pure function new_record(receiver, force, sample_rate) result(record)
+   !> The receiver with the conjugates of its poles as poles of their own.
+   pure function with_conjugates(receiver) result(complete)
       type(receiver_type), intent(in) :: receiver
-      !> The force, N: [n_sample].
-      real(wp), intent(in) :: force(:)
-      real(wp), intent(in) :: sample_rate
-      type(record_type) :: record
+      type(receiver_type) :: complete
 
-      associate (acts => abs(force) > 0.0_wp)
-         record%force = force(findloc(acts, .true., dim=1):findloc(acts, .true., dim=1, back=.true.))
-      end associate
-      record%sample_rate = sample_rate
-      record%direct = receiver%direct
-      allocate (record%pole(0), record%residue(0))
+      complete%direct = receiver%direct
+      allocate (complete%pole(0), complete%residue(0))
       if (.not. allocated(receiver%pole)) return
-      associate (pole => cmplx(min(receiver%pole%re, -min_decay), receiver%pole%im, wp))
-         record%pole = [pole, conjg(pole)]
-      end associate
+      complete%pole = [receiver%pole, conjg(receiver%pole)]
       ! Half of a doubled residue belongs to the conjugate pole; both halves of a real residue are equal.
-      record%residue = [receiver%residue, conjg(receiver%residue)]/2
-   end function new_record
+      complete%residue = [receiver%residue, conjg(receiver%residue)]/2
+   end function with_conjugates
 
    !> Energy in a frequency step.
-   pure function get_step_energy(record, rule, middle, half) result(energy)
-      type(record_type), intent(in) :: record
+   pure function get_step_energy(receiver, force, sample_rate, rule, middle, half) result(energy)
+      !> The receiver, with conjugate poles.
+      type(receiver_type), intent(in) :: receiver
+      !> Force from first touch to its end, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
       type(rule_type), intent(in) :: rule
       !> Middle and half length of the step, Hz.
       real(wp), intent(in) :: middle, half
       !> The energy, J.
       real(wp) :: energy
       complex(wp), dimension(n_node) :: s, mobility
-      real(wp), dimension(n_node) :: square
+      real(wp), dimension(n_node) :: frequency, square
       real(wp) :: by_square(0:n_node - 1)
       complex(wp) :: second(0:n_node - 1)
       complex(wp) :: z
       integer :: k
 
-      s = cmplx(0.0_wp, 2*pi*(middle + half*rule%node), wp)
-      square = abs(get_sums(record%force, exp(-s/record%sample_rate))/record%sample_rate)**2
+      frequency = middle + half*rule%node
+      s = cmplx(0.0_wp, 2*pi*frequency, wp)
+      square = abs(get_spectrum(force, sample_rate, frequency))**2
       by_square = matmul(rule%coefficient, square)
-      mobility = record%direct
+      mobility = receiver%direct
       energy = 0.0_wp
-      do k = 1, size(record%pole)
-         associate (pole => record%pole(k), residue => record%residue(k))
+      do k = 1, size(receiver%pole)
+         associate (pole => receiver%pole(k), residue => receiver%residue(k))
             z = (cmplx(pole%im, -pole%re, wp)/(2*pi) - middle)/half
             if (abs(z - 1) + abs(z + 1) > near) then
                mobility = mobility + residue/(s - pole)
@@ -200,26 +184,35 @@ contains
       energy = energy + 2*half*sum(rule%weight*square*real(mobility, wp))
    end function get_step_energy
 
-   !> Sums of sample(i) phase_factor**(i - 1), by Horner's scheme: [n_node].
-   pure function get_sums(sample, phase_factor) result(total)
-      !> The samples: [n_sample].
-      real(wp), intent(in) :: sample(:)
-      !> Phase factor of one sample: [n_node].
-      complex(wp), intent(in) :: phase_factor(n_node)
-      complex(wp) :: total(n_node)
-      real(wp), dimension(n_node) :: factor_re, factor_im, re, im, next
-      integer :: i
+   !> Fourier transform of a force at frequencies, N s: [n]. It is a polynomial in the phase factor of a sample, summed by
+   !> Horner's scheme.
+   pure function get_spectrum(force, sample_rate, frequency) result(spectrum)
+      !> The force, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> The frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      complex(wp) :: spectrum(size(frequency))
+      ! So many at once stay in registers.
+      real(wp), dimension(n_node) :: angle, re, im, next
+      integer :: i, first, n
 
-      factor_re = phase_factor%re
-      factor_im = phase_factor%im
-      re = 0.0_wp
-      im = 0.0_wp
-      do i = size(sample), 1, -1
-         next = re*factor_re - im*factor_im + sample(i)
-         im = re*factor_im + im*factor_re
-         re = next
+      do first = 1, size(frequency), n_node
+         n = min(n_node, size(frequency) - first + 1)
+         angle = 0.0_wp
+         angle(:n) = -2*pi*frequency(first:first + n - 1)/sample_rate
+         re = 0.0_wp
+         im = 0.0_wp
+         associate (factor_re => cos(angle), factor_im => sin(angle))
+            do i = size(force), 1, -1
+               next = re*factor_re - im*factor_im + force(i)
+               im = re*factor_im + im*factor_re
+               re = next
+            end do
+         end associate
+         spectrum(first:first + n - 1) = cmplx(re(:n), im(:n), wp)/sample_rate
       end do
-      total = cmplx(re, im, wp)
-   end function get_sums
+   end function get_spectrum
 
 end module thud_injected_energy

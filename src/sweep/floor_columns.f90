@@ -3,12 +3,12 @@ module thud_floor_columns
    use thud_band, only: band_type, get_band_name
    use thud_case, only: case_type
    use thud_compute, only: impact_type
-   use thud_error, only: error_type
    use thud_floor_result, only: floor_result_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_room, only: get_room_bands, get_rating_index, room_level_type
+   use thud_rating, only: get_rated_bands
+   use thud_room, only: get_rating_index, room_level_type
    implicit none (type, external)
    private
 
@@ -26,15 +26,12 @@ contains
       type(band_type), intent(in) :: bands(:)
       !> The names, with units; none if the case has no floor: [n_column].
       character(len=column_name_length), allocatable :: names(:)
-      type(band_type), allocatable :: room_bands(:)
-      type(error_type), allocatable :: error
 
       allocate (names(0))
       if (.not. case%has_floor) return
       names = [character(len=column_name_length) :: get_level_names('contact', bands), 'floor_work_J']
       if (.not. case%has_room) return
-      call get_room_bands(room_bands, error)
-      names = [character(len=column_name_length) :: names, get_level_names('room', room_bands), 'room_rating_dB']
+      names = [character(len=column_name_length) :: names, get_level_names('room', get_rated_bands('third')), 'room_rating_dB']
    end function get_floor_columns
 
    !> Names of the columns of levels.

@@ -181,7 +181,6 @@ def positions_below(
         case=case_text(case),
         force=source.mean_force(),
         sample_rate=source.sample_rate,
-        pressure=1.0,
         ball=_positions("balls", balls, size[:2]),
         microphone=_positions("microphones", microphones, size),
         **request,

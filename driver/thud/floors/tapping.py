@@ -133,7 +133,7 @@ def tapping_level(floor: Plate | Construction | str, room: Room | None = None) -
             f"{' and '.join(layers)}",
             "plates without floating floor, covering, subceiling and ceiling",
         )
-    result = ask("radiator", case=case_text(case), frequency=FREQUENCY)
+    result = ask("floor_modes", case=case_text(case), frequency=FREQUENCY)["plate"]
     time = 2.2 / (FREQUENCY * result["loss_factor"])
     radiated = time * result["radiation_factor"] * FREQUENCY / 1000
     level = 155 - 30 * np.log10(result["surface_mass"]) + 10 * np.log10(radiated)

@@ -122,7 +122,7 @@ class FloorImpact(Impact):
         Raise InputError if the point, m, is outside or the floor is not rectangular.
         """
         answer = ask(
-            "point_velocity", case=case_text(Case(floor=self.floor)), force=self.floor_force,
+            "mobility", case=case_text(Case(floor=self.floor)), force=self.floor_force,
             sample_rate=self.sample_rate, point=np.array(require_pair("point", (x, y))),
         )  # fmt: skip
         return np.asarray(answer["velocity"])

@@ -197,16 +197,15 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
     """
     require_whole("count", count, 1, MAX_SHAPES)
     require_whole("columns", columns, 1, MAX_SHAPES)
+    grid = np.meshgrid(*[np.linspace(0, 1, POINTS)] * 2)
+    x, y = (coordinate.ravel() for coordinate in grid)
     case = case_text(Case(floor=floor))
-    modes = ask("floor_modes", case=case, highest=1e6)
-    frequency = modes["frequency"][:count]
+    modes = ask("floor_modes", case=case, highest=1e6, count=float(count), x=x, y=y)
+    frequency = modes["frequency"]
     if not len(frequency):
         refuse(f"floor: no mode lies below {modes['limit']:.0f} Hz", "a floor with modes")
     count = len(frequency)
-    x, y = np.linspace(0, modes["length"], POINTS), np.linspace(0, modes["width"], POINTS)
-    points = [coordinate.ravel() for coordinate in np.meshgrid(x, y)]
-    highest = frequency[-1] * (1 + 1e-9)
-    shapes = ask("floor_modes", case=case, highest=highest, x=points[0], y=points[1])["shape"]
+    sides = modes["length"] * grid[0], modes["width"] * grid[1]
     columns = min(columns, count)
     rows = -(-count // columns)
     side = WIDTH / columns
@@ -215,9 +214,9 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in panels:
         axes.set_axis_off()
-    for axes, natural, values in zip(panels, frequency, shapes, strict=False):
+    for axes, natural, values in zip(panels, frequency, modes["shape"], strict=False):
         shape = values.reshape(POINTS, POINTS) / values[np.argmax(abs(values))]
-        drawn = axes.pcolormesh(x, y, shape, cmap="RdBu_r", vmin=-1, vmax=1, rasterized=True)
+        drawn = axes.pcolormesh(*sides, shape, cmap="RdBu_r", vmin=-1, vmax=1, rasterized=True)
         axes.set_aspect("equal")
         axes.set_title(f"{natural:.1f} Hz")
     figure.colorbar(

@@ -22,7 +22,7 @@ module thud_modal_radiation
    implicit none (type, external)
    private
 
-   public :: get_modal_radiation, get_strike_points, modal_radiation_type
+   public :: get_modal_radiation, modal_radiation_type
 
    !> Number of wavenumbers of sound per band, at which the transforms are computed.
    integer, parameter :: n_wavenumber = 3
@@ -44,19 +44,18 @@ module thud_modal_radiation
    !> Modes whose products have a smaller mean than this, relative to their squares, are orthogonal.
    real(wp), parameter :: max_overlap = 0.05_wp
 
-   !> Answer of a floor to a force at its mean position above the room, per band.
+   !> Answer of a floor in a band to a force at its mean position above the room.
    type :: modal_radiation_type
-      !> Radiation factor of the part above the room: power over rho0 c0 times area times mean-square velocity there:
-      !> [n_band].
-      real(wp), allocatable :: radiation_factor(:)
-      !> The same of its upper side: [n_band].
-      real(wp), allocatable :: upper_factor(:)
-      !> Power that the bearing plate dissipates per mean-square force, m/(N s): [n_band].
-      real(wp), allocatable :: conductance(:)
-      !> Power that the floor radiates into the room per mean-square force, m/(N s): [n_band].
-      real(wp), allocatable :: radiated(:)
-      !> Energy of the bearing plate beyond the room over that above the room: [n_band].
-      real(wp), allocatable :: energy_beyond(:)
+      !> Radiation factor of the part above the room: power over rho0 c0 times area times mean-square velocity there.
+      real(wp) :: radiation_factor = 0.0_wp
+      !> The same of its upper side.
+      real(wp) :: upper_factor = 0.0_wp
+      !> Power that the bearing plate dissipates per mean-square force, m/(N s).
+      real(wp) :: conductance = 0.0_wp
+      !> Power that the floor radiates into the room per mean-square force, m/(N s).
+      real(wp) :: radiated = 0.0_wp
+      !> Energy of the bearing plate beyond the room over that above the room.
+      real(wp) :: energy_beyond = 0.0_wp
    end type modal_radiation_type
 
    !> Part of the floor above the room.
@@ -98,9 +97,10 @@ contains
       type(air_type), intent(in) :: air
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> Ends of the part of the plate above the room along length and width, m: [4].
-      real(wp), intent(in) :: area(4)
-      type(modal_radiation_type), intent(out) :: radiation
+      !> Opposite corners of the part of the plate above the room, along length and width, m: [2, 2].
+      real(wp), intent(in) :: area(2, 2)
+      !> The answers: [n_band].
+      type(modal_radiation_type), intent(out) :: radiation(:)
       !> Strike points, relative to length and width (default: the mean over the part above the room): [2, n].
       real(wp), intent(in), optional :: stated_strike(:, :)
       type(floor_modes_type) :: selected
@@ -108,38 +108,31 @@ contains
       type(part_type) :: part
       type(sums_type) :: sums
       real(wp) :: highest
-      logical :: couples_all
-      integer :: i
+      integer :: i, max_count
 
-      allocate (radiation%radiation_factor(size(bands)), radiation%conductance(size(bands)))
-      allocate (radiation%radiated(size(bands)), radiation%energy_beyond(size(bands)))
-      if (size(bands) > 0) then
-         highest = 2*pi*maxval(bands%upper)/air%sound_speed
-         part = new_part(modes, area)
-         couples_all = all([area(2) - area(1), area(4) - area(3)] &
-            < [modes%stack%length, modes%stack%width]*(1 - 1.0e-9_wp))
-         associate (displacement => modes%modes%displacement(modes%stack%radiator))
-            along = new_wave_series(displacement%x, area(1:2), highest)
-            across = new_wave_series(displacement%y, area(3:4), highest)
-         end associate
-      end if
+      if (size(bands) == 0) return
+      highest = 2*pi*maxval(bands%upper)/air%sound_speed
+      part = new_part(modes, area)
+      max_count = max_modes
+      if (all(area(:, 2) - area(:, 1) < [modes%stack%length, modes%stack%width]*(1 - 1.0e-9_wp))) max_count = max_coupled
+      associate (displacement => modes%modes%displacement(modes%stack%radiator))
+         along = new_wave_series(displacement%x, area(1, :), highest)
+         across = new_wave_series(displacement%y, area(2, :), highest)
+      end associate
       do i = 1, size(bands)
-         selected = get_selected_modes(modes, take_part(modes, bands(i), merge(max_coupled, max_modes, couples_all)))
+         selected = get_selected_modes(modes, take_part(modes, bands(i), max_count))
          sums = get_sums(get_coupled_modes(selected, part, stated_strike), air, bands(i), along, across)
          if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) then
             ! A plate without modes there, or without resolved or known ones.
-            radiation%radiation_factor(i) = get_plate_radiation(plate, air, bands(i)%center)
-            radiation%conductance(i) = 1/get_resistance(plate)
-            radiation%radiated(i) = 0.0_wp
-            radiation%energy_beyond(i) = modes%stack%length*modes%stack%width/part%area - 1
+            radiation(i) = modal_radiation_type(radiation_factor=get_plate_radiation(plate, air, bands(i)%center), &
+               conductance=1/get_resistance(plate), energy_beyond=modes%stack%length*modes%stack%width/part%area - 1)
             cycle
          end if
-         radiation%radiation_factor(i) = sums%power/sums%above
-         radiation%radiated(i) = air%density*air%sound_speed*sums%power/sums%width
-         radiation%energy_beyond(i) = sums%velocity/sums%above - 1
-         ! The modes have these losses.
-         radiation%conductance(i) = sums%velocity/sums%width*get_surface_mass(plate)*2*pi*bands(i)%center &
-            *get_total_loss(plate, air, bands(i)%center)
+         ! The modes have the losses of the plate.
+         radiation(i) = modal_radiation_type(radiation_factor=sums%power/sums%above, &
+            radiated=air%density*air%sound_speed*sums%power/sums%width, energy_beyond=sums%velocity/sums%above - 1, &
+            conductance=sums%velocity/sums%width*get_surface_mass(plate)*2*pi*bands(i)%center &
+            *get_total_loss(plate, air, bands(i)%center))
       end do
       radiation%upper_factor = radiation%radiation_factor
       ! The upper side of a floor with a subceiling is that of the bearing plate.
@@ -172,11 +165,11 @@ contains
    !> Part of a floor above a room.
    function new_part(modes, area) result(part)
       type(floor_modes_type), intent(in) :: modes
-      !> Its ends along length and width, m.
-      real(wp), intent(in) :: area(4)
+      !> Its opposite corners along length and width, m: [2, 2].
+      real(wp), intent(in) :: area(2, 2)
       type(part_type) :: part
 
-      part%area = (area(2) - area(1))*(area(4) - area(3))
+      part%area = product(area(:, 2) - area(:, 1))
       if (part%area > modes%stack%length*modes%stack%width*(1 - 1.0e-9_wp)) return
       associate (displacement => modes%modes%displacement)
          part%struck = new_overlap(displacement(1))
@@ -189,8 +182,8 @@ contains
          type(product_type), intent(in) :: set
          type(overlap_type) :: overlap
 
-         allocate (overlap%x, source=get_overlap(set%x, 0, set%x, 0, area(1), area(2)))
-         allocate (overlap%y, source=get_overlap(set%y, 0, set%y, 0, area(3), area(4)))
+         allocate (overlap%x, source=get_overlap(set%x, 0, set%x, 0, area(1, 1), area(1, 2)))
+         allocate (overlap%y, source=get_overlap(set%y, 0, set%y, 0, area(2, 1), area(2, 2)))
       end function new_overlap
    end function new_part
 
@@ -387,19 +380,5 @@ contains
       product = product*get_unmixed(modes%block, conjg(transpose(get_unmixed(modes%block, cmplx(modes%drive, kind=wp)))))
       response = real(get_mixed(modes%block, conjg(transpose(get_mixed(modes%block, product)))), wp)
    end function get_responses
-
-   !> Relative positions that fill a floor evenly (the R2 sequence of Roberts): [2, n].
-   pure subroutine get_strike_points(n, strike)
-      integer, intent(in) :: n
-      real(wp), allocatable, intent(out) :: strike(:, :)
-      !> Solution of x**3 = x + 1.
-      real(wp), parameter :: plastic = 1.32471795724474602596_wp
-      integer :: i
-
-      allocate (strike(2, n))
-      do i = 1, n
-         strike(:, i) = modulo(0.5_wp + i/plastic**[1, 2], 1.0_wp)
-      end do
-   end subroutine get_strike_points
 
 end module thud_modal_radiation

@@ -4,22 +4,20 @@
 !> velocity of the floor drives the air; the air acts back on the floor only by the loss factor of the floor.
 module thud_modal_room
    use thud_band, only: band_type
-   use thud_constants, only: pi
+   use thud_constants, only: decay_of_60_db, fast_time, pi, reference_pressure
    use thud_floor_modes, only: floor_modes_type, get_poles, get_selected_modes
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
+   use thud_injected_energy, only: get_spectrum
    use thud_kinds, only: wp
-   use thud_matrix_product, only: get_product, get_transposed_product
+   use thud_matrix_product, only: get_transposed_product
    use thud_mode_mixing, only: are_mixed, get_mixed, get_unmixed
    use thud_modes, only: get_mode_sums, get_mode_values
-   use thud_plate, only: air_type
+   use thud_room, only: box_type
    use thud_transform, only: get_signal
    implicit none (type, external)
    private
 
-   public :: box_type, get_crossover, get_highest_frequency, get_modal_room, modal_room_type, place_standard
-
-   !> Number of overlapping modes of the room above which the sound is statistical.
-   real(wp), parameter :: overlap_limit = 3.0_wp
+   public :: get_highest_frequency, get_modal_room, modal_room_type
 
    !> Frequency of the highest modes of the room over the upper edge of the highest band: at a quiet position, modes above
    !> the band add up to 0.5 dB.
@@ -36,29 +34,6 @@ module thud_modal_room
 
    !> Number of frequencies whose answers of the room are in memory at once.
    integer, parameter :: chunk_size = 64
-
-   !> Time constant of the Fast detector, s; reference sound pressure, Pa.
-   real(wp), parameter :: time_constant = 0.125_wp, reference_pressure = 2.0e-5_wp
-
-   !> Number of standard positions.
-   integer, parameter :: n_standard = 5
-
-   !> Distance of standard positions from the walls, m, and height of the microphones, m (KS F 2810-2).
-   real(wp), parameter :: wall_distance = 0.75_wp, microphone_height = 1.2_wp
-
-   !> The room, and positions in it.
-   type :: box_type
-      !> Length, width and height, m.
-      real(wp) :: sides(3) = 0.0_wp
-      !> Position of its corner below the floor, m.
-      real(wp) :: corner(2) = 0.0_wp
-      type(air_type) :: air
-      !> One-third-octave bands and the reverberation times in them, s: [n_band].
-      type(band_type), allocatable :: bands(:)
-      real(wp), allocatable :: reverberation_time(:)
-      !> Positions of the ball on the floor and of the microphone, from the corner of the room, m: [2, n_ball], [3, n_mic].
-      real(wp), allocatable :: ball(:, :), microphone(:, :)
-   end type box_type
 
    !> Levels at positions.
    type :: modal_room_type
@@ -82,9 +57,8 @@ module thud_modal_room
    type :: group_type
       !> Indices of the pairs and of the modes: [n_pair], [n_mode].
       integer, allocatable :: pair(:), mode(:)
-      !> Their coupling, m2/sqrt(kg): [n_mode, n_pair]. If it is complex, negative imaginary parts follow the real ones in
-      !> further rows.
-      real(wp), allocatable :: coupling(:, :)
+      !> Real and imaginary parts of their coupling, m2/sqrt(kg); without the latter if they are zero: [n_mode, n_pair].
+      real(wp), allocatable :: real_part(:, :), imaginary_part(:, :)
    end type group_type
 
    !> Floor, room and positions.
@@ -93,6 +67,8 @@ module thud_modal_room
       !> Squared angular frequencies of the floor's modes with their losses, rad2/s2, and shapes at the balls, 1/sqrt(kg):
       !> [n_mode], [n_mode, n_ball].
       complex(wp), allocatable :: pole(:), gain(:, :)
+      !> Decay of the energy of a mode with a dashpot, angular frequency times loss factor, 1/s: [n_mode].
+      real(wp), allocatable :: decay(:)
       type(box_type) :: box
       !> Frequency of the highest modes of the room, Hz.
       real(wp) :: highest = 0.0_wp
@@ -104,8 +80,8 @@ module thud_modal_room
 
    !> Answers of the room to the volume flow into a pair of half waves along length and width, at some frequencies.
    type :: answers_type
-      !> Sound pressure at the microphones, real parts before imaginary ones, Pa s/m3: [2*n_microphone, n_pair, n_line].
-      real(wp), allocatable :: pressure(:, :, :)
+      !> Sound pressure at the microphones, Pa s/m3: [n_microphone, n_pair, n_line].
+      complex(wp), allocatable :: pressure(:, :, :)
       !> Power into the room and its losses per mean-square flow, Pa s/m3: [n_pair, n_line].
       real(wp), allocatable :: input(:, :), loss(:, :)
       !> Number of modes of the room.
@@ -114,49 +90,26 @@ module thud_modal_room
 
 contains
 
-   !> Frequency above which the modes of a room overlap so much that its sound is statistical, Hz: the overlap is the mode
-   !> density 4 pi V f**2/c**3 times the bandwidth 2.2/T.
-   pure function get_crossover(box) result(frequency)
-      type(box_type), intent(in) :: box
-      real(wp) :: frequency
-
-      frequency = sqrt(overlap_limit*box%air%sound_speed**3*minval(box%reverberation_time) &
-         /(2.2_wp*4*pi*product(box%sides)))
-   end function get_crossover
-
    !> Frequency of the highest modes of a floor that take part, Hz; 0 if no band is modal.
    pure function get_highest_frequency(box) result(frequency)
       type(box_type), intent(in) :: box
       real(wp) :: frequency
 
-      frequency = floor_ratio*room_ratio*maxval([0.0_wp, pack(box%bands%upper, box%bands%center <= get_crossover(box))])
+      frequency = floor_ratio*room_ratio*maxval([0.0_wp, pack(box%bands%upper, box%bands%center <= box%crossover)])
    end function get_highest_frequency
 
-   !> Places ball and microphone at the standard positions: center and four points near the corners (KS F 2810-2).
-   pure subroutine place_standard(box)
-      type(box_type), intent(inout) :: box
-      real(wp), parameter :: corner(2, n_standard) = reshape([0, 0, -1, -1, 1, -1, -1, 1, 1, 1], [2, n_standard])
-      integer :: i
-
-      box%ball = reshape([(box%sides(:2)/2 + corner(:, i)*(box%sides(:2)/2 - min(wall_distance, box%sides(:2)/4)), &
-         i=1, n_standard)], [2, n_standard])
-      box%microphone = reshape([(box%ball(:, i), min(microphone_height, box%sides(3)/2), i=1, n_standard)], [3, n_standard])
-   end subroutine place_standard
-
    !> Levels at positions for a force on the floor.
-   subroutine get_modal_room(modes, box, force, sample_rate, with_pressure, with_energies, room, max_frequency)
+   subroutine get_modal_room(modes, box, force, sample_rate, with_details, room)
       type(floor_modes_type), intent(in) :: modes
       type(box_type), intent(in) :: box
       !> Force on the floor, N: [n_force], and samples per second, Hz.
       real(wp), intent(in) :: force(:)
       real(wp), intent(in) :: sample_rate
-      !> Also return the sound pressure, and the energies.
-      logical, intent(in) :: with_pressure, with_energies
+      !> Also return the sound pressure and the energies.
+      logical, intent(in) :: with_details
       type(modal_room_type), intent(out) :: room
-      !> Highest mid frequency of a band, Hz (default: the crossover).
-      real(wp), intent(in), optional :: max_frequency
       type(coupled_type) :: coupled
-      real(wp), allocatable :: omega(:), decay(:), frequency(:)
+      real(wp), allocatable :: omega(:), frequency(:)
       complex(wp), allocatable :: spectrum(:), sound(:, :, :)
       integer, allocatable :: moving(:)
       real(wp) :: duration, slowest
@@ -165,10 +118,9 @@ contains
       coupled%box = box
       n_ball = size(box%ball, 2)
       n_microphone = size(box%microphone, 2)
-      room%n_band = count(box%bands%center <= get_crossover(box))
-      if (present(max_frequency)) room%n_band = count(box%bands%center <= max_frequency)
       ! Bands that the modes of the floor do not reach are statistical.
-      room%n_band = min(room%n_band, count(2*pi*box%bands%upper <= min(modes%limit, modes%known_limit)))
+      room%n_band = count(box%bands%center <= box%crossover &
+         .and. 2*pi*box%bands%upper <= min(modes%limit, modes%known_limit))
       do
          if (room%n_band == 0) exit
          coupled%highest = room_ratio*box%bands(room%n_band)%upper
@@ -180,11 +132,11 @@ contains
          end if
          coupled%pole = get_poles(coupled%floor)
          omega = sqrt(max(coupled%pole%re, tiny(1.0_wp)))
-         decay = get_decay(coupled%pole)
-         slowest = max(minval(decay), 1.0_wp)
+         coupled%decay = coupled%pole%im/omega
+         slowest = max(minval(coupled%decay), 1.0_wp)
          ! Modes far below the bands ring longest, but the filters of the bands remove them.
-         if (.not. with_pressure) slowest = max(minval(decay, omega > pi*box%bands(1)%lower), slowest)
-         duration = 0.5_wp + 6*log(10.0_wp)/min(slowest, 6*log(10.0_wp)/maxval(box%reverberation_time))
+         if (.not. with_details) slowest = max(minval(coupled%decay, omega > pi*box%bands(1)%lower), slowest)
+         duration = 0.5_wp + decay_of_60_db/min(slowest, decay_of_60_db/maxval(box%reverberation_time))
          n_line = int(coupled%highest*duration)
          ! The number of modes of the room is about that of the half waves in an eighth of an ellipsoid.
          if (pi/6*product(2*coupled%highest/box%air%sound_speed*box%sides + 1)*n_line <= max_values) exit
@@ -198,16 +150,16 @@ contains
       room%sample_rate = n_sample/duration
       room%floor_modes = size(coupled%pole)
       frequency = [(i, i=1, n_line)]/duration
-      spectrum = get_spectrum(force, sample_rate, frequency)
+      spectrum = get_spectrum(force(:findloc(abs(force) > 0.0_wp, .true., dim=1, back=.true.)), sample_rate, frequency)
       coupled%gain = get_mode_values(coupled%floor%modes, 1, box%corner(1) + box%ball(1, :), &
          box%corner(2) + box%ball(2, :))
       ! Balls on a rigid support move nothing: nobody drops them there.
       moving = pack([(j, j=1, n_ball)], maxval(abs(coupled%gain), dim=1) > 1.0e-6_wp*maxval(abs(coupled%gain)))
       coupled%gain = get_unmixed(coupled%floor%modes%block, coupled%gain)
       call couple(coupled)
-      call get_sound(coupled, frequency, spectrum, with_energies, sound, room)
+      call get_sound(coupled, frequency, spectrum, with_details, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
-      if (with_pressure) then
+      if (with_details) then
          allocate (room%pressure(n_sample, n_microphone, n_ball))
          do j = 1, n_ball
             do i = 1, n_microphone
@@ -250,10 +202,9 @@ contains
                   group%pair = pack([(k, k=1, size(lx))], 2*mod(lx, 2) + mod(ly, 2) == i - 1)
                   group%mode = pack([(k, k=1, size(coupling, 1))], &
                      maxval(abs(coupling(:, group%pair)), dim=2) > 1.0e-12_wp*maxval(abs(coupling)))
-                  group%coupling = real(coupling(group%mode, group%pair), wp)
-                  if (any(abs(aimag(coupling(group%mode, group%pair))) > 0.0_wp)) group%coupling = &
-                     reshape([transpose(group%coupling), -transpose(aimag(coupling(group%mode, group%pair)))], &
-                     [2*size(group%mode), size(group%pair)], order=[2, 1])
+                  group%real_part = real(coupling(group%mode, group%pair), wp)
+                  if (any(abs(aimag(coupling(group%mode, group%pair))) > 0.0_wp)) &
+                     group%imaginary_part = aimag(coupling(group%mode, group%pair))
                end associate
             end do
          end associate
@@ -271,40 +222,30 @@ contains
       !> Spectra of the sound pressure, Pa s: [n_line, n_microphone, n_ball].
       complex(wp), allocatable, intent(out) :: sound(:, :, :)
       type(modal_room_type), intent(inout) :: room
-      complex(wp), allocatable :: response(:, :)
-      ! For each frequency real parts, then imaginary parts, for each ball or microphone.
-      real(wp), allocatable :: flow(:, :), pressure(:, :)
+      complex(wp), allocatable :: response(:, :), flow(:, :)
       type(answers_type) :: answers
-      integer :: before, i, k, n, n_ball, n_microphone
+      integer :: before, i, n, n_ball
 
       n_ball = size(coupled%gain, 2)
-      n_microphone = size(coupled%box%microphone, 2)
-      allocate (sound(size(frequency), n_microphone, n_ball))
+      allocate (sound(size(frequency), size(coupled%box%microphone, 2), n_ball))
       do before = 0, size(frequency) - 1, chunk_size
          n = min(chunk_size, size(frequency) - before)
          associate (lines => frequency(before + 1:before + n), force => spectrum(before + 1:before + n))
             call get_answers(coupled, lines, answers)
             response = get_responses(coupled, lines, force)
-            allocate (flow(size(coupled%lx), 2*n_ball*n))
-            do k = 1, size(coupled%group)
-               flow(coupled%group(k)%pair, :) = get_flow(coupled%group(k), coupled%gain, response)
-            end do
+            flow = get_flow(coupled, response)
             do i = 1, n
-               associate (here => flow(:, 2*n_ball*(i - 1) + 1:2*n_ball*i))
-                  pressure = get_product(answers%pressure(:, :, i), here)
-                  sound(before + i, :, :) = cmplx( &
-                     pressure(:n_microphone, :n_ball) - pressure(n_microphone + 1:, n_ball + 1:), &
-                     pressure(:n_microphone, n_ball + 1:) + pressure(n_microphone + 1:, :n_ball), wp)
+               associate (here => flow(:, n_ball*(i - 1) + 1:n_ball*i))
+                  sound(before + i, :, :) = matmul(answers%pressure(:, :, i), here)
                   if (.not. with_energies) cycle
-                  associate (energy => 2*frequency(1)*(here(:, :n_ball)**2 + here(:, n_ball + 1:)**2))
-                     room%room_energy(:, 1) = room%room_energy(:, 1) + matmul(answers%input(:, i), energy)
-                     room%room_energy(:, 2) = room%room_energy(:, 2) + matmul(answers%loss(:, i), energy)
-                  end associate
+                  room%room_energy(:, 1) = room%room_energy(:, 1) &
+                     + 2*frequency(1)*matmul(answers%input(:, i), here%re**2 + here%im**2)
+                  room%room_energy(:, 2) = room%room_energy(:, 2) &
+                     + 2*frequency(1)*matmul(answers%loss(:, i), here%re**2 + here%im**2)
                end associate
             end do
             if (with_energies) room%floor_energy = room%floor_energy &
                + 2*frequency(1)*get_floor_energies(coupled, lines, force, response)
-            deallocate (flow)
          end associate
       end do
       room%room_modes = answers%n_mode
@@ -317,58 +258,57 @@ contains
       real(wp), intent(in) :: frequency(:)
       complex(wp), intent(in) :: force(:)
       complex(wp) :: response(size(coupled%pole), size(frequency))
-      real(wp), dimension(size(coupled%pole)) :: decay, difference, loss
-      logical :: is_mixed
+      complex(wp) :: difference(size(coupled%pole))
       integer :: i
 
-      decay = get_decay(coupled%pole)
-      is_mixed = are_mixed(coupled%floor%modes%block)
       do i = 1, size(frequency)
          associate (w => 2*pi*frequency(i))
-            ! Modes that are not mixed have dashpots, whose sound is causal; others have the complex stiffness that mixes
-            ! them.
-            loss = merge(coupled%pole%im, w*decay, is_mixed)
-            difference = coupled%pole%re - w**2
-            response(:, i) = force(i)*cmplx(0.0_wp, w, wp)*cmplx(difference, -loss, wp)/(difference**2 + loss**2)
+            difference = conjg(get_stiffness(coupled, w)) - w**2
+            response(:, i) = force(i)*cmplx(0.0_wp, w, wp)*difference/(difference%re**2 + difference%im**2)
          end associate
       end do
    end function get_responses
 
-   !> Decay of the energy of a mode with a dashpot, 1/s: angular frequency times loss factor.
-   elemental function get_decay(pole) result(decay)
-      !> Squared angular frequency with its losses, rad2/s2.
-      complex(wp), intent(in) :: pole
-      real(wp) :: decay
+   !> Stiffness of modes with their losses at an angular frequency, rad2/s2: [n_mode]. Modes that are not mixed have
+   !> dashpots, whose sound is causal; others have the complex stiffness that mixes them.
+   pure function get_stiffness(coupled, omega) result(stiffness)
+      type(coupled_type), intent(in) :: coupled
+      !> The angular frequency, rad/s.
+      real(wp), intent(in) :: omega
+      complex(wp) :: stiffness(size(coupled%pole))
 
-      decay = pole%im/sqrt(max(pole%re, tiny(1.0_wp)))
-   end function get_decay
+      stiffness = coupled%pole
+      if (.not. are_mixed(coupled%floor%modes%block)) stiffness%im = omega*coupled%decay
+   end function get_stiffness
 
-   !> Volume flow into the pairs of half waves of a group, m3/s per Hz, for each frequency real parts, then imaginary parts,
-   !> for each ball: [n_pair, 2*n_ball*n_line].
-   pure function get_flow(group, gain, response) result(flow)
-      type(group_type), intent(in) :: group
-      !> Shapes of the modes at the balls: [n_mode, n_ball]; their velocities per unit of it: [n_mode, n_line].
-      complex(wp), intent(in) :: gain(:, :), response(:, :)
-      real(wp), allocatable :: flow(:, :)
-      complex(wp) :: velocity(size(group%mode))
-      real(wp), allocatable :: part(:, :)
-      integer :: i, j, n, rows, at
+   !> Volume flow into the pairs of half waves for each ball, frequency after frequency, m3/s per Hz:
+   !> [n_pair, n_ball*n_line].
+   pure function get_flow(coupled, response) result(flow)
+      type(coupled_type), intent(in) :: coupled
+      !> Velocities of the modes per unit of their shape under the force: [n_mode, n_line].
+      complex(wp), intent(in) :: response(:, :)
+      complex(wp), allocatable :: flow(:, :)
+      complex(wp), allocatable :: velocity(:, :)
+      integer :: i, j, k, n_ball
 
-      n = size(group%mode)
-      rows = size(group%coupling, 1)
-      allocate (part(rows, 2*size(gain, 2)*size(response, 2)))
-      do i = 1, size(response, 2)
-         do j = 1, size(gain, 2)
-            velocity = gain(group%mode, j)*response(group%mode, i)
-            at = 2*size(gain, 2)*(i - 1) + j
-            part(:n, at) = velocity%re
-            part(:n, at + size(gain, 2)) = velocity%im
-            ! Of a complex coupling.
-            part(n + 1:, at) = velocity(:rows - n)%im
-            part(n + 1:, at + size(gain, 2)) = -velocity(:rows - n)%re
-         end do
+      n_ball = size(coupled%gain, 2)
+      allocate (flow(size(coupled%lx), n_ball*size(response, 2)))
+      do k = 1, size(coupled%group)
+         associate (group => coupled%group(k))
+            allocate (velocity(size(group%mode), size(flow, 2)))
+            do i = 1, size(response, 2)
+               do j = 1, n_ball
+                  velocity(:, n_ball*(i - 1) + j) = coupled%gain(group%mode, j)*response(group%mode, i)
+               end do
+            end do
+            flow(group%pair, :) = cmplx(get_transposed_product(group%real_part, velocity%re), &
+               get_transposed_product(group%real_part, velocity%im), wp)
+            if (allocated(group%imaginary_part)) flow(group%pair, :) = flow(group%pair, :) + cmplx( &
+               -get_transposed_product(group%imaginary_part, velocity%im), &
+               get_transposed_product(group%imaginary_part, velocity%re), wp)
+            deallocate (velocity)
+         end associate
       end do
-      flow = get_transposed_product(group%coupling, part)
    end function get_flow
 
    !> Sums over frequencies of the powers into the floor and lost by it per mean-square force, J s: [n_ball, 2].
@@ -383,17 +323,13 @@ contains
       complex(wp), dimension(size(coupled%pole), size(coupled%gain, 2)) :: stressed, velocity
       integer :: i, j
 
-      associate (pole => coupled%pole, gain => coupled%gain, blocks => coupled%floor%modes%block)
+      associate (gain => coupled%gain, blocks => coupled%floor%modes%block)
          energy(:, 1) = real(matmul(matmul(response, conjg(force)), gain**2), wp)
-         if (.not. are_mixed(blocks)) then
-            energy(:, 2) = matmul(get_decay(pole)*sum(response%re**2 + response%im**2, dim=2), gain%re**2)
-            return
-         end if
          ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
          energy(:, 2) = 0.0_wp
          do i = 1, size(frequency)
             velocity = gain*spread(response(:, i), 2, size(gain, 2))
-            stressed = get_mixed(blocks, spread(pole, 2, size(gain, 2))*velocity)
+            stressed = get_mixed(blocks, spread(get_stiffness(coupled, 2*pi*frequency(i)), 2, size(gain, 2))*velocity)
             velocity = get_mixed(blocks, velocity)
             do j = 1, size(gain, 2)
                energy(j, 2) = energy(j, 2) + aimag(dot_product(velocity(:, j), stressed(:, j)))/(2*pi*frequency(i))
@@ -401,28 +337,6 @@ contains
          end do
       end associate
    end function get_floor_energies
-
-   !> Fourier transform of a force, N s, at frequencies in equal steps.
-   pure function get_spectrum(force, sample_rate, frequency) result(spectrum)
-      real(wp), intent(in) :: force(:)
-      real(wp), intent(in) :: sample_rate
-      !> Frequencies, Hz, multiples of the first one: [n].
-      real(wp), intent(in) :: frequency(:)
-      complex(wp) :: spectrum(size(frequency))
-      complex(wp) :: turn, phase
-      integer :: i, k, last
-
-      last = findloc(abs(force) > 0.0_wp, .true., dim=1, back=.true.)
-      spectrum = 0.0_wp
-      do i = 1, last
-         turn = exp(cmplx(0.0_wp, -2*pi*frequency(1)*(i - 1)/sample_rate, wp))
-         phase = force(i)/sample_rate
-         do k = 1, size(frequency)
-            phase = phase*turn
-            spectrum(k) = spectrum(k) + phase
-         end do
-      end do
-   end function get_spectrum
 
    !> Natural frequency of a mode of the room, Hz.
    elemental function get_mode_frequency(box, lx, ly, lz) result(frequency)
@@ -474,7 +388,7 @@ contains
       n = size(coupled%box%microphone, 2)
       associate (box => coupled%box, lx => coupled%lx, ly => coupled%ly, w => 2*pi*frequency, &
          height => coupled%box%microphone(3, :)/coupled%box%sides(3))
-         allocate (answers%pressure(2*n, size(lx), size(frequency)))
+         allocate (answers%pressure(n, size(lx), size(frequency)))
          allocate (answers%input(size(lx), size(frequency)), answers%loss(size(lx), size(frequency)), source=0.0_wp)
          shape = get_cosines(lx, box%microphone(1, :)/box%sides(1))*get_cosines(ly, box%microphone(2, :)/box%sides(2))
          do i = 1, size(lx)
@@ -485,7 +399,7 @@ contains
                if (natural > coupled%highest) exit
                answers%n_mode = answers%n_mode + 1
                ! The reverberation time of the nearest band.
-               decay = 6*log(10.0_wp)/box%reverberation_time(minloc(abs(log(max(natural, 1.0_wp)/box%bands%center)), dim=1))
+               decay = decay_of_60_db/box%reverberation_time(minloc(abs(log(max(natural, 1.0_wp)/box%bands%center)), dim=1))
                ! rho0 c0**2/(V norm), Pa/m3: the norm is the mean-square shape.
                stiffness = box%air%density*box%air%sound_speed**2/product(box%sides)*2**count([lx(i), ly(i), k] > 0)
                amplitude = stiffness*cmplx(0.0_wp, w, wp)/cmplx((2*pi*natural)**2 - w**2, w*decay, wp)
@@ -497,8 +411,7 @@ contains
                end do
                k = k + 1
             end do
-            answers%pressure(:n, i, :) = transpose(pressure%re)
-            answers%pressure(n + 1:, i, :) = transpose(pressure%im)
+            answers%pressure(:, i, :) = transpose(pressure)
          end do
       end associate
    end subroutine get_answers
@@ -519,7 +432,7 @@ contains
       real(wp) :: mean, largest, decay
       integer :: i, j, k, l
 
-      decay = exp(-1/(sample_rate*time_constant))
+      decay = exp(-1/(sample_rate*fast_time))
       filtered(0) = 0.0_wp
       do i = 1, size(bands)
          ! Butterworth filters of third order with the exact edges (class 1 of IEC 61260-1).

@@ -73,22 +73,16 @@ contains
       !> Set if a list has neither one value nor one for each wall.
       type(error_type), allocatable, intent(out) :: error
 
+      type(list_type) :: lists(5)
+      character(len=16), parameter :: keys(*) = [character(len=16) :: 'wall_thickness', 'wall_density', 'wall_wave_speed', &
+         'wall_loss_factor', 'junction_index']
+      integer :: i
+
       if (walls%lengths%count == 0) return
-      call check_count(walls%thickness, 'wall_thickness')
-      call check_count(walls%density, 'wall_density')
-      call check_count(walls%wave_speed, 'wall_wave_speed')
-      call check_count(walls%loss_factor, 'wall_loss_factor')
-      call check_count(walls%index, 'junction_index')
-   contains
-
-      subroutine check_count(list, key)
-         type(list_type), intent(in) :: list
-         character(len=*), intent(in) :: key
-
-         if (allocated(error) .or. any(list%count == [1, walls%lengths%count])) return
-         error = input_error('&room: '//key//' has '//to_text(list%count)//' values; allowed: 1, or 1 for each of the ' &
-            //to_text(walls%lengths%count)//' wall_lengths')
-      end subroutine check_count
+      lists = [walls%thickness, walls%density, walls%wave_speed, walls%loss_factor, walls%index]
+      i = findloc(lists%count /= 1 .and. lists%count /= walls%lengths%count, .true., dim=1)
+      if (i > 0) error = input_error('&room: '//trim(keys(i))//' has '//to_text(lists(i)%count)//' values; allowed: 1, or ' &
+         //'1 for each of the '//to_text(walls%lengths%count)//' wall_lengths')
    end subroutine check_walls
 
    !> The value of a wall in a list of one value for all or one for each.
