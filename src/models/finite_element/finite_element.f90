@@ -33,7 +33,7 @@ module thud_finite_element
    implicit none (type, external)
    private
 
-   public :: finite_element_type
+   public :: finite_element_type, get_frame_count
 
    !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
@@ -100,7 +100,6 @@ module thud_finite_element
       procedure :: refine
       procedure :: solve
       procedure :: compress
-      procedure :: get_snapshot_shape
       procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: get_loss_factors
@@ -134,6 +133,7 @@ contains
       type(ball_type), intent(in) :: ball
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
+      type(mesh_options_type) :: largest
       real(wp) :: bytes
 
       call check_material(self%material, ball, error)
@@ -145,8 +145,13 @@ contains
             //' Hz is not allowed with finite_element; allowed: from '//to_text(min_rate)//' Hz')
          return
       end if
+      largest = get_element_counts(ball, self%mesh)
+      if (chooses_resolution(self)) then
+         largest%radial_elements = nint(largest%radial_elements*refinement_ratio**(highest_level - 1))
+         largest%polar_elements = nint(largest%polar_elements*refinement_ratio**(highest_level - 1)*max_contact_ratio)
+      end if
       ! Positions and velocities of each node.
-      bytes = 32.0_wp*product(real(self%get_snapshot_shape(ball, sampling), wp))
+      bytes = 32.0_wp*(largest%radial_elements + 1)*(largest%polar_elements + 1)*get_frame_count(self, sampling)
       if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
          //to_text(self%snapshot_interval)//' s makes '//to_text(get_frame_count(self, sampling)) &
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
@@ -258,22 +263,6 @@ contains
 
       rate = sqrt(ball%youngs_modulus/(2*(1 + ball%poisson_ratio)*get_density(ball)))/ball%outer_radius
    end function get_shear_rate
-
-   !> Size of the snapshots; of automatic elements the largest that the levels of resolution can have.
-   function get_snapshot_shape(self, ball, sampling) result(extents)
-      class(finite_element_type), intent(in) :: self
-      type(ball_type), intent(in) :: ball
-      type(sampling_type), intent(in) :: sampling
-      !> Number of nodes from pole to pole, of nodes through the wall, and of snapshots.
-      integer :: extents(3)
-      integer :: factor(2)
-
-      factor = 1
-      if (chooses_resolution(self)) factor = nint(refinement_ratio**(highest_level - 1)*[max_contact_ratio, 1.0_wp])
-      associate (counts => get_element_counts(ball, self%mesh))
-         extents = [factor*[counts%polar_elements, counts%radial_elements] + 1, get_frame_count(self, sampling)]
-      end associate
-   end function get_snapshot_shape
 
    !> Maximum number of snapshots of a run.
    pure function get_frame_count(self, sampling) result(n_frame)

@@ -124,18 +124,13 @@ contains
       !> Set if the modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: omega(:), coefficient(:, :)
-      logical :: failed
       integer :: n, k, i, place
 
       do n = 0, size(lowest) + 1
          call check_interrupt(error)
          if (allocated(error)) return
-         call get_modes(basis, n, highest_omega, omega, coefficient, failed)
-         if (failed) then
-            error = numerical_error('&ball: the modes of harmonic '//to_text(n)//' cannot be computed in double ' &
-               //'precision; allowed: less extreme values of wall_thickness and poisson_ratio')
-            return
-         end if
+         call get_modes(basis, n, highest_omega, omega, coefficient, error)
+         if (allocated(error)) return
          do k = 1, size(omega)
             place = count(lowest%omega <= omega(k)) + 1
             if (place > size(lowest)) exit

@@ -8,7 +8,7 @@ module thud_modal_ball
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
-   use thud_error, only: error_type, input_error, numerical_error
+   use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
    use thud_force_history, only: add_model_quantity, force_history_type
    use thud_kinds, only: wp
@@ -21,7 +21,7 @@ module thud_modal_ball
    use thud_ring_contact, only: new_ring_contact
    use thud_sampling, only: sampling_type
    use thud_source_model, only: resolution_type, source_model_type
-   use thud_sphere_modes, only: basis_type, family_type, get_families, get_flexibility, limit_family, new_basis
+   use thud_sphere_modes, only: family_type, get_families, get_flexibilities, limit_family
    use thud_surface_rings, only: get_ring_response, greatest_angle, new_surface_rings
    use thud_text, only: to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
@@ -328,7 +328,6 @@ contains
       type(family_type), allocatable :: families(:)
       real(wp), allocatable :: flexibility(:, :, :), gain(:, :, :), response(:, :)
       real(wp) :: highest_omega, omega
-      logical :: failed
       integer :: i, n
 
       highest_omega = min(2*pi*get_frequency(self, run%ball, 1), max_phase/run%interval)
@@ -348,7 +347,7 @@ contains
       call new_damping(self%damping_law, self%loss_factor, self%loss_frequency, self%fractional_order, &
          get_frequency(self, run%ball, 1), run%modes%damping)
       call set_factors(run%modes, run%interval)
-      call get_flexibilities(self, run, families, flexibility, error)
+      call get_flexibilities(run%ball, self%cavity_gas, families, ubound(run%rings%shape_at_ring, 3), flexibility, error)
       if (allocated(error)) return
       run%static_modes = new_static_step(run%modes%damping, run%interval, get_ring_response(run%rings, flexibility))
       ! Response of the oscillating modes after one step, of those without inertia, of the rigid ball and of the floor.
@@ -363,40 +362,7 @@ contains
       associate (own => response(::run%rings%n_dof, ::run%rings%n_dof))
          own = own + (run%interval**2/(2*run%ball%mass) + run%floor_step%compliance)
       end associate
-      call new_ring_contact(response, run%rings%n_dof, run%contact, failed)
-      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(run%rings%radius)) &
-         //' cannot be distinguished; allowed: fewer rings, or more substeps')
+      call new_ring_contact(response, run%rings%n_dof, run%contact, error)
    end subroutine prepare
-
-   !> Flexibilities of all harmonics of the rings, without the modes that oscillate.
-   subroutine get_flexibilities(self, run, families, flexibility, error)
-      type(modal_ball_type), intent(in) :: self
-      !> The run; its rings are set.
-      type(modal_run_type), intent(in) :: run
-      !> Harmonics that have modes: [0:highest].
-      type(family_type), intent(in) :: families(0:)
-      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2, 0:highest].
-      real(wp), allocatable, intent(out) :: flexibility(:, :, :)
-      !> Set if a flexibility cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
-      type(basis_type) :: basis
-      logical :: failed
-      integer :: n
-
-      basis = new_basis(run%ball, 0, self%cavity_gas)
-      allocate (flexibility(2, 2, 0:ubound(run%rings%shape_at_ring, 3)))
-      do n = 0, ubound(flexibility, 3)
-         if (n <= ubound(families, 1)) then
-            flexibility(:, :, n) = families(n)%flexibility
-            cycle
-         end if
-         call get_flexibility(basis, n, flexibility(:, :, n), failed)
-         if (failed) then
-            error = numerical_error('&modal_ball: rings: the flexibility of harmonic '//to_text(n) &
-               //' cannot be computed; allowed: fewer rings, or a thinner wall')
-            return
-         end if
-      end do
-   end subroutine get_flexibilities
 
 end module thud_modal_ball

@@ -6,7 +6,7 @@ module thud_modal_compression
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact, update_sticking
-   use thud_sphere_modes, only: basis_type, get_flexibility, new_basis
+   use thud_sphere_modes, only: family_type, get_flexibilities
    use thud_surface_rings, only: get_ring_response, surface_rings_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -78,21 +78,14 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> Set if the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
-      type(basis_type) :: basis
-      real(wp) :: flexibility(2, 2, 0:ubound(rings%shape_at_ring, 3))
-      logical :: failed
-      integer :: n
+      type(family_type) :: no_modes(0)
+      real(wp), allocatable :: flexibility(:, :, :)
 
-      basis = new_basis(ball, 0, with_gas)
-      flexibility = 0.0_wp
+      call get_flexibilities(ball, with_gas, no_modes, ubound(rings%shape_at_ring, 3), flexibility, error)
+      if (allocated(error)) return
       ! Equal forces on both poles double the response of even harmonics and cancel that of odd ones.
-      do n = 0, ubound(flexibility, 3), 2
-         call get_flexibility(basis, n, flexibility(:, :, n), failed)
-         if (failed) exit
-      end do
-      if (.not. failed) call new_ring_contact(2*get_ring_response(rings, flexibility), rings%n_dof, contact, failed)
-      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(size(rings%radius)) &
-         //' cannot be distinguished; allowed: fewer rings')
+      flexibility(:, :, 1::2) = 0.0_wp
+      call new_ring_contact(2*get_ring_response(rings, flexibility), rings%n_dof, contact, error)
    end subroutine new_press
 
 end module thud_modal_compression

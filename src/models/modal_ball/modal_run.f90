@@ -281,22 +281,18 @@ contains
       logical, intent(in) :: has_separated
       !> Set if the ball touches the floor or may touch it again.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: cause, allowed
+      character(len=:), allocatable :: cause
 
+      cause = '; allowed: longer than that'
+      if (run%floor_moves) cause = ', probably because the floor is so soft that the ball sinks into it instead of ' &
+         //'rebounding; allowed: a stiffer floor, covering or floating plate, or a longer duration'
       if (.not. has_separated) then
-         cause = ''
-         allowed = 'longer than that'
-         if (run%floor_moves) then
-            cause = ', probably because the floor is so soft that the ball sinks into it instead of rebounding'
-            allowed = 'a stiffer floor, covering or floating plate, or a longer duration'
-         end if
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact'//cause//'; allowed: '//allowed)
+            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact'//cause)
       else if (run%floor_moves) then
-         if (can_strike(run%floor, run%floor_motion, minval(run%gap(::run%contact%n_dof)), run%velocity)) then
-            error = input_error('&sampling: duration = '//to_text(sampling%duration) &
-               //' s ends while the floor may strike the ball again; allowed: longer')
-         end if
+         if (can_strike(run%floor, run%floor_motion, minval(run%gap(::run%contact%n_dof)), run%velocity)) error = &
+            input_error('&sampling: duration = '//to_text(sampling%duration) &
+            //' s ends while the floor may strike the ball again; allowed: longer')
       end if
    end subroutine check_end
 

@@ -46,15 +46,15 @@ module thud_ring_contact
 contains
 
    !> Prepares the contact.
-   subroutine new_ring_contact(response, n_dof, contact, failed)
+   subroutine new_ring_contact(response, n_dof, contact, error)
       !> Gaps due to unit forces, symmetric, m/N: [n_gap, n_gap].
       real(wp), intent(in) :: response(:, :)
       !> Degrees of freedom of a ring.
       integer, intent(in) :: n_dof
       !> The contact; no ring touches.
       type(ring_contact_type), intent(out) :: contact
-      !> Whether the response is not positive definite.
-      logical, intent(out) :: failed
+      !> Set if the response is not positive definite.
+      type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: factor(:, :)
       integer :: i, n, info
 
@@ -66,8 +66,11 @@ contains
       allocate (contact%indices(n), source=0)
       factor = response
       call dpotrf('L', n, factor, n, info)
-      failed = info /= 0
-      if (failed) return
+      if (info /= 0) then
+         error = numerical_error('&modal_ball: rings = '//to_text(n/n_dof)//' cannot be distinguished; allowed: fewer rings, ' &
+            //'or more substeps')
+         return
+      end if
       do i = 1, n
          contact%inverse(i, i) = 1.0_wp
       end do

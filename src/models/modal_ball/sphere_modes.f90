@@ -17,8 +17,8 @@ module thud_sphere_modes
    implicit none (type, external)
    private
 
-   public :: basis_type, family_type, get_displacements, get_families, get_family, get_flexibility, get_modes
-   public :: limit_family, new_basis
+   public :: basis_type, family_type, get_displacements, get_families, get_family, get_flexibilities, get_flexibility
+   public :: get_modes, limit_family, new_basis
 
    !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. The modes differ from those of
    !> incompressible material by about this distance.
@@ -216,7 +216,6 @@ contains
       type(basis_type) :: basis
       real(wp) :: wavenumber
       integer :: n, highest
-      logical :: failed
 
       wavenumber = highest_omega*sqrt(get_density(ball)*2*(1 + ball%poisson_ratio)/ball%youngs_modulus)
       if (.not. wavenumber*ball%outer_radius <= max_waves) then
@@ -238,12 +237,8 @@ contains
             call move_alloc(families, all)
             basis = new_basis(ball, 2*n, with_gas, highest_omega)
          end if
-         call get_family(basis, n, highest_omega, all(n), failed)
-         if (failed) then
-            error = numerical_error('&modal_ball: the modes of harmonic '//to_text(n) &
-               //' cannot be computed; allowed: a thinner wall, or a lower highest_frequency')
-            return
-         end if
+         call get_family(basis, n, highest_omega, all(n), error)
+         if (allocated(error)) return
          ! From n = 2 on the lowest frequencies of the harmonics increase.
          if (n >= 2 .and. size(all(n)%omega) == 0) exit
          n = n + 1
@@ -267,21 +262,21 @@ contains
    end subroutine limit_family
 
    !> The modes of one harmonic up to a frequency, and the flexibility of all other modes.
-   subroutine get_family(basis, harmonic, highest_omega, family, failed)
+   subroutine get_family(basis, harmonic, highest_omega, family, error)
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
       !> Highest angular frequency to keep, rad/s.
       real(wp), intent(in) :: highest_omega
       type(family_type), intent(out) :: family
-      !> Whether the eigenproblem could not be solved.
-      logical, intent(out) :: failed
+      !> Set if the modes cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: coefficient(:, :)
       integer :: k
 
-      call get_flexibility(basis, harmonic, family%flexibility, failed)
-      if (.not. failed) call get_modes(basis, harmonic, highest_omega, family%omega, coefficient, failed)
-      if (failed) return
+      call get_flexibility(basis, harmonic, family%flexibility, error)
+      if (.not. allocated(error)) call get_modes(basis, harmonic, highest_omega, family%omega, coefficient, error)
+      if (allocated(error)) return
       family%surface = matmul(sum(get_displacements(basis, harmonic, [1.0_wp]), dim=2), coefficient)
       do k = 1, size(family%omega)
          family%flexibility = family%flexibility - outer(family%surface(:, k))/family%omega(k)**2
@@ -290,7 +285,7 @@ contains
 
    !> The elastic modes of one harmonic up to a frequency. The largest eigenvalues of mass over stiffness lose no digits to
    !> the energies of compression and of thin walls, which are much larger than those of the lowest modes.
-   subroutine get_modes(basis, harmonic, highest_omega, omega, coefficient, failed)
+   subroutine get_modes(basis, harmonic, highest_omega, omega, coefficient, error)
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
@@ -300,8 +295,8 @@ contains
       real(wp), allocatable, intent(out) :: omega(:)
       !> Coefficients of the functions for modes of unit modal mass, 1/sqrt(kg): [n, n_mode].
       real(wp), allocatable, intent(out) :: coefficient(:, :)
-      !> Whether the eigenproblem could not be solved.
-      logical, intent(out) :: failed
+      !> Set if the eigenproblem cannot be solved.
+      type(error_type), allocatable, intent(out) :: error
       real(wp), allocatable :: stiffness(:, :), mass(:, :), momentum(:), inverse(:), shape(:, :), work(:)
       integer, allocatable :: iwork(:), unconverged(:)
       integer :: n, n_mode, info
@@ -311,8 +306,10 @@ contains
       allocate (inverse(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
       call dsygvx(1, 'V', 'V', 'L', n, mass, n, stiffness, n, 1/highest_omega**2, huge(1.0_wp), 0, 0, 0.0_wp, n_mode, &
          inverse, shape, n, work, size(work), iwork, unconverged, info)
-      failed = info /= 0
-      if (failed) return
+      if (info /= 0) then
+         error = harmonic_error('modes', harmonic)
+         return
+      end if
       omega = 1/sqrt(inverse(n_mode:1:-1))
       shape(:, :n_mode) = shape(:, n_mode:1:-1)*spread(omega, 1, n)
       if (harmonic == 1) then
@@ -327,13 +324,13 @@ contains
    !> Flexibility of a harmonic, without the rigid mode of n = 1; below n = 2 by the basis, from there in closed form (Lur'e,
    !> Theory of Elasticity, Springer 2005, section 5.1): four solutions of the static equations with U = a r^m, V = b r^m,
    !> and the tractions 2 mu c r^(m-1), 2 mu d r^(m-1).
-   subroutine get_flexibility(basis, harmonic, flexibility, failed)
+   subroutine get_flexibility(basis, harmonic, flexibility, error)
       type(basis_type), intent(in) :: basis
       integer, intent(in) :: harmonic
       !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2].
       real(wp), intent(out) :: flexibility(2, 2)
-      !> Whether the stiffness is singular, or the solutions cannot be distinguished.
-      logical, intent(out) :: failed
+      !> Set if the stiffness is singular, or the solutions cannot be distinguished.
+      type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(4) :: a, b, c, d, inner, at_outer
       real(wp) :: matrix(4, 4), right(4, 2)
       real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :), momentum(:)
@@ -349,7 +346,7 @@ contains
             solution = transpose(surface)
             call dposv('L', n_function, 2, stiffness, n_function, solution, n_function, info)
          end associate
-         failed = info /= 0
+         if (info /= 0) error = harmonic_error('flexibility', harmonic)
          flexibility = matmul(surface, solution)
          return
       end if
@@ -376,13 +373,55 @@ contains
          right(2, 2) = 1/(area*n*(n + 1)*scale)
       end associate
       call dgetf2(4, 4, matrix, 4, pivot, info)
-      failed = info /= 0
-      if (failed) return
+      if (info /= 0) then
+         error = harmonic_error('flexibility', harmonic)
+         return
+      end if
       call dgetrs('N', 4, 2, matrix, 4, pivot, right, 4, info)
       at_outer = [1.0_wp, 1.0_wp, inner(3), inner(4)]
       flexibility(1, :) = matmul(a*at_outer, right)
       flexibility(2, :) = matmul(b*at_outer, right)
    end subroutine get_flexibility
+
+   !> Error for a harmonic.
+   function harmonic_error(quantity, harmonic) result(error)
+      !> What cannot be computed.
+      character(len=*), intent(in) :: quantity
+      integer, intent(in) :: harmonic
+      type(error_type) :: error
+
+      error = numerical_error('&ball: the '//quantity//' of harmonic '//to_text(harmonic)//' cannot be computed in double ' &
+         //'precision; allowed: less extreme values of wall_thickness and poisson_ratio, fewer modes or rings')
+   end function harmonic_error
+
+   !> Flexibilities of all harmonics up to a highest one, without the modes that oscillate.
+   subroutine get_flexibilities(ball, with_gas, families, highest, flexibility, error)
+      type(ball_type), intent(in) :: ball
+      !> Whether the enclosed gas resists changes of its volume.
+      logical, intent(in) :: with_gas
+      !> Harmonics that have modes, and their flexibilities: [0:].
+      type(family_type), intent(in) :: families(0:)
+      !> Highest harmonic.
+      integer, intent(in) :: highest
+      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2, 0:highest].
+      real(wp), allocatable, intent(out) :: flexibility(:, :, :)
+      !> Set if a flexibility cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(basis_type) :: basis
+      integer :: n
+
+      ! Higher harmonics have closed forms.
+      basis = new_basis(ball, 1, with_gas)
+      allocate (flexibility(2, 2, 0:highest))
+      do n = 0, highest
+         if (n < size(families)) then
+            flexibility(:, :, n) = families(n)%flexibility
+         else
+            call get_flexibility(basis, n, flexibility(:, :, n), error)
+            if (allocated(error)) return
+         end if
+      end do
+   end subroutine get_flexibilities
 
    !> Stiffness and mass of one harmonic in the basis. For n = 1 its first function, U = 1 and W = 0, is the rigid mode; the
    !> others keep their elastic part, without momentum.
