@@ -23,10 +23,8 @@ module thud_rubber
 
    !> Multiplication takes a fraction of the time of a division.
    real(wp), parameter :: third = 1/3.0_wp
-   !> Half-width of the range around 1 in which one iteration gives all digits of the cube root.
-   real(wp), parameter :: near = 0.2_wp
-   !> Middle and half-width of the range in which two iterations do.
-   real(wp), parameter :: middle = 1.45_wp, far = 1.05_wp
+   !> Middle and half-width of the range in which two iterations give all digits of the cube root.
+   real(wp), parameter :: middle = 1.45_wp, half_width = 1.05_wp
    !> Distance from 1 within which the series of the cube root has all digits.
    real(wp), parameter :: near_1 = 1.0e-3_wp
 
@@ -110,49 +108,23 @@ contains
       real(wp), intent(in) :: x(n)
       !> Their roots: [n].
       real(wp), intent(out) :: root(n)
-      real(wp) :: residual
+      real(wp) :: residual, n_outside
       integer :: j, iteration
 
-      ! Minimax polynomials with errors of 3e-5 and 4 %; each iteration raises the error to its fourth power.
-      if (is_within(n, x, 1.0_wp, near)) then
-         !$omp simd private(residual)
-         do j = 1, n
-            root(j) = 1.74098956_wp + x(j)*(-1.32838497_wp + x(j)*(0.76697019_wp - x(j)*0.17960475_wp))
+      ! A minimax polynomial with an error of 4 %; each iteration raises the error to its fourth power. The numbers outside
+      ! its range are counted by a sum, since gfortran does not vectorize minimum and maximum.
+      n_outside = 0.0_wp
+      !$omp simd private(residual) reduction(+:n_outside)
+      do j = 1, n
+         root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
+         do iteration = 1, 2
             residual = 1 - x(j)*root(j)**3
             root(j) = root(j)*(1 + residual*(1/3.0_wp + residual*(2/9.0_wp + residual*(14/81.0_wp))))
          end do
-      else if (is_within(n, x, middle, far)) then
-         !$omp simd private(residual)
-         do j = 1, n
-            root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
-            do iteration = 1, 2
-               residual = 1 - x(j)*root(j)**3
-               root(j) = root(j)*(1 + residual*(1/3.0_wp + residual*(2/9.0_wp + residual*(14/81.0_wp))))
-            end do
-         end do
-      else
-         root = x**(-1.0_wp/3.0_wp)
-      end if
-   end subroutine get_inverse_cube_root
-
-   !> Whether all numbers lie within a range.
-   pure function is_within(n, x, center, half_width) result(yes)
-      integer, intent(in) :: n
-      !> The numbers: [n].
-      real(wp), intent(in) :: x(n)
-      real(wp), intent(in) :: center, half_width
-      logical :: yes
-      real(wp) :: n_outside
-      integer :: j
-
-      ! A sum, since gfortran does not vectorize minimum and maximum.
-      n_outside = 0.0_wp
-      !$omp simd reduction(+:n_outside)
-      do j = 1, n
-         n_outside = n_outside + merge(0.0_wp, 1.0_wp, abs(x(j) - center) <= half_width)
+         n_outside = n_outside + merge(0.0_wp, 1.0_wp, abs(x(j) - middle) <= half_width)
       end do
-      yes = .not. n_outside > 0.0_wp
-   end function is_within
+      if (n_outside > 0.0_wp) root = x**(-1.0_wp/3.0_wp)
+   end subroutine get_inverse_cube_root
 
    !> Sets the isochoric and mean stresses and the energies of the elastic solid, without dissipation.
    pure subroutine set_elastic_stress(block, material, strain, stress)

@@ -153,14 +153,11 @@ contains
          call check_interrupt(error)
          if (allocated(error)) return
       end do samples
-      if (impact%source%touching) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration) &
-            //' s ends while the source is still in contact; allowed: longer than the contact')
-      else if (.not. has_left(impact)) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration) &
-            //' s ends while the source may touch the floor again; allowed: longer')
-      else
+      if (has_left(impact)) then
          call finish(impact, history, error)
+      else
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the source touches the ' &
+            //'floor or may touch it again; allowed: longer')
       end if
    end subroutine march
 

@@ -12,7 +12,7 @@ module thud_modal_ball
    use thud_field, only: field_type, list_type, name_length
    use thud_force_history, only: add_model_quantity, force_history_type
    use thud_kinds, only: wp
-   use thud_modal_compression, only: compress_modal_ball
+   use thud_modal_compression, only: compress_modal_ball, get_flexibilities
    use thud_modal_run, only: march, modal_run_type, new_history, start_run
    use thud_mode_step, only: damping_type, index_amplitude, new_damping, new_modes, new_static_step, set_factors
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
@@ -21,7 +21,7 @@ module thud_modal_ball
    use thud_ring_contact, only: new_ring_contact
    use thud_sampling, only: sampling_type
    use thud_source_model, only: resolution_type, source_model_type
-   use thud_sphere_modes, only: family_type, get_families, get_flexibilities, limit_family
+   use thud_sphere_modes, only: family_type, get_families, limit_family
    use thud_surface_rings, only: get_ring_response, greatest_angle, new_surface_rings
    use thud_text, only: to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type

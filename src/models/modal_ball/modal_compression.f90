@@ -1,18 +1,18 @@
-!> Quasi-static compression of the modal ball: the static flexibility of all harmonics, with the long-term modulus, under
-!> unilateral contact with two plates.
+!> Static flexibility of the modal ball, and its quasi-static compression: the flexibility of all harmonics, with the
+!> long-term modulus, under unilateral contact with two plates.
 module thud_modal_compression
    use thud_ball, only: ball_type
    use thud_error, only: error_type, numerical_error
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact, update_sticking
-   use thud_sphere_modes, only: family_type, get_flexibilities
+   use thud_sphere_modes, only: basis_type, family_type, get_flexibility, new_basis
    use thud_surface_rings, only: get_ring_response, surface_rings_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: compress_modal_ball, new_press
+   public :: compress_modal_ball, get_flexibilities, new_press
 
    !> Maximum approach of the plates in a step with sticking rings, as a fraction of the outer radius.
    real(wp), parameter :: max_step = 1.0e-3_wp
@@ -87,5 +87,34 @@ contains
       flexibility(:, :, 1::2) = 0.0_wp
       call new_ring_contact(2*get_ring_response(rings, flexibility), rings%n_dof, contact, error)
    end subroutine new_press
+
+   !> Flexibilities of all harmonics up to a highest one, without the modes that oscillate.
+   subroutine get_flexibilities(ball, with_gas, families, highest, flexibility, error)
+      type(ball_type), intent(in) :: ball
+      !> Whether the enclosed gas resists changes of its volume.
+      logical, intent(in) :: with_gas
+      !> Harmonics that have modes, and their flexibilities: [0:].
+      type(family_type), intent(in) :: families(0:)
+      !> Highest harmonic.
+      integer, intent(in) :: highest
+      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2, 0:highest].
+      real(wp), allocatable, intent(out) :: flexibility(:, :, :)
+      !> Set if a flexibility cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(basis_type) :: basis
+      integer :: n
+
+      ! Higher harmonics have closed forms.
+      basis = new_basis(ball, 1, with_gas)
+      allocate (flexibility(2, 2, 0:highest))
+      do n = 0, highest
+         if (n < size(families)) then
+            flexibility(:, :, n) = families(n)%flexibility
+         else
+            call get_flexibility(basis, n, flexibility(:, :, n), error)
+            if (allocated(error)) return
+         end if
+      end do
+   end subroutine get_flexibilities
 
 end module thud_modal_compression

@@ -17,8 +17,8 @@ module thud_sphere_modes
    implicit none (type, external)
    private
 
-   public :: basis_type, family_type, get_displacements, get_families, get_family, get_flexibilities, get_flexibility
-   public :: get_modes, limit_family, new_basis
+   public :: basis_type, family_type, get_displacements, get_families, get_family, get_flexibility, get_modes
+   public :: limit_family, new_basis
 
    !> Distance of Poisson's ratio from 1/2 below which the material counts as incompressible. The modes differ from those of
    !> incompressible material by about this distance.
@@ -29,6 +29,9 @@ module thud_sphere_modes
 
    !> Maximum wavenumber of shear waves times outer radius: some hundred harmonics, whose modes take minutes.
    real(wp), parameter :: max_waves = 600.0_wp
+
+   !> Bound of the harmonics that have modes: bending waves of a wall of 1e-3 of the radius have 1440 at that wavenumber.
+   integer, parameter :: max_harmonic = 4000
 
    !> Gram matrices of the basis, the same for every harmonic.
    type :: basis_type
@@ -226,23 +229,20 @@ contains
       ! Surface waves of this frequency; bending waves of thin walls are slower.
       highest = 4 + ceiling(1.1_wp*wavenumber*ball%outer_radius)
       basis = new_basis(ball, highest, with_gas, highest_omega)
-      allocate (all(0:highest))
-      n = 0
-      do
+      allocate (all(0:max_harmonic))
+      do n = 0, max_harmonic
          call check_interrupt(error)
          if (allocated(error)) return
-         if (n > ubound(all, 1)) then
-            allocate (families(0:2*n))
-            families(:n - 1) = all
-            call move_alloc(families, all)
-            basis = new_basis(ball, 2*n, with_gas, highest_omega)
+         if (n > highest) then
+            highest = 2*n
+            basis = new_basis(ball, highest, with_gas, highest_omega)
          end if
          call get_family(basis, n, highest_omega, all(n), error)
          if (allocated(error)) return
          ! From n = 2 on the lowest frequencies of the harmonics increase.
          if (n >= 2 .and. size(all(n)%omega) == 0) exit
-         n = n + 1
       end do
+      n = min(n, max_harmonic)
       allocate (families(0:n), source=all(:n))
    end subroutine get_families
 
@@ -306,19 +306,13 @@ contains
       allocate (inverse(n), shape(n, n), work(34*n), iwork(5*n), unconverged(n))
       call dsygvx(1, 'V', 'V', 'L', n, mass, n, stiffness, n, 1/highest_omega**2, huge(1.0_wp), 0, 0, 0.0_wp, n_mode, &
          inverse, shape, n, work, size(work), iwork, unconverged, info)
-      if (info /= 0) then
-         error = harmonic_error('modes', harmonic)
-         return
-      end if
+      if (info /= 0) error = harmonic_error('modes', harmonic)
+      if (allocated(error)) return
       omega = 1/sqrt(inverse(n_mode:1:-1))
       shape(:, :n_mode) = shape(:, n_mode:1:-1)*spread(omega, 1, n)
-      if (harmonic == 1) then
-         allocate (coefficient(0:n, n_mode))
-         coefficient(0, :) = -matmul(momentum, shape(:, :n_mode))
-         coefficient(1:, :) = shape(:, :n_mode)
-      else
-         coefficient = shape(:, :n_mode)
-      end if
+      coefficient = shape(:, :n_mode)
+      if (harmonic == 1) coefficient = reshape([-matmul(momentum, coefficient), transpose(coefficient)], [n + 1, n_mode], &
+         order=[2, 1])
    end subroutine get_modes
 
    !> Flexibility of a harmonic, without the rigid mode of n = 1; below n = 2 by the basis, from there in closed form (Lur'e,
@@ -373,11 +367,8 @@ contains
          right(2, 2) = 1/(area*n*(n + 1)*scale)
       end associate
       call dgetf2(4, 4, matrix, 4, pivot, info)
-      if (info /= 0) then
-         error = harmonic_error('flexibility', harmonic)
-         return
-      end if
-      call dgetrs('N', 4, 2, matrix, 4, pivot, right, 4, info)
+      if (info == 0) call dgetrs('N', 4, 2, matrix, 4, pivot, right, 4, info)
+      if (info /= 0) error = harmonic_error('flexibility', harmonic)
       at_outer = [1.0_wp, 1.0_wp, inner(3), inner(4)]
       flexibility(1, :) = matmul(a*at_outer, right)
       flexibility(2, :) = matmul(b*at_outer, right)
@@ -393,35 +384,6 @@ contains
       error = numerical_error('&ball: the '//quantity//' of harmonic '//to_text(harmonic)//' cannot be computed in double ' &
          //'precision; allowed: less extreme values of wall_thickness and poisson_ratio, fewer modes or rings')
    end function harmonic_error
-
-   !> Flexibilities of all harmonics up to a highest one, without the modes that oscillate.
-   subroutine get_flexibilities(ball, with_gas, families, highest, flexibility, error)
-      type(ball_type), intent(in) :: ball
-      !> Whether the enclosed gas resists changes of its volume.
-      logical, intent(in) :: with_gas
-      !> Harmonics that have modes, and their flexibilities: [0:].
-      type(family_type), intent(in) :: families(0:)
-      !> Highest harmonic.
-      integer, intent(in) :: highest
-      !> U and V at the outer surface due to unit generalized forces on U and V, m/N: [2, 2, 0:highest].
-      real(wp), allocatable, intent(out) :: flexibility(:, :, :)
-      !> Set if a flexibility cannot be computed.
-      type(error_type), allocatable, intent(out) :: error
-      type(basis_type) :: basis
-      integer :: n
-
-      ! Higher harmonics have closed forms.
-      basis = new_basis(ball, 1, with_gas)
-      allocate (flexibility(2, 2, 0:highest))
-      do n = 0, highest
-         if (n < size(families)) then
-            flexibility(:, :, n) = families(n)%flexibility
-         else
-            call get_flexibility(basis, n, flexibility(:, :, n), error)
-            if (allocated(error)) return
-         end if
-      end do
-   end subroutine get_flexibilities
 
    !> Stiffness and mass of one harmonic in the basis. For n = 1 its first function, U = 1 and W = 0, is the rigid mode; the
    !> others keep their elastic part, without momentum.
