@@ -43,8 +43,8 @@ module thud_pressed_ball
       real(wp) :: deflection = 0.0_wp
       !> Force on the plates, N.
       real(wp) :: force = 0.0_wp
-      !> Diameter of the undeformed ball, thickness of the wall and of an element, m.
-      real(wp) :: diameter = 0.0_wp, wall = 0.0_wp, element_thickness = 0.0_wp
+      !> Diameter of the undeformed ball, and thickness of an element, m.
+      real(wp) :: diameter = 0.0_wp, element_thickness = 0.0_wp
       !> Force on a node that counts as zero, N.
       real(wp) :: tolerance = 0.0_wp
    end type pressed_ball_type
@@ -69,7 +69,6 @@ contains
       pressed%body = new_elastic_body(ball, mesh, relaxed)
       pressed%diameter = 2*ball%outer_radius
       pressed%tolerance = balanced*material%shear_modulus*ball%wall_thickness**2
-      pressed%wall = ball%wall_thickness
       pressed%element_thickness = ball%wall_thickness/mesh%n_radial
       allocate (pressed%position(0:n, 0:mesh%n_radial, 2))
       pressed%position(:, :, 1) = pressed%body%mesh%r
@@ -93,7 +92,7 @@ contains
 
       halvings = 0
       do while (pressed%deflection < deflection)
-         step = min(deflection - pressed%deflection, max_step*pressed%wall/2**halvings)
+         step = min(deflection - pressed%deflection, max_step*pressed%element_thickness*pressed%body%mesh%n_radial/2**halvings)
          next = pressed
          next%deflection = merge(deflection, pressed%deflection + step, step >= deflection - pressed%deflection)
          call find_rest(next, converged, error)
@@ -135,6 +134,8 @@ contains
 
       last = pressed%body%mesh%n_radial
       converged = .false.
+      call get_forces(pressed%body, pressed%position, force, failed)
+      if (failed) return
       do iteration = 1, max_iterations
          call check_interrupt(error)
          if (allocated(error)) return
@@ -144,8 +145,7 @@ contains
          target = pressed%position
          where (pressed%touches(:, 1)) target(:, last, 2) = 0.0_wp
          where (pressed%touches(:, 2)) target(:, last, 2) = pressed%diameter - pressed%deflection
-         call get_forces(pressed%body, pressed%position, force, failed)
-         if (.not. failed) call get_newton_step(pressed, force, fixed, target - pressed%position, change, failed)
+         call get_newton_step(pressed, force, fixed, target - pressed%position, change, failed)
          if (failed) return
          pressed%position = pressed%position + change
          call get_forces(pressed%body, pressed%position, force, failed)

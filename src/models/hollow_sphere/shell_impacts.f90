@@ -119,8 +119,11 @@ contains
             call advance(impacts, moving, impacts%whole_step, force(:batch_size, sample), force(batch_size + 1:, sample))
          else
             call advance(impacts, moving, impacts%whole_step, elastic_force, floor_force)
-            if (mod(n, substeps) == 0) call record(elastic_force, floor_force, real(n, wp), first_step, end_step, &
-               force(:, sample))
+            ! No force after the end of a phase; before its beginning, the forces of the previous phase remain.
+            if (mod(n, substeps) == 0) then
+               where ([first_step, first_step] <= n) force(:, sample) = merge([elastic_force, floor_force], 0.0_wp, &
+                  [end_step, end_step] >= n)
+            end if
          end if
          last_step = n
          if (n == nint(latest_start)) all_moving = all(first_step < never .and. end_step >= never)
@@ -171,24 +174,6 @@ contains
       end associate
       if (any(wanted)) call expand_series(impacts%shell, impacts%state, wanted, impacts%series)
    end subroutine renew_series
-
-   !> Writes the forces of one sample. They are zero for balls whose phase has ended. For balls whose phase has not begun,
-   !> the forces of the previous phase remain.
-   pure subroutine record(elastic_force, floor_force, n, first_step, end_step, force)
-      !> Elastic forces, N: [batch_size].
-      real(wp), intent(in) :: elastic_force(batch_size)
-      !> Forces on the floor, N: [batch_size].
-      real(wp), intent(in) :: floor_force(batch_size)
-      !> Index of the step.
-      real(wp), intent(in) :: n
-      real(wp), intent(in) :: first_step(batch_size)
-      !> Step in which the phase has ended: [batch_size].
-      real(wp), intent(in) :: end_step(batch_size)
-      !> The sample, N: [2*batch_size].
-      real(wp), intent(inout) :: force(2*batch_size)
-
-      where ([first_step, first_step] <= n) force = merge([elastic_force, floor_force], 0.0_wp, [end_step, end_step] >= n)
-   end subroutine record
 
    !> Accepts the step of each ball that stays inside the phase; the other balls stop at the beginning of the step.
    pure subroutine commit_step(impacts, compressing, moving, n, first_step, end_step)

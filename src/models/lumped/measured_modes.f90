@@ -105,11 +105,14 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(mode_type) :: modes(self%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
+      type(bisection_type) :: bracket
       integer :: i, j, substeps
       logical :: released
 
-      modes = new_mode(self%frequency%values(:size(modes)), self%damping_ratio%values(:size(modes)), &
-         self%effective_mass%values(:size(modes)))
+      modes%mass = self%effective_mass%values(:size(modes))
+      modes%omega = 2*pi*self%frequency%values(:size(modes))
+      modes%zeta = self%damping_ratio%values(:size(modes))
+      modes%omega_damped = modes%omega*sqrt(1 - modes%zeta**2)
       v0 = get_impact_velocity(drop)
       step = 1/sampling%sample_rate
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['modal_force'])
@@ -136,7 +139,12 @@ contains
       history%component(1, 1) = history%component(1, 1)/2
       history%elastic_force = history%component(:, 1)
       history%floor_force = history%component(:, 1)
-      call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
+      bracket = bisection_type(time - step/substeps, time)
+      do while (bracket%is_open())
+         call get_motion(modes, v0, bracket%get_middle(), deflection, velocity, force)
+         call bracket%halve(force > 0.0_wp)
+      end do
+      call finish(modes, bracket%get_middle(), history, error)
       if (allocated(error)) return
       if (history%restitution < 0.0_wp) then
          error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
@@ -146,21 +154,6 @@ contains
       end if
       if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve
-
-   !> One mode from its measured values.
-   elemental function new_mode(frequency, damping_ratio, mass) result(mode)
-      !> Natural frequency, Hz.
-      real(wp), intent(in) :: frequency
-      real(wp), intent(in) :: damping_ratio
-      !> Effective mass, kg.
-      real(wp), intent(in) :: mass
-      type(mode_type) :: mode
-
-      mode%mass = mass
-      mode%omega = 2*pi*frequency
-      mode%zeta = damping_ratio
-      mode%omega_damped = mode%omega*sqrt(1 - damping_ratio**2)
-   end function new_mode
 
    !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t), F = sum M_n (w^2 d_n + 2 zeta w d_n').
    pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force)
@@ -182,26 +175,6 @@ contains
          force = sum(m*(w**2*d + 2*zeta*w*v))
       end associate
    end subroutine get_motion
-
-   !> Time at which the force first falls to zero, by bisection to rounding.
-   pure function release_time(modes, impact_velocity, before, after) result(time)
-      type(mode_type), intent(in) :: modes(:)
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
-      !> A time with positive force, s; a later one without, s.
-      real(wp), intent(in) :: before, after
-      !> Time of release, s.
-      real(wp) :: time
-      type(bisection_type) :: bracket
-      real(wp) :: deflection, velocity, force
-
-      bracket = bisection_type(before, after)
-      do while (bracket%is_open())
-         call get_motion(modes, impact_velocity, bracket%get_middle(), deflection, velocity, force)
-         call bracket%halve(force > 0.0_wp)
-      end do
-      time = bracket%get_middle()
-   end function release_time
 
    !> Scalars of the impact. By the equations of motion of the modes, the impulse is the change of momentum. The closed form
    !> has no error of integration, so the residuals stay 0.

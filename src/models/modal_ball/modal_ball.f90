@@ -13,7 +13,7 @@ module thud_modal_ball
    use thud_force_history, only: add_model_quantity, force_history_type
    use thud_kinds, only: wp
    use thud_modal_compression, only: compress_modal_ball, get_flexibilities
-   use thud_modal_run, only: march, modal_run_type, new_history, start_run
+   use thud_modal_run, only: march, modal_run_type, start_run
    use thud_mode_step, only: damping_type, index_amplitude, new_damping, new_modes, new_static_step, set_factors
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
    use thud_prony, only: check_fractional_loss
@@ -239,19 +239,6 @@ contains
       yes = self%highest_frequency > 0.0_wp .and. self%highest_frequency*ratio < get_automatic_frequency(self, ball)
    end function has_few_modes
 
-   !> Estimated error of a result divided by its difference from the next coarser level: it is found from random balls
-   !> (docs/modal_ball.md).
-   pure function get_error_ratio(ball, history) result(ratio)
-      type(ball_type), intent(in) :: ball
-      !> The result.
-      type(force_history_type), intent(in) :: history
-      real(wp) :: ratio
-
-      ! Wide contacts and compressible walls converge more slowly.
-      ratio = usual_ratio + 25*max(0.0_wp, history%max_deflection/ball%outer_radius - wide_contact)
-      if (ball%poisson_ratio < compressible) ratio = max(ratio, 2.5_wp)
-   end function get_error_ratio
-
    !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
    !> modulus.
    function get_standard_modulus(self) result(modulus)
@@ -309,9 +296,11 @@ contains
       call prepare(self, run, error)
       if (allocated(error)) return
       call start_run(run, get_impact_velocity(drop), merge(drop%gravity, 0.0_wp, self%contact_gravity))
-      history = new_history(run, sampling)
       call march(run, sampling, history, error)
-      history%error_ratio = get_error_ratio(ball, history)
+      ! Wide contacts and compressible walls converge more slowly; the numbers are found from random balls
+      ! (docs/modal_ball.md).
+      history%error_ratio = usual_ratio + 25*max(0.0_wp, history%max_deflection/ball%outer_radius - wide_contact)
+      if (ball%poisson_ratio < compressible) history%error_ratio = max(history%error_ratio, 2.5_wp)
       call add_model_quantity(history, 'rings', '', real(size(run%rings%radius), wp))
       call add_model_quantity(history, 'highest_frequency', 'Hz', &
          min(get_frequency(self, ball, 1), max_phase/(2*pi*run%interval)))

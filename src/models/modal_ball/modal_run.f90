@@ -18,7 +18,7 @@ module thud_modal_run
    implicit none (type, external)
    private
 
-   public :: march, modal_run_type, new_history, start_run
+   public :: march, modal_run_type, start_run
 
    !> Number of harmonics whose energies are recorded separately, from n = 0 on.
    integer, parameter :: n_family = 6
@@ -97,33 +97,23 @@ contains
       run%floor_motion = new_receiver_motion(run%floor)
    end subroutine start_run
 
-   !> A history without force.
-   function new_history(run, sampling) result(history)
-      !> The ball at first touch.
-      type(modal_run_type), intent(in) :: run
-      type(sampling_type), intent(in) :: sampling
-      type(force_history_type) :: history
-      integer :: i
-
-      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'], &
-         [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J'])
-      history%has_means = .true.
-      history%impact_velocity = -run%velocity
-      if (run%floor_moves) allocate (history%floor_displacement, history%floor_velocity, source=history%floor_force)
-   end function new_history
-
    !> Integrates in time from first touch until the ball has left for good, or on a mobile floor to the end of the record.
    subroutine march(run, sampling, history, error)
       !> The ball at first touch.
       type(modal_run_type), intent(inout) :: run
       type(sampling_type), intent(in) :: sampling
-      type(force_history_type), intent(inout) :: history
+      type(force_history_type), intent(out) :: history
       !> Set if the contact outlasts the record, or if too much energy is lost in the contact.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: settling_time, before, fraction, clearance, last_clearance
       integer :: i, j, n_step, last_contact, nearest
       logical :: has_separated
 
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'], &
+         [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), 'energy_rest_J'])
+      history%has_means = .true.
+      history%impact_velocity = -run%velocity
+      if (run%floor_moves) allocate (history%floor_displacement, history%floor_velocity, source=history%floor_force)
       ! The surface may touch again while the slowest mode swings back, half a period later.
       settling_time = 0.0_wp
       if (size(run%modes%omega) > 0) settling_time = pi/(sqrt(run%modes%damping%equilibrium_ratio)*minval(run%modes%omega))
