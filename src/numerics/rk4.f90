@@ -1,4 +1,4 @@
-!> Classical fourth-order Runge-Kutta steps for any system of ordinary differential equations.
+!> Classical fourth-order Runge-Kutta steps for autonomous systems of ordinary differential equations.
 module thud_rk4
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -6,7 +6,7 @@ module thud_rk4
 
    public :: ode_type, rk4_step
 
-   !> A first-order system of ordinary differential equations.
+   !> A first-order autonomous system of ordinary differential equations.
    type, abstract :: ode_type
    contains
       procedure(derivative_interface), deferred :: get_derivative
@@ -14,12 +14,10 @@ module thud_rk4
 
    abstract interface
       !> Right-hand side of the system.
-      pure subroutine derivative_interface(self, time, state, rate, valid)
+      pure subroutine derivative_interface(self, state, rate, valid)
          import :: ode_type, wp
          implicit none (type, external)
          class(ode_type), intent(in) :: self
-         !> Independent variable.
-         real(wp), intent(in) :: time
          !> State: [n_state].
          real(wp), intent(in) :: state(:)
          !> Its derivative: [n_state].
@@ -33,10 +31,8 @@ contains
 
    !> One step. Shorter steps from the same state are the dense output: as a function of `step`, the result follows the
    !> solution with a local error of order step**5.
-   pure subroutine rk4_step(ode, time, state, step, new_state, valid)
+   pure subroutine rk4_step(ode, state, step, new_state, valid)
       class(ode_type), intent(in) :: ode
-      !> Time at the beginning of the step.
-      real(wp), intent(in) :: time
       !> State at the beginning: [n_state].
       real(wp), intent(in) :: state(:)
       !> Length of the step.
@@ -48,13 +44,13 @@ contains
       real(wp), dimension(size(state)) :: k1, k2, k3, k4
 
       new_state = state
-      call ode%get_derivative(time, state, k1, valid)
+      call ode%get_derivative(state, k1, valid)
       if (.not. valid) return
-      call ode%get_derivative(time + step/2, state + step/2*k1, k2, valid)
+      call ode%get_derivative(state + step/2*k1, k2, valid)
       if (.not. valid) return
-      call ode%get_derivative(time + step/2, state + step/2*k2, k3, valid)
+      call ode%get_derivative(state + step/2*k2, k3, valid)
       if (.not. valid) return
-      call ode%get_derivative(time + step, state + step*k3, k4, valid)
+      call ode%get_derivative(state + step*k3, k4, valid)
       if (.not. valid) return
       new_state = state + step/6*(k1 + 2*(k2 + k3) + k4)
    end subroutine rk4_step

@@ -168,9 +168,8 @@ contains
 
    !> Right-hand side of the equation of motion, m a = s (M/2R) v^2 - F_B - F_G, with
    !> m = M (1 - deflection/2R).
-   pure subroutine get_derivative(self, time, state, rate, valid)
+   pure subroutine get_derivative(self, state, rate, valid)
       class(shell_type), intent(in) :: self
-      real(wp), intent(in) :: time
       real(wp), intent(in) :: state(:)
       real(wp), intent(out) :: rate(:)
       logical, intent(out) :: valid
@@ -178,7 +177,7 @@ contains
 
       associate (deflection => state(at_deflection), velocity => state(at_velocity))
          ! Below the closing deflection gas volume and moving mass are positive.
-         valid = time >= 0.0_wp .and. deflection < self%closing_deflection
+         valid = deflection < self%closing_deflection
          rate = 0.0_wp
          if (.not. valid) return
          elastic_force = self%stiffness*deflection + get_gas_force(self, deflection)

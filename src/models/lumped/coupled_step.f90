@@ -73,8 +73,6 @@ module thud_coupled_step
       real(wp), allocatable :: force(:), acceleration(:, :)
       !> Displacements and velocities of the floor without the forces of this step, m and m/s: [n_stage].
       real(wp), dimension(n_stage) :: free_displacement, free_velocity
-      !> Times of the stages since first touch, s: [n_stage].
-      real(wp) :: time(n_stage)
       !> Displacements, velocities and accelerations of the floor, m, m/s, m/s2: [n_stage].
       real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
       !> State relative to the floor at the stages, and its rate: [n_state, n_stage].
@@ -97,12 +95,12 @@ contains
    end function get_relative_state
 
    !> Advances source and floor by one step.
-   pure subroutine take_coupled_step(source, stages, time, scale, start, end, valid, converged)
+   pure subroutine take_coupled_step(source, stages, scale, start, end, valid, converged)
       class(contact_source_type), intent(in) :: source
       !> Motion of the floor at the stages of this step, per unit force and per unit initial motion.
       type(receiver_stages_type), intent(in) :: stages
-      !> Time at the beginning since first touch, s; scale of velocities, m/s.
-      real(wp), intent(in) :: time, scale
+      !> Scale of velocities, m/s.
+      real(wp), intent(in) :: scale
       !> Motion at the beginning and at the end.
       type(coupled_state_type), intent(in) :: start
       type(coupled_state_type), intent(out) :: end
@@ -115,7 +113,6 @@ contains
 
       n = size(change)
       allocate (trial%force(n_stage), source=start%force)
-      trial%time = time + stages%interval*radau_node
       trial%acceleration = spread(start%acceleration, 1, n_stage)
       allocate (trial%state(source%n_state, n_stage), trial%rate(source%n_state, n_stage), source=0.0_wp)
       call get_free_motion(stages, start%receiver_motion, trial%free_velocity, trial%free_displacement)
@@ -174,17 +171,15 @@ contains
             state(2*k, :) = start%state(2*k) + h*matmul(radau_integral, trial%acceleration(:, k)) - u
          end do
          do i = 1, n_stage
-            call get_rate(source, trial%time(i), state(:, i), trial%rate(:, i), valid)
+            call get_rate(source, state(:, i), trial%rate(:, i), valid)
             if (.not. valid) return
          end do
       end associate
    end subroutine evaluate_stages
 
    !> Accelerations, force and loss of the source, all zero for a single mass in flight.
-   pure subroutine get_rate(source, time, state, rate, valid)
+   pure subroutine get_rate(source, state, rate, valid)
       class(contact_source_type), intent(in) :: source
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
       !> State relative to the floor, and its rate: [n_state].
       real(wp), intent(in) :: state(:)
       real(wp), intent(out) :: rate(:)
@@ -192,7 +187,7 @@ contains
       logical, intent(out) :: valid
 
       if (source%touching .or. source%n_mass > 1) then
-         call source%get_derivative(time, state, rate, valid)
+         call source%get_derivative(state, rate, valid)
       else
          valid = .true.
          rate = 0.0_wp
@@ -250,7 +245,7 @@ contains
             moved = trial%state(:, i)
             ! Towards smaller values, because smaller deflections stay inside the domain.
             moved(j) = moved(j) - length
-            call get_rate(source, trial%time(i), moved, rate, valid)
+            call get_rate(source, moved, rate, valid)
             by_state(:, j) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
          end do
          state_by_unknown = 0.0_wp

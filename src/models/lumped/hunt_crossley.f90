@@ -91,16 +91,15 @@ contains
    end subroutine check
 
    !> Right-hand side of the equation of motion.
-   pure subroutine get_derivative(self, time, state, rate, valid)
+   pure subroutine get_derivative(self, state, rate, valid)
       class(spring_type), intent(in) :: self
-      real(wp), intent(in) :: time
       real(wp), intent(in) :: state(:)
       real(wp), intent(out) :: rate(:)
       logical, intent(out) :: valid
       real(wp) :: components(2)
       real(wp) :: force
 
-      valid = time >= 0.0_wp
+      valid = .true.
       call self%get_components(state, components, force)
       rate(at_deflection) = state(at_velocity)
       rate(at_velocity) = -force/self%mass

@@ -260,12 +260,12 @@ contains
 
       converged = .true.
       if (.not. impact%is_mobile) then
-         call rk4_step(impact%source, impact%time, impact%motion%state, length, impact%end%state, inside)
+         call rk4_step(impact%source, impact%motion%state, length, impact%end%state, inside)
       else if (length < impact%stages%interval) then
-         call take_coupled_step(impact%source, new_receiver_stages(impact%receiver, length), impact%time, &
+         call take_coupled_step(impact%source, new_receiver_stages(impact%receiver, length), &
             impact%velocity_scale, impact%motion, impact%end, inside, converged)
       else
-         call take_coupled_step(impact%source, impact%stages, impact%time, impact%velocity_scale, impact%motion, &
+         call take_coupled_step(impact%source, impact%stages, impact%velocity_scale, impact%motion, &
             impact%end, inside, converged)
       end if
       if (.not. inside) then
@@ -314,8 +314,8 @@ contains
             state = get_relative_state(source, coupled)
             slower = state
             slower(2) = state(2) - length
-            call source%get_derivative(impact%time, state, rate, valid)
-            call source%get_derivative(impact%time, slower, slower_rate, valid)
+            call source%get_derivative(state, rate, valid)
+            call source%get_derivative(slower, slower_rate, valid)
             change = (rate(index) - coupled%force) &
                /(1 + impact%receiver%direct*(rate(index) - slower_rate(index))/(state(2) - slower(2)))
             if (abs(change) <= epsilon(change)*abs(coupled%force)) exit

@@ -190,16 +190,15 @@ contains
    end function get_fastest_rate
 
    !> Right-hand side of the equations of motion.
-   pure subroutine get_derivative(self, time, state, rate, valid)
+   pure subroutine get_derivative(self, state, rate, valid)
       class(tyre_type), intent(in) :: self
-      real(wp), intent(in) :: time
       real(wp), intent(in) :: state(:)
       real(wp), intent(out) :: rate(:)
       logical, intent(out) :: valid
       real(wp) :: components(3)
       real(wp) :: force, sidewall
 
-      valid = time >= 0.0_wp
+      valid = .true.
       call self%get_components(state, components, force)
       associate (belt => state(at_belt_velocity), rim => state(at_rim_velocity))
          sidewall = self%sidewall_stiffness*(state(at_rim) - state(at_belt)) + self%sidewall_damping*(rim - belt)
