@@ -5,7 +5,7 @@ module thud_hollow_sphere
    use thud_constants, only: pi
    use thud_contact_source, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_source_type
    use thud_drop, only: drop_type, get_impact_velocity
-   use thud_error, only: error_type, input_error, numerical_error
+   use thud_error, only: error_type, numerical_error
    use thud_field, only: field_type, name_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -14,7 +14,7 @@ module thud_hollow_sphere
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
-   use thud_text, only: fixed, join_quoted, quoted, to_text
+   use thud_text, only: fixed, to_text
    use thud_validity_limit, only: get_gravity_limit, get_wall_limits, validity_limit_type
    implicit none (type, external)
    private
@@ -182,7 +182,7 @@ contains
          if (.not. valid) return
          elastic_force = self%stiffness*deflection + get_gas_force(self, deflection)
          flux = self%mass/(2*self%radius)*velocity**2
-         weight = get_flux_weight(self)
+         weight = merge(self%compression_weight, self%restitution_weight, self%compressing)
          moving_mass = self%mass*(1 - deflection/(2*self%radius))
          rate(at_deflection) = velocity
          rate(at_velocity) = (weight*flux - elastic_force)/moving_mass
@@ -200,19 +200,13 @@ contains
       real(wp), intent(out) :: components(:)
       !> F_B + F_G (paper eq. 1), N.
       real(wp), intent(out) :: elastic_force
-
-      components = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
-         (1 - get_flux_weight(self))*self%mass/(2*self%radius)*state(at_velocity)**2]
-      elastic_force = components(1) + components(2)
-   end subroutine get_components
-
-   !> Factor s of the flux term in the present phase.
-   pure function get_flux_weight(shell) result(weight)
-      class(shell_type), intent(in) :: shell
       real(wp) :: weight
 
-      weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
-   end function get_flux_weight
+      weight = merge(self%compression_weight, self%restitution_weight, self%compressing)
+      components = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
+         (1 - weight)*self%mass/(2*self%radius)*state(at_velocity)**2]
+      elastic_force = components(1) + components(2)
+   end subroutine get_components
 
    !> Whether a state results from a step that is too long: far outside the domain, or with several times the energy of the
    !> impact.
@@ -259,11 +253,6 @@ contains
       integer :: choice
 
       choice = findloc(flux_choices, self%momentum_flux, dim=1)
-      if (choice == 0) then
-         error = input_error('&hollow_sphere: momentum_flux = '//quoted(self%momentum_flux) &
-            //' is not allowed; allowed: '//join_quoted(flux_choices))
-         return
-      end if
       shell = new_shell(ball, compression_weights(choice), restitution_weights(choice))
       call solve_lumped(shell, drop, sampling, [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'], &
          history, error, receiver)

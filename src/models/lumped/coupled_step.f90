@@ -75,6 +75,8 @@ module thud_coupled_step
       real(wp), dimension(n_stage) :: free_displacement, free_velocity
       !> Displacements, velocities and accelerations of the floor, m, m/s, m/s2: [n_stage].
       real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
+      !> Mass of the cap at the stages, 0 after release, kg: [n_stage].
+      real(wp) :: cap_mass(n_stage)
       !> State relative to the floor at the stages, and its rate: [n_state, n_stage].
       real(wp), allocatable :: state(:, :), rate(:, :)
    end type trial_type
@@ -118,14 +120,13 @@ contains
       call get_free_motion(stages, start%receiver_motion, trial%free_velocity, trial%free_displacement)
       converged = .false.
       do iteration = 1, max_iterations
-         call evaluate_stages(source, stages, start, trial, valid)
+         call evaluate_stages(source, stages, start, trial, change(:, 1), valid)
          if (.not. valid) return
          if (mod(iteration, max_reuse) == 1) then
             call set_matrix(source, stages, scale, trial, matrix)
             call dgetf2(n, n, matrix, n, pivot, info)
             if (info /= 0) return
          end if
-         change(:, 1) = get_residual(source, trial)
          call dgetrs('N', n, 1, matrix, n, pivot, change, n, info)
          ! Written so that NaN ends here too.
          if (.not. maxval(abs(change)) < huge(1.0_wp)) return
@@ -150,13 +151,15 @@ contains
       call advance_stages(stages, trial%force, end%receiver_motion)
    end subroutine take_coupled_step
 
-   !> Motion at the stages under the trial forces and accelerations, and the rate of the source's state.
-   pure subroutine evaluate_stages(source, stages, start, trial, valid)
+   !> Motion at the stages under the trial forces and accelerations, and what they miss of the equations.
+   pure subroutine evaluate_stages(source, stages, start, trial, residual, valid)
       class(contact_source_type), intent(in) :: source
       type(receiver_stages_type), intent(in) :: stages
       !> Motion at the beginning.
       type(coupled_state_type), intent(in) :: start
       type(trial_type), intent(inout) :: trial
+      !> Right-hand sides of force balance and equations of motion minus the unknowns: [n_unknown].
+      real(wp), intent(out) :: residual(:)
       !> Whether the source stays in the domain of its equations.
       logical, intent(out) :: valid
       integer :: i, k
@@ -173,6 +176,14 @@ contains
          do i = 1, n_stage
             call get_rate(source, state(:, i), trial%rate(:, i), valid)
             if (.not. valid) return
+         end do
+         trial%cap_mass = 0.0_wp
+         if (source%touching) trial%cap_mass = source%cap_mass_per_deflection*max(state(1, :), 0.0_wp)
+      end associate
+      associate (n => source%n_mass)
+         residual(:n_stage) = trial%rate(2*n + 1, :) - trial%force - trial%cap_mass*trial%floor_acceleration
+         do k = 1, n
+            residual(k*n_stage + 1:(k + 1)*n_stage) = trial%rate(2*k, :) - trial%acceleration(:, k)
          end do
       end associate
    end subroutine evaluate_stages
@@ -194,32 +205,6 @@ contains
       end if
    end subroutine get_rate
 
-   !> Residual of force balance and equations of motion.
-   pure function get_residual(source, trial) result(residual)
-      class(contact_source_type), intent(in) :: source
-      type(trial_type), intent(in) :: trial
-      !> Right-hand sides of the equations minus the unknowns: [n_unknown].
-      real(wp) :: residual(n_stage*(1 + source%n_mass))
-      integer :: k
-
-      associate (n => source%n_mass)
-         residual(:n_stage) = trial%rate(2*n + 1, :) - trial%force - get_cap_mass(source, trial)*trial%floor_acceleration
-         do k = 1, n
-            residual(k*n_stage + 1:(k + 1)*n_stage) = trial%rate(2*k, :) - trial%acceleration(:, k)
-         end do
-      end associate
-   end function get_residual
-
-   !> Mass of the cap at the stages, 0 after release, kg: [n_stage].
-   pure function get_cap_mass(source, trial) result(mass)
-      class(contact_source_type), intent(in) :: source
-      type(trial_type), intent(in) :: trial
-      real(wp) :: mass(n_stage)
-
-      mass = 0.0_wp
-      if (source%touching) mass = source%cap_mass_per_deflection*max(trial%state(1, :), 0.0_wp)
-   end function get_cap_mass
-
    !> Derivative of the negative residual with respect to the unknowns.
    pure subroutine set_matrix(source, stages, scale, trial, matrix)
       class(contact_source_type), intent(in) :: source
@@ -232,12 +217,11 @@ contains
       ! Derivatives of the rate with respect to displacements and velocities, and of these with respect to the unknowns.
       real(wp) :: by_state(source%n_state, 2*source%n_mass), state_by_unknown(2*source%n_mass, size(matrix, 2))
       real(wp) :: moved(source%n_state), rate(source%n_state)
-      real(wp) :: floor_acceleration_by_force(n_stage, n_stage), cap_mass(n_stage)
+      real(wp) :: floor_acceleration_by_force(n_stage, n_stage)
       real(wp) :: length
       integer :: i, j, k
       logical :: valid
 
-      cap_mass = get_cap_mass(source, trial)
       floor_acceleration_by_force = matmul(radau_derivative, stages%velocity)/stages%interval
       do i = 1, n_stage
          do j = 1, 2*source%n_mass
@@ -259,12 +243,12 @@ contains
          end do
          associate (force => 2*source%n_mass + 1)
             ! The mass of the cap grows with the deflection.
-            if (cap_mass(i) > 0.0_wp) by_state(force, 1) = by_state(force, 1) &
+            if (trial%cap_mass(i) > 0.0_wp) by_state(force, 1) = by_state(force, 1) &
                - source%cap_mass_per_deflection*trial%floor_acceleration(i)
             ! The balance of the forces on the cap, then the equations of motion of the masses.
             matrix(i::n_stage, :) = -matmul(by_state([force, (2*k, k=1, source%n_mass)], :), state_by_unknown)
          end associate
-         matrix(i, :n_stage) = matrix(i, :n_stage) + cap_mass(i)*floor_acceleration_by_force(i, :)
+         matrix(i, :n_stage) = matrix(i, :n_stage) + trial%cap_mass(i)*floor_acceleration_by_force(i, :)
       end do
       do i = 1, size(matrix, 1)
          matrix(i, i) = matrix(i, i) + 1

@@ -84,18 +84,18 @@ contains
       !> Integrals of the displacements by U and V, downwards and inwards: [n_ring, 2, n_dof, 0:highest].
       real(wp), intent(inout), contiguous :: shapes(:, :, :, 0:)
       real(wp), dimension(size(angle)) :: cosine, sine, value, previous, slope, previous_slope
-      real(wp), dimension(size(angle), 2) :: down, inward
+      real(wp) :: direction(size(angle), 2, 2)
       real(wp) :: next_factor, previous_factor, next, next_slope
       integer :: i, n
 
       cosine = cos(angle)
       sine = sin(angle)
       ! Downwards: P_n cos t for U and -dP_n/dt sin t for V.
-      down(:, 1) = sine*cosine
-      down(:, 2) = sine**3
+      direction(:, 1, 1) = sine*cosine
+      direction(:, 2, 1) = sine**3
       ! Inwards: -P_n sin t for U and -dP_n/dt cos t for V.
-      inward(:, 1) = -sine**2
-      inward(:, 2) = sine**2*cosine
+      direction(:, 1, 2) = -sine**2
+      direction(:, 2, 2) = sine**2*cosine
       n = size(angle)
       area(:n) = area(:n) + inner_weight*sine
       area(2:) = area(2:) + outer_weight*sine
@@ -106,12 +106,10 @@ contains
       previous_slope = 0.0_wp
       slope = 0.0_wp
       do n = 0, ubound(shapes, 4)
-         call add(down(:, 1), value, shapes(:, 1, 1, n))
-         call add(down(:, 2), slope, shapes(:, 2, 1, n))
-         if (size(shapes, 3) == 2) then
-            call add(inward(:, 1), value, shapes(:, 1, 2, n))
-            call add(inward(:, 2), slope, shapes(:, 2, 2, n))
-         end if
+         do i = 1, size(shapes, 3)
+            call add(direction(:, 1, i), value, shapes(:, 1, i, n))
+            call add(direction(:, 2, i), slope, shapes(:, 2, i, n))
+         end do
          ! Legendre polynomials and derivatives of the next degree.
          next_factor = real(2*n + 1, wp)/(n + 1)
          previous_factor = real(n, wp)/(n + 1)
