@@ -257,7 +257,7 @@ contains
    end subroutine get_structure
 
    !> The finite number in a cell.
-   pure subroutine read_number(cell, value, valid)
+   elemental subroutine read_number(cell, value, valid)
       character(len=*), intent(in) :: cell
       real(wp), intent(out) :: value
       !> The cell is one.

@@ -12,7 +12,7 @@ module thud_sampled_modes
    use thud_floor_modes, only: floor_modes_type
    use thud_function_set, only: min_nodes, new_splines
    use thud_kinds, only: wp
-   use thud_plate_stack, only: orthotropic_type
+   use thud_modes, only: shape_type
    use thud_table_reader, only: cell_length, open_table, read_number, read_row, row_error, table_reader_type
    use thud_text, only: fixed, lower_case, quoted, to_text
    implicit none (type, external)
@@ -88,21 +88,29 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(table_reader_type) :: table
       character(len=cell_length), allocatable :: cells(:)
-      real(wp), allocatable :: value(:), more(:, :)
-      integer :: i, n_point, number
+      character(len=:), allocatable :: missing
+      real(wp), allocatable :: value(:)
+      logical, allocatable :: valid(:)
+      integer :: first, i, n_point, number
 
       n_point = 0
       call open_table(path, table, error)
       do
          if (.not. allocated(error)) call read_row(table, cells, error)
-         if (.not. allocated(error)) then
-            if (size(cells) == 0) exit
-            if (index(lower_case(cells(1)), 'x') == 1) cycle
-            number = findloc(labels == lower_case(cells(1)), .true., dim=1)
-            call read_values(table, cells, merge(3, 1, number > 0), value, error)
-         end if
          if (allocated(error)) return
-         if (number > 0) then
+         if (size(cells) == 0) exit
+         if (index(lower_case(cells(1)), 'x') == 1) cycle
+         number = findloc(labels == lower_case(cells(1)), .true., dim=1)
+         ! A label and a unit stand before values.
+         first = merge(3, 1, number > 0)
+         if (allocated(value)) deallocate (value, valid)
+         allocate (value(size(cells(first:))), valid(size(cells(first:))))
+         call read_number(cells(first:), value, valid)
+         i = findloc(valid, .false., dim=1)
+         if (i > 0) then
+            error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not a ' &
+               //'number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
+         else if (number > 0) then
             i = findloc(value > 0.0_wp .and. value <= highest_value(number), .false., dim=1)
             if (allocated(rows(number)%value)) then
                error = row_error(table, trim(labels(number))//' is given twice; allowed: once')
@@ -111,34 +119,23 @@ contains
                   //to_text(value(i))//'; allowed: above 0, up to '//to_text(highest_value(number)))
             end if
             rows(number)%value = value
-            cycle
+         else
+            call add_point(table, value, point, n_point, error)
          end if
-         if (n_point == 0) allocate (point(size(value), 64))
-         if (size(value) /= size(point, 1)) then
-            error = row_error(table, 'it has '//to_text(size(value))//' values, points before it have ' &
-               //to_text(size(point, 1))//'; allowed: x, y and the shape of each mode')
-            return
-         end if
-         if (n_point == size(point, 2)) then
-            allocate (more(size(value), 2*n_point))
-            more(:, :n_point) = point
-            call move_alloc(more, point)
-         end if
-         n_point = n_point + 1
-         point(:, n_point) = value
       end do
-      if (.not. allocated(rows(1)%value)) then
-         error = input_error('there is no row of frequencies; allowed: a table with rows '//labels(1)//' (Hz) and ' &
-            //labels(2)//', and a row of x, y and the shapes of all modes for each point')
-      else if (.not. allocated(rows(2)%value)) then
-         error = input_error('the modes have no losses; allowed: a row '//labels(2)//' with one value above 0 per mode')
-      else if (n_point == 0) then
-         error = input_error('there is no point; allowed: a row of x, y (m) and the shapes of all modes for each point')
+      missing = ''
+      if (n_point == 0) missing = 'x, y and the shapes at a point'
+      if (.not. allocated(rows(2)%value)) missing = trim(labels(2))
+      if (.not. allocated(rows(1)%value)) missing = trim(labels(1))
+      if (missing /= '') then
+         error = input_error('there is no row of '//missing//'; allowed: a table with rows '//trim(labels(1))//' (Hz) and ' &
+            //trim(labels(2))//', and a row of x, y (m) and the shapes of all modes for each point')
+         return
       else if (n_point > max_points) then
          error = input_error('the grid has '//to_text(n_point)//' points; allowed: up to '//to_text(max_points) &
             //', of which eight per wavelength are enough')
+         return
       end if
-      if (allocated(error)) return
       point = point(:, :n_point)
       associate (n => size(point, 1) - 2)
          if (.not. allocated(rows(3)%value)) rows(3)%value = spread(1.0_wp, 1, n)
@@ -152,28 +149,32 @@ contains
       end associate
    end subroutine read_rows
 
-   !> Reads the values of a row.
-   subroutine read_values(table, cells, first, value, error)
+   !> Adds a point to those of a table.
+   subroutine add_point(table, value, point, n_point, error)
       type(table_reader_type), intent(in) :: table
-      !> The cells: [n_cell].
-      character(len=cell_length), intent(in) :: cells(:)
-      !> Index of the first cell with a value: before it there may be a label and a unit.
-      integer, intent(in) :: first
-      real(wp), allocatable, intent(out) :: value(:)
-      !> Set if a cell is neither a number nor a label.
+      !> Coordinates and shapes: [2 + n_mode].
+      real(wp), intent(in) :: value(:)
+      !> The points, with space for more: [2 + n_mode, at least n_point]; not allocated before the first one.
+      real(wp), allocatable, intent(inout) :: point(:, :)
+      integer, intent(inout) :: n_point
+      !> Set if it does not have as many values as the others.
       type(error_type), allocatable, intent(out) :: error
-      logical :: valid
-      integer :: i
+      real(wp), allocatable :: more(:, :)
 
-      allocate (value(max(size(cells) - first + 1, 0)))
-      do i = 1, size(value)
-         call read_number(cells(first + i - 1), value(i), valid)
-         if (valid) cycle
-         error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not a ' &
-            //'number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
+      if (n_point == 0) allocate (point(size(value), 64))
+      if (size(value) /= size(point, 1)) then
+         error = row_error(table, 'it has '//to_text(size(value))//' values, points before it have ' &
+            //to_text(size(point, 1))//'; allowed: x, y and the shape of each mode')
          return
-      end do
-   end subroutine read_values
+      end if
+      if (n_point == size(point, 2)) then
+         allocate (more(size(value), 2*n_point))
+         more(:, :n_point) = point
+         call move_alloc(more, point)
+      end if
+      n_point = n_point + 1
+      point(:, n_point) = value
+   end subroutine add_point
 
    !> Shapes at the points of a grid.
    subroutine get_shapes(point, x, y, shape, error)
@@ -277,17 +278,14 @@ contains
       !> Shapes there, 1/sqrt(kg): [n_x, n_y, n_mode].
       real(wp), intent(in) :: samples(:, :, :)
       type(floor_modes_type), intent(out) :: modes
+      type(shape_type) :: shape
       real(wp), allocatable :: by_x(:, :), by_y(:, :)
       integer, allocatable :: order(:)
-      integer :: i, n_x, n_y, n_mode
+      integer :: i
 
-      n_x = size(x)
-      n_y = size(y)
-      n_mode = size(samples, 3)
-      modes%stack%length = x(n_x)
-      modes%stack%width = y(n_y)
+      modes%stack%length = x(size(x))
+      modes%stack%width = y(size(y))
       allocate (modes%stack%plate(1), modes%stack%layer(0))
-      modes%stack%plate(1) = orthotropic_type()
       order = get_ascending_order(rows(1)%value)
       modes%omega = 2*pi*rows(1)%value(order)
       modes%loss_factor = rows(2)%value(order)
@@ -298,20 +296,17 @@ contains
       allocate (modes%modes%displacement(1), modes%modes%block(1))
       call new_splines(x, modes%modes%displacement(1)%x, by_x)
       call new_splines(y, modes%modes%displacement(1)%y, by_y)
+      shape%x = [(i, i=1, size(x))]
+      shape%y = [(i, i=1, size(y))]
+      allocate (shape%coefficient(size(x)*size(y), size(order)))
+      do i = 1, size(order)
+         shape%coefficient(:, i) = reshape(matmul(matmul(by_x, samples(:, :, order(i))), transpose(by_y)), [size(x)*size(y)])
+      end do
       associate (block => modes%modes%block(1))
          block%omega = modes%omega
          block%loss_factor = modes%loss_factor
-         allocate (block%bearing_share(n_mode), source=1.0_wp)
-         allocate (block%shape(1))
-         associate (shape => block%shape(1))
-            shape%x = [(i, i=1, n_x)]
-            shape%y = [(i, i=1, n_y)]
-            allocate (shape%coefficient(n_x*n_y, n_mode))
-            do i = 1, n_mode
-               shape%coefficient(:, i) = reshape(matmul(matmul(by_x, samples(:, :, order(i))), transpose(by_y)), &
-                  [n_x*n_y])
-            end do
-         end associate
+         block%bearing_share = spread(1.0_wp, 1, size(order))
+         block%shape = [shape]
       end associate
    end subroutine get_sampled_modes
 
