@@ -35,7 +35,6 @@ module thud_joist_floor
    contains
       procedure :: get_fields
       procedure :: get_bearing
-      procedure :: get_source
    end type joist_floor_type
 
 contains
@@ -72,7 +71,7 @@ contains
    !> The smeared plate, and the sheathing with its joists.
    subroutine get_bearing(self, state, bearing)
       class(joist_floor_type), intent(in) :: self
-      type(floor_state_type), intent(out) :: state
+      type(floor_state_type), intent(inout) :: state
       type(orthotropic_type), intent(out) :: bearing
       type(ribs_type) :: joists
 
@@ -87,6 +86,11 @@ contains
       associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
          arm => (self%joist_height + self%sheathing_thickness)/2)
          joists%position = get_spaced_positions(self%width, self%spacing, b)
+         associate (y => joists%position, n => size(joists%position), source_y => self%source_y*self%width)
+            if (self%source_on == 'joist') state%source(2) = get_nearest(y, source_y)/self%width
+            if (self%source_on == 'sheathing' .and. n > 1) state%source(2) = get_nearest((y(:n - 1) + y(2:))/2, source_y) &
+               /self%width
+         end associate
          joists%bending = e*b*h**3/12
          call get_composite(self, joists%composite, joists%slip)
          ! Shear coefficient of a rectangle: 5/6.
@@ -103,26 +107,6 @@ contains
       joists%loss_factor = self%loss_factor
       allocate (bearing%ribs, source=joists)
    end subroutine get_bearing
-
-   !> Relative position of the source.
-   function get_source(self) result(source)
-      class(joist_floor_type), intent(in) :: self
-      real(wp) :: source(2)
-
-      source = [self%source_x, self%source_y]
-      associate (joists => get_spaced_positions(self%width, self%spacing, self%joist_width), y => self%source_y*self%width)
-         associate (n => size(joists))
-            select case (self%source_on)
-             case ('joist')
-               source(2) = get_nearest(joists, y)/self%width
-             case ('sheathing')
-               if (n > 1) source(2) = get_nearest((joists(:n - 1) + joists(2:))/2, y)/self%width
-             case default
-               continue
-            end select
-         end associate
-      end associate
-   end function get_source
 
    !> The value next to a given one.
    pure function get_nearest(values, value) result(nearest)

@@ -102,7 +102,7 @@ contains
    !> The equivalent homogeneous plate, and the stiffnesses of the layers.
    subroutine get_bearing(self, state, bearing)
       class(laminate_floor_type), intent(in) :: self
-      type(floor_state_type), intent(out) :: state
+      type(floor_state_type), intent(inout) :: state
       type(orthotropic_type), intent(out) :: bearing
       real(wp), allocatable :: thickness(:)
       logical, allocatable :: is_along(:)

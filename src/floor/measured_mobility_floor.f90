@@ -67,6 +67,11 @@ contains
       class(measured_mobility_floor_type), intent(in) :: self
       logical, intent(in) :: has_room
       type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: rounding = 1.0e-12_wp
+      type(receiver_type) :: receiver
+      real(wp), allocatable :: omega(:), conductance(:)
+      logical :: failed
+      integer :: i
 
       associate (n => self%pole_frequency%count, thickness => self%radiator%plate%thickness)
          if (n == 0 .or. any([self%damping_ratio%count, self%residue_real%count, self%residue_imaginary%count] &
@@ -79,24 +84,12 @@ contains
             error = input_error('&measured_mobility: thickness = '//to_text(thickness)//' m; allowed: 0, or from ' &
                //to_text(min_thickness)//' m on')
          else if (has_room .and. .not. thickness > 0.0_wp) then
-            error = input_error('&measured_mobility: a mobility alone does not radiate into a room; allowed: with the plate ' &
-               //'that it was measured on (thickness above 0)')
-         else
-            call check_passivity(get_receiver(self), error)
+            error = input_error('&measured_mobility: a mobility alone does not radiate into a room; allowed: with the ' &
+               //'plate that it was measured on (thickness above 0)')
          end if
       end associate
-   end subroutine check
-
-   !> Checks that a mobility takes up energy at all frequencies.
-   subroutine check_passivity(receiver, error)
-      type(receiver_type), intent(in) :: receiver
-      !> Set if its real part is negative, or the frequencies of that cannot be found.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), parameter :: rounding = 1.0e-12_wp
-      real(wp), allocatable :: omega(:), conductance(:)
-      logical :: failed
-      integer :: i
-
+      if (allocated(error)) return
+      receiver = get_receiver(self)
       ! The test needs a positive direct part: it is raised by less than rounding.
       call find_violations(receiver%pole, receiver%residue, receiver%direct + rounding*(receiver%direct &
          + sum(abs(receiver%residue/receiver%pole))), omega, failed)
@@ -108,7 +101,7 @@ contains
          error = input_error('&measured_mobility: the real part of the mobility is '//to_text(conductance(i)) &
             //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
       end if
-   end subroutine check_passivity
+   end subroutine check
 
    !> The fitted mobility.
    function get_receiver(self) result(receiver)

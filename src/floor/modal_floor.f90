@@ -142,7 +142,8 @@ contains
       end if
       ! `new_floor_receiver` lets residual modes of the resistance Z have the compliance 2/(pi Z limit).
       if (self%residual_compliance > 0.0_wp) state%resistance = 2/(pi*self%residual_compliance*state%modes%sum_limit)
-      call new_floor_receiver('modal_floor', state%modes, state%resistance, state%source, state%source, state%receiver, error)
+      call new_floor_receiver('modal_floor', state%modes, state%resistance, state%source, state%source, state%receiver, &
+         error)
    end subroutine prepare
 
 end module thud_modal_floor

@@ -34,7 +34,7 @@ contains
    !> The plate.
    subroutine get_bearing(self, state, bearing)
       class(plate_floor_type), intent(in) :: self
-      type(floor_state_type), intent(out) :: state
+      type(floor_state_type), intent(inout) :: state
       type(orthotropic_type), intent(out) :: bearing
 
       state%group = 'plate'

@@ -11,8 +11,7 @@ module thud_rectangular_floor
       plate_stack_type, rigid_support
    use thud_receiver, only: receiver_type
    use thud_screed, only: get_screed_fields, get_screed_plate, screed_type
-   use thud_subceiling, only: get_cavity_limit, get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, &
-      subceiling_type
+   use thud_subceiling, only: get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, subceiling_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -59,19 +58,18 @@ module thud_rectangular_floor
       procedure :: get_build_up_fields
       procedure :: check
       procedure :: prepare
-      procedure :: get_source
       procedure(get_bearing), deferred :: get_bearing
    end type rectangular_floor_type
 
    abstract interface
-      !> The plate that bears, without supports: its group, the plate with homogeneous stiffness, and up to which frequency
-      !> and why the model of the plate is valid.
+      !> The plate that bears, without supports: its group, the plate with homogeneous stiffness, up to which frequency and
+      !> why the model of the plate is valid, and the source, if it is moved.
       subroutine get_bearing(self, state, bearing)
          import :: floor_state_type, orthotropic_type, rectangular_floor_type
          implicit none (type, external)
          class(rectangular_floor_type), intent(in) :: self
-         !> What is not stated of the bearing plate has its default.
-         type(floor_state_type), intent(out) :: state
+         !> With the source as stated.
+         type(floor_state_type), intent(inout) :: state
          !> Stiffnesses, masses and ribs.
          type(orthotropic_type), intent(out) :: bearing
       end subroutine get_bearing
@@ -116,6 +114,7 @@ contains
       type(edge_type) :: edge(4)
       character(len=:), allocatable :: group
 
+      state%source = [self%source_x, self%source_y]
       call self%get_bearing(state, bearing)
       group = '&'//trim(state%group)//': '
       edge = get_edges(self)
@@ -126,7 +125,7 @@ contains
       end if
       call check_springs(self%support_stiffness, 'support_stiffness')
       call check_springs(self%support_rotation, 'support_rotation')
-      associate (plate => state%plate, source => self%get_source())
+      associate (plate => state%plate, source => state%source)
          call check_lines(self%line_x, 'line_x', plate%length, source(1)*plate%length)
          call check_lines(self%line_y, 'line_y', plate%width, source(2)*plate%width)
       end associate
@@ -205,9 +204,9 @@ contains
       type(plate_stack_type) :: stack
       integer :: i
 
+      state%source = [self%source_x, self%source_y]
       call self%get_bearing(state, bearing)
       stack = get_stack(self, state, bearing)
-      state%source = self%get_source()
       state%air = self%air
       state%edges_are_known = self%support /= unknown_support
       state%resistance = get_resistance(state%plate)
@@ -238,14 +237,6 @@ contains
          receiver%residue = [receiver%residue, cmplx(-k/c**2, 0.0_wp, wp)]
       end associate
    end subroutine add_covering
-
-   !> Relative position of the source.
-   function get_source(self) result(source)
-      class(rectangular_floor_type), intent(in) :: self
-      real(wp) :: source(2)
-
-      source = [self%source_x, self%source_y]
-   end function get_source
 
    !> The plates above each other.
    function get_stack(self, state, bearing) result(stack)
@@ -287,6 +278,7 @@ contains
    pure function get_edges(self) result(edge)
       class(rectangular_floor_type), intent(in) :: self
       type(edge_type) :: edge(4)
+      integer, parameter :: number(4) = [1, 2, 3, 4]
 
       select case (self%support)
        case (unknown_support, 'simple')
@@ -296,23 +288,13 @@ contains
        case ('free')
          edge = edge_type(0.0_wp, 0.0_wp)
        case default
-         edge%deflection = get_four(self%support_stiffness, rigid_support)
-         edge%rotation = get_four(self%support_rotation, 0.0_wp)
+         associate (deflection => self%support_stiffness, rotation => self%support_rotation)
+            edge%deflection = merge(deflection%values(min(number, max(deflection%count, 1))), rigid_support, &
+               deflection%count > 0)
+            edge%rotation = merge(rotation%values(min(number, max(rotation%count, 1))), 0.0_wp, rotation%count > 0)
+         end associate
       end select
    end function get_edges
-
-   !> Values of four edges.
-   pure function get_four(list, default) result(values)
-      !> No, one or four values.
-      type(list_type), intent(in) :: list
-      !> Value of all edges if the list is empty.
-      real(wp), intent(in) :: default
-      real(wp) :: values(4)
-
-      values = default
-      if (list%count == 1) values = list%values(1)
-      if (list%count == 4) values = list%values(:4)
-   end function get_four
 
    !> Adds the frequency up to which the model is valid: that of the plate, the modes, the subceiling or its cavity.
    subroutine add_validity(self, stack, state)
@@ -321,11 +303,11 @@ contains
       type(plate_stack_type), intent(in) :: stack
       type(floor_state_type), intent(inout) :: state
 
-      call limit(get_mode_limit(stack), 'the modes of the floor are not resolved, and the mean mobility of the construction ' &
-         //'takes their place')
+      call limit(get_mode_limit(stack), 'the modes of the floor are not resolved, and the mean mobility of the ' &
+         //'construction takes their place')
       if (.not. self%subceiling%thickness > 0.0_wp) return
-      call limit(get_cavity_limit(self%subceiling, self%air), 'the cavity above the subceiling is deeper than a quarter of ' &
-         //'a wavelength, and no mere stiffness')
+      call limit(self%air%sound_speed/(4*self%subceiling%cavity_depth), 'the cavity above the subceiling is deeper than a ' &
+         //'quarter of a wavelength, and no mere stiffness')
       call limit(get_thin_limit(get_subceiling_plate(self%subceiling, state%plate)), &
          'bending waves are shorter than six thicknesses of the subceiling, and it is not thin')
    contains

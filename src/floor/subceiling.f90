@@ -9,7 +9,7 @@ module thud_subceiling
    implicit none (type, external)
    private
 
-   public :: get_cavity_limit, get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, subceiling_type
+   public :: get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, subceiling_type
 
    !> The subceiling; no thickness means none. The other defaults are those of a gypsum board on resilient channels.
    type :: subceiling_type
@@ -78,14 +78,5 @@ contains
       layer%line_stiffness = subceiling%channel_stiffness
       layer%line_loss_factor = subceiling%channel_loss_factor
    end function get_subceiling_layer
-
-   !> Frequency at which the cavity is a quarter of a wavelength deep, Hz; above it, the air is no mere stiffness.
-   pure function get_cavity_limit(subceiling, air) result(frequency)
-      type(subceiling_type), intent(in) :: subceiling
-      type(air_type), intent(in) :: air
-      real(wp) :: frequency
-
-      frequency = air%sound_speed/(4*subceiling%cavity_depth)
-   end function get_cavity_limit
 
 end module thud_subceiling

@@ -163,21 +163,10 @@ contains
          end associate
       end do
       ! The third derivative is continuous at the second and at the last but one node.
-      system(1, :3) = get_jump(node(:3))
-      system(n, n - 2:) = get_jump(node(n - 2:))
+      system(1, :3) = [node(3) - node(2), node(1) - node(3), node(2) - node(1)]
+      system(n, n - 2:) = [node(n) - node(n - 1), node(n - 2) - node(n), node(n - 1) - node(n - 2)]
       call dgetf2(n, n, system, n, pivot, info)
       call dgetrs('N', n, n, system, n, pivot, curvature, n, info)
-   contains
-
-      !> Factors of three second derivatives in the jump of the third derivative in the middle.
-      pure function get_jump(three) result(factor)
-         real(wp), intent(in) :: three(3)
-         real(wp) :: factor(3)
-
-         associate (before => three(2) - three(1), after => three(3) - three(2))
-            factor = [after, -before - after, before]
-         end associate
-      end function get_jump
    end function get_curvature
 
    !> Splines or their derivatives at positions: [n_position, count].

@@ -12,7 +12,7 @@ module thud_ritz_system
    implicit none (type, external)
    private
 
-   public :: add_energies, add_stiffness, energy_type, ritz_system_type, solve_ritz_system
+   public :: add_energies, add_term, energy_type, ritz_system_type, solve_ritz_system, term_type
 
    !> A matrix entry below this fraction of the largest one in its row or column is rounding.
    real(wp), parameter :: rounding = 1.0e-11_wp
@@ -67,7 +67,7 @@ contains
       !> Direction of the sum (1: x, 2: y; default: none), and positions, m.
       integer, intent(in), optional :: direction
       real(wp), intent(in), optional :: at(:)
-      real(wp), allocatable :: x(:, :), y(:, :)
+      type(term_type) :: term
       integer :: i, summed
 
       summed = 0
@@ -75,15 +75,13 @@ contains
       do i = 1, size(energies)
          associate (e => energies(i))
             if (.not. abs(e%factor) > 0.0_wp) cycle
+            term = term_type(e%row, e%column, loss_factor=loss_factor, in_bearing=system%is_bearing)
             associate (row => system%displacement(e%row), column => system%displacement(e%column))
-               x = get_products(row%x, e%row_order(1), column%x, e%column_order(1), 1)
-               y = get_products(row%y, e%row_order(2), column%y, e%column_order(2), 2)
+               term%x = e%factor*get_products(row%x, e%row_order(1), column%x, e%column_order(1), 1)
+               term%y = get_products(row%y, e%row_order(2), column%y, e%column_order(2), 2)
             end associate
-            if (e%is_mass) then
-               call add_term(system%mass, term_type(e%row, e%column, e%factor*x, y))
-            else
-               call add_stiffness(system, e%row, e%factor*x, y, loss_factor, e%column)
-            end if
+            if (e%is_mass) call add_term(system%mass, term)
+            if (.not. e%is_mass) call add_term(system%stiffness, term)
          end associate
       end do
    contains
@@ -103,23 +101,6 @@ contains
          end if
       end function get_products
    end subroutine add_energies
-
-   !> Adds a stiffness by its matrices.
-   subroutine add_stiffness(system, row, x, y, loss_factor, column)
-      type(ritz_system_type), intent(inout) :: system
-      !> Index of the displacement.
-      integer, intent(in) :: row
-      !> Matrices over its functions of x and y.
-      real(wp), intent(in) :: x(:, :), y(:, :)
-      real(wp), intent(in) :: loss_factor
-      !> Index of the other displacement (default: the same).
-      integer, intent(in), optional :: column
-      integer :: other
-
-      other = row
-      if (present(column)) other = column
-      call add_term(system%stiffness, term_type(row, other, x, y, loss_factor, system%is_bearing))
-   end subroutine add_stiffness
 
    !> Adds a term.
    subroutine add_term(terms, term)
@@ -267,6 +248,7 @@ contains
       real(wp), intent(in) :: lower_limit
       real(wp), allocatable :: stiffness(:, :), mass(:, :), omega(:), transformation(:, :)
       integer, allocatable :: first(:), dynamic(:), static(:)
+      logical, allocatable :: follows(:)
       integer :: i, p, n
 
       failed = .false.
@@ -278,14 +260,9 @@ contains
             block%shape(p)%y = y(p)%index
          end do
          first = get_first([(size(block%shape(p)%x)*size(block%shape(p)%y), p=1, n)])
-         allocate (dynamic(0), static(0))
-         do p = 1, n
-            if (displacement(p)%is_static) then
-               static = [static, (i, i=first(p), first(p + 1) - 1)]
-            else
-               dynamic = [dynamic, (i, i=first(p), first(p + 1) - 1)]
-            end if
-         end do
+         follows = [(spread(displacement(p)%is_static, 1, first(p + 1) - first(p)), p=1, n)]
+         static = pack([(i, i=1, size(follows))], follows)
+         dynamic = pack([(i, i=1, size(follows))], .not. follows)
       end associate
       associate (terms => system%stiffness)
          call assemble(terms, spread(1.0_wp, 1, size(terms)), block, first, stiffness)

@@ -64,7 +64,10 @@ contains
          error = input_error('there is no such file, or it is empty, a directory, not regular or too large; allowed: a ' &
             //'table of modes of up to '//to_text(int(max_size))//' bytes')
       else
+         ! Threads may read the same file, and none can be open twice.
+         !$omp critical (thud_sampled_modes)
          call read_rows(path, rows, point, error)
+         !$omp end critical (thud_sampled_modes)
       end if
       if (.not. allocated(error)) call get_coordinates(point(1, :), 'x', x, error)
       if (.not. allocated(error)) call get_coordinates(point(2, :), 'y', y, error)
@@ -108,8 +111,8 @@ contains
          call read_number(cells(first:), value, valid)
          i = findloc(valid, .false., dim=1)
          if (i > 0) then
-            error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not a ' &
-               //'number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
+            error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not ' &
+               //'a number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
          else if (number > 0) then
             i = findloc(value > 0.0_wp .and. value <= highest_value(number), .false., dim=1)
             if (allocated(rows(number)%value)) then

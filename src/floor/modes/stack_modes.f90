@@ -9,7 +9,7 @@ module thud_stack_modes
    use thud_modes, only: modes_type, product_type
    use thud_plate_stack, only: edge_type, get_counts, get_degree, get_lines, get_resolved_frequency, has_shear, &
       has_sines, orthotropic_type, plate_stack_type, ribs_type, rigid_support
-   use thud_ritz_system, only: add_energies, add_stiffness, energy_type, ritz_system_type, solve_ritz_system
+   use thud_ritz_system, only: add_energies, add_term, energy_type, ritz_system_type, solve_ritz_system, term_type
    implicit none (type, external)
    private
 
@@ -296,8 +296,8 @@ contains
       x = system%displacement(w)%x
       y = system%displacement(w)%y
       associate (at_ribs => get_functions(y, ribs%position, 0))
-         call add_stiffness(system, w, get_beam_stiffness(ribs, x, rotation), matmul(transpose(at_ribs), at_ribs), &
-            ribs%loss_factor)
+         call add_term(system%stiffness, term_type(w, w, get_beam_stiffness(ribs, x, rotation), &
+            matmul(transpose(at_ribs), at_ribs), ribs%loss_factor, system%is_bearing))
       end associate
       call add_energies(system, [energy_type(ribs%mass, w, w, is_mass=.true.)], 0.0_wp, 2, ribs%position)
       if (.not. ribs%inertia > 0.0_wp) return

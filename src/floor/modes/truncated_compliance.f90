@@ -20,11 +20,6 @@ module thud_truncated_compliance
    !> Points of the quadratures over wavenumbers.
    integer, parameter :: n_point = 32
 
-   !> Stiffnesses per width of a plate along ribs, of torsion and coupling, and across, N m.
-   type :: strip_type
-      real(wp) :: along = 0.0_wp, mixed = 0.0_wp, across = 0.0_wp
-   end type strip_type
-
 contains
 
    !> The compliance at a point, m/N.
@@ -36,13 +31,11 @@ contains
       !> Coordinate of the point along the width, m.
       real(wp), intent(in) :: y
       real(wp) :: compliance
-      type(strip_type) :: strip
       type(ribs_type) :: ribs
       real(wp), allocatable :: along(:), weight(:), load(:), moment(:), position(:), distance(:, :)
       logical, allocatable :: near(:)
       integer :: i
 
-      strip = strip_type(plate%along, plate%coupling + 2*plate%torsion, plate%across)
       allocate (ribs%position(0))
       if (allocated(plate%ribs)) ribs = plate%ribs
       allocate (near(size(ribs%position)))
@@ -56,25 +49,25 @@ contains
       ! Waves along the ribs that the functions have: what is missing across.
       call get_quadrature(n_point, 0.0_wp, wavenumber(1), along, weight)
       do i = 1, n_point
-         call get_line_loads(strip, ribs, along(i), distance, load, moment)
+         call get_line_loads(plate, ribs, along(i), distance, load, moment)
          compliance = compliance + weight(i)/pi*dot_product(load, &
-            matmul(get_short_deflection(strip, along(i), wavenumber(2), distance), load))
+            matmul(get_short_deflection(plate, along(i), wavenumber(2), distance), load))
       end do
       ! Shorter ones: k = wavenumber/t.
       call get_quadrature(n_point, 0.0_wp, 1.0_wp, along, weight)
       do i = 1, n_point
          associate (k => wavenumber(1)/along(i))
-            call get_line_loads(strip, ribs, k, distance, load, moment)
+            call get_line_loads(plate, ribs, k, distance, load, moment)
             compliance = compliance + weight(i)*k/along(i)/pi &
-               *(dot_product(load, get_deflection(strip, k, distance(:, 1), 0)) &
-               + dot_product(moment, get_deflection(strip, k, distance(2:, 1), 1)))
+               *(dot_product(load, get_deflection(plate, k, distance(:, 1), 0)) &
+               + dot_product(moment, get_deflection(plate, k, distance(2:, 1), 1)))
          end associate
       end do
    end function get_truncated_compliance
 
    !> Loads on the plate: a unit force, and the reactions of the ribs.
-   subroutine get_line_loads(strip, ribs, k, distance, load, moment)
-      type(strip_type), intent(in) :: strip
+   subroutine get_line_loads(plate, ribs, k, distance, load, moment)
+      type(orthotropic_type), intent(in) :: plate
       type(ribs_type), intent(in) :: ribs
       !> Wavenumber along the ribs, 1/m.
       real(wp), intent(in) :: k
@@ -92,16 +85,16 @@ contains
       if (n == 0) return
       beam = 1/((ribs%bending + ribs%composite/(1 + ribs%slip*ribs%composite*k**2))*k**4) + 1/(ribs%shear*k**2)
       associate (between => distance(2:, 2:), from_force => distance(2:, 1))
-         matrix(:n, :n) = get_deflection(strip, k, between, 0)
-         matrix(:n, n + 1:) = -get_deflection(strip, k, between, 1)
-         matrix(n + 1:, n + 1:) = -get_deflection(strip, k, between, 2)
-         reaction(:n, 1) = get_deflection(strip, k, from_force, 0)
-         reaction(n + 1:, 1) = get_deflection(strip, k, from_force, 1)
+         matrix(:n, :n) = get_deflection(plate, k, between, 0)
+         matrix(:n, n + 1:) = -get_deflection(plate, k, between, 1)
+         matrix(n + 1:, n + 1:) = -get_deflection(plate, k, between, 2)
+         reaction(:n, 1) = get_deflection(plate, k, from_force, 0)
+         reaction(n + 1:, 1) = get_deflection(plate, k, from_force, 1)
       end associate
       do i = 1, n
          matrix(i, i) = matrix(i, i) + beam
          ! Without torsion, nothing resists the slope: a compliance that is far above that of the plate.
-         matrix(n + i, n + i) = matrix(n + i, n + i) + 1/max(ribs%torsion*k**2 + ribs%warping*k**4, 1.0e-9_wp*strip%across*k)
+         matrix(n + i, n + i) = matrix(n + i, n + i) + 1/max(ribs%torsion*k**2 + ribs%warping*k**4, 1.0e-9_wp*plate%across*k)
       end do
       call dposv('U', 2*n, 1, matrix, 2*n, reaction, 2*n, info)
       if (info /= 0) return
@@ -110,8 +103,8 @@ contains
    end subroutine get_line_loads
 
    !> Derivative with respect to the distance of the deflection by a unit line load cos(k x), m2/N/m**order, by residues.
-   elemental function get_deflection(strip, k, distance, order) result(deflection)
-      type(strip_type), intent(in) :: strip
+   elemental function get_deflection(plate, k, distance, order) result(deflection)
+      type(orthotropic_type), intent(in) :: plate
       !> Wavenumber, 1/m, and distance from the load, m, with its sign.
       real(wp), intent(in) :: k, distance
       integer, intent(in) :: order
@@ -119,28 +112,28 @@ contains
       complex(wp) :: square(2), root(2)
       real(wp) :: difference
 
-      associate (product => strip%along*strip%across)
+      associate (product => plate%along*plate%across, mixed => plate%coupling + 2*plate%torsion)
          ! Equal roots, as of an isotropic plate, would divide by zero.
-         difference = strip%mixed**2 - product
+         difference = mixed**2 - product
          if (abs(difference) < 1.0e-6_wp*product) difference = 1.0e-6_wp*product
+         square = k**2/plate%across*(mixed + [1, -1]*sqrt(cmplx(difference, 0.0_wp, wp)))
       end associate
-      square = k**2/strip%across*(strip%mixed + [1, -1]*sqrt(cmplx(difference, 0.0_wp, wp)))
       root = sqrt(square)
       deflection = real(((-root(2))**order*exp(-root(2)*abs(distance))/root(2) &
-         - (-root(1))**order*exp(-root(1)*abs(distance))/root(1))/(2*strip%across*(square(1) - square(2))), wp)
+         - (-root(1))**order*exp(-root(1)*abs(distance))/root(1))/(2*plate%across*(square(1) - square(2))), wp)
       if (mod(order, 2) == 1) deflection = sign(1.0_wp, distance)*deflection
    end function get_deflection
 
    !> As `get_deflection`, of wavenumbers across the ribs from a limit on.
-   elemental function get_short_deflection(strip, k, limit, distance) result(deflection)
-      type(strip_type), intent(in) :: strip
+   elemental function get_short_deflection(plate, k, limit, distance) result(deflection)
+      type(orthotropic_type), intent(in) :: plate
       real(wp), intent(in) :: k, limit, distance
       real(wp) :: deflection
       real(wp), allocatable :: t(:), weight(:)
 
       call get_quadrature(n_point, 0.0_wp, 1.0_wp, t, weight)
-      associate (q => limit/t)
-         deflection = sum(weight*q/t*cos(q*distance)/(strip%along*k**4 + 2*strip%mixed*k**2*q**2 + strip%across*q**4))/pi
+      associate (q => limit/t, mixed => plate%coupling + 2*plate%torsion)
+         deflection = sum(weight*q/t*cos(q*distance)/(plate%along*k**4 + 2*mixed*k**2*q**2 + plate%across*q**4))/pi
       end associate
    end function get_short_deflection
 
