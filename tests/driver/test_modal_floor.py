@@ -299,9 +299,9 @@ def edited(path: Path, line: int, old: str, new: str) -> None:
 @pytest.mark.parametrize(
     ("line", "old", "new", "words"),
     [
-        (0, "frequency,Hz", "0,0", ("no row of frequencies",)),
+        (0, "frequency,Hz", "0,0", ("no row of frequency",)),
         (0, ",Hz,", ",Hz,-", ("line 1", "frequency", "mode 1", "above 0")),
-        (1, "loss_factor", "# loss", ("no losses", "loss_factor")),
+        (1, "loss_factor", "# loss", ("no row of loss_factor",)),
         (1, "0.03", "0.0, 0.03", ("line 2", "loss_factor", "mode 1", "above 0")),
         (1, "0.03", "1.5", ("loss_factor", "above 0", "up to", 1.0)),
         (2, "modal_mass,kg,1", "modal_mass,kg,0", ("modal_mass", "mode 1", "above 0")),
