@@ -369,7 +369,7 @@ def test_missing_files_are_refused(path: Path) -> None:
     for file, words in (
         ("", ("file is empty",)),
         ("none.csv", ("none.csv", "no such file")),
-        (str(path.parent), ("directory", "table of modes")),
+        (str(path.parent), ("directory", "a table")),
     ):
         with pytest.raises(thud.InputError, match=naming("modal_floor", *words)):
             thud.mobility(replace(FLOOR, file=file), [30.0])
