@@ -65,7 +65,7 @@ contains
       held = with_rigid_edges(stack)
       wanted = mode_limit*resolution
       ! In shear, waves are short, and many functions gain little.
-      if (is_uncoupled(held) .and. .not. any(has_shear(held%plate))) wanted = mode_limit*sum_limit_factor
+      if (all(is_uncoupled(held)) .and. .not. any(has_shear(held%plate))) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
       modes%stack = held
       call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
@@ -204,7 +204,7 @@ contains
 
       ! Sums of functions are stopped at a frequency, or have the compliance of all their modes.
       corner = pi/(2*sqrt(2.0_wp))*modes%limit
-      has_all = .not. (is_uncoupled(modes%stack) .or. any(has_shear(modes%stack%plate)))
+      has_all = .not. (all(is_uncoupled(modes%stack)) .or. any(has_shear(modes%stack%plate)))
       associate (length => modes%stack%length, width => modes%stack%width, omega => modes%omega, &
          set => modes%modes%displacement(1))
          value = get_mode_values(modes%modes, 1, length*[source(1), point(1)], width*[source(2), point(2)])

@@ -160,9 +160,11 @@ contains
       real(wp) :: frequency
       integer :: i, limit
 
-      limit = max_coupled(count([is_symmetric(stack, 1), is_symmetric(stack, 2)]))
-      if (is_uncoupled_along(stack, 1)) limit = max_half_coupled
-      if (is_uncoupled(stack)) limit = max_uncoupled
+      associate (uncoupled => is_uncoupled(stack))
+         limit = max_coupled(count(is_symmetric(stack)))
+         if (uncoupled(1)) limit = max_half_coupled
+         if (all(uncoupled)) limit = max_uncoupled
+      end associate
       ! Rotations take about as long as two plates.
       if (any(has_shear(stack%plate))) limit = limit/2
       frequency = max_frequency
@@ -189,6 +191,8 @@ contains
    pure function get_simplified(stack) result(part)
       type(plate_stack_type), intent(in) :: stack
       type(plate_stack_type) :: part
+      real(wp) :: cut
+      integer :: i
 
       part = stack
       associate (bearing => part%plate(part%bearing))
@@ -200,78 +204,61 @@ contains
          .and. max(part%length, part%width) > min_part)
          if (part%length > part%width) then
             part%length = 0.9_wp*part%length
-         else
-            call narrow()
+            cycle
          end if
-      end do
-   contains
-
-      !> Cuts both sides of the width, with the positions across it.
-      pure subroutine narrow()
-         real(wp) :: cut
-         integer :: i
-
+         ! Both sides of the width, with the positions across it.
          cut = 0.05_wp*part%width
          part%width = part%width - 2*cut
          do i = 1, size(part%plate)
-            if (allocated(part%plate(i)%ribs)) call move(part%plate(i)%ribs%position, cut)
+            if (allocated(part%plate(i)%ribs)) call move(part%plate(i)%ribs%position)
          end do
          do i = 1, size(part%layer)
-            if (allocated(part%layer(i)%line_y)) call move(part%layer(i)%line_y, cut)
+            if (allocated(part%layer(i)%line_y)) call move(part%layer(i)%line_y)
          end do
-      end subroutine narrow
+      end do
+   contains
 
       !> Moves positions, without those beyond the new width.
-      pure subroutine move(position, cut)
+      pure subroutine move(position)
          real(wp), allocatable, intent(inout) :: position(:)
-         real(wp), intent(in) :: cut
 
          position = pack(position - cut, position > cut .and. position < cut + part%width)
       end subroutine move
    end function get_simplified
 
-   !> Whether each mode of a stack has one number of half waves along the length and one along the width.
+   !> Whether each mode of a stack has one number of half waves along the length, and one along the width: simply supported
+   !> plates, with ribs and lines of springs along it: [2].
    pure function is_uncoupled(stack) result(yes)
       type(plate_stack_type), intent(in) :: stack
-      logical :: yes
+      logical :: yes(2)
+      integer :: i
 
-      yes = is_uncoupled_along(stack, 1) .and. is_uncoupled_along(stack, 2)
+      yes = .true.
+      do i = 1, size(stack%plate)
+         yes = yes .and. [has_sines(stack%plate(i), 1), has_sines(stack%plate(i), 2)]
+         if (allocated(stack%plate(i)%ribs)) yes(2) = .false.
+      end do
+      if (any([(allocated(stack%layer(i)%line_y), i=1, size(stack%plate) - 1)])) yes(2) = .false.
    end function is_uncoupled
 
-   !> Whether each mode of a stack has one number of half waves in a direction: simply supported plates with ribs along it.
-   pure function is_uncoupled_along(stack, direction) result(yes)
+   !> Whether the supports and ribs of a stack are symmetric along the length, and along the width: [2].
+   pure function is_symmetric(stack) result(yes)
       type(plate_stack_type), intent(in) :: stack
-      !> 1: along the length, 2: along the width.
-      integer, intent(in) :: direction
-      logical :: yes
-      integer :: i
+      logical :: yes(2)
+      integer :: i, k
 
       yes = .true.
       do i = 1, size(stack%plate)
-         yes = yes .and. has_sines(stack%plate(i), direction)
-         if (direction == 2) yes = yes .and. .not. allocated(stack%plate(i)%ribs)
-      end do
-      if (direction == 2) yes = yes .and. .not. any([(allocated(stack%layer(i)%line_y), i=1, size(stack%plate) - 1)])
-   end function is_uncoupled_along
-
-   !> Whether the supports and connections of a stack are symmetric in a direction.
-   pure function is_symmetric(stack, direction) result(yes)
-      type(plate_stack_type), intent(in) :: stack
-      !> 1: along the length, 2: along the width.
-      integer, intent(in) :: direction
-      logical :: yes
-      integer :: i
-
-      yes = .true.
-      do i = 1, size(stack%plate)
-         associate (edges => stack%plate(i)%edge(2*direction - 1:2*direction))
-            yes = yes .and. abs(edges(1)%deflection - edges(2)%deflection) <= 0.0_wp &
-               .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp
-         end associate
-         yes = yes .and. size(get_lines(stack%plate(i), direction)) == 0
-         if (direction == 1 .or. .not. allocated(stack%plate(i)%ribs)) cycle
+         do k = 1, 2
+            associate (edges => stack%plate(i)%edge(2*k - 1:2*k))
+               yes(k) = yes(k) .and. size(get_lines(stack%plate(i), k)) == 0 &
+                  .and. abs(edges(1)%deflection - edges(2)%deflection) <= 0.0_wp &
+                  .and. abs(edges(1)%rotation - edges(2)%rotation) <= 0.0_wp
+            end associate
+         end do
+         if (.not. allocated(stack%plate(i)%ribs)) cycle
          associate (position => stack%plate(i)%ribs%position)
-            yes = yes .and. all(abs(position + position(size(position):1:-1) - stack%width) <= 1.0e-9_wp*stack%length)
+            yes(2) = yes(2) .and. all(abs(position + position(size(position):1:-1) - stack%width) <= 1.0e-9_wp*stack%length)
          end associate
       end do
    end function is_symmetric
