@@ -13,7 +13,7 @@ module thud_case_answers
    use thud_kinds, only: wp
    use thud_progress_line, only: begin_progress, end_progress
    use thud_request, only: request_type
-   use thud_result_bundle, only: add_compression, add_results
+   use thud_records, only: add_compression, add_results
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
    use thud_system, only: is_forked
@@ -60,7 +60,6 @@ contains
       !> Set if the run fails.
       type(error_type), allocatable, intent(out) :: error
       type(case_type), target :: case
-      type(results_type) :: results
       type(outcome_type) :: outcome
       type(run_options_type) :: options
       character(len=:), allocatable :: path, text
@@ -73,15 +72,15 @@ contains
       if (request%get_number('progress') > 0.0_wp) call begin_progress()
       ! gfortran keeps the lengths of texts that functions return in static memory: one run writes its tables at a time.
       !$omp critical (thud_run)
-      call run_case(path, options, case, results, outcome, error)
+      call run_case(path, options, case, bundle, outcome, error)
       !$omp end critical (thud_run)
       call end_progress()
       if (allocated(error)) return
+      bundle%group = ''
       call get_case_text(case, text)
       call bundle%add_text('case', text)
       call bundle%add_text('table', outcome%table)
       call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
-      call add_results(bundle, case, results)
    end subroutine answer_run
 
    !> The results that a case asks for, except levels and energies: callers ask for them in the bands that they need.
@@ -167,19 +166,20 @@ contains
       !> The results; the forces are moved out of them.
       type(sweep_type), intent(inout) :: sweep
       type(text_buffer_type) :: reasons
-      integer :: i
+      integer :: i, n
 
       do i = 1, size(sweep%reason)
          if (allocated(sweep%reason(i)%text)) call reasons%append(sweep%reason(i)%text//newline)
       end do
       call bundle%add_text('reasons', reasons%get_text())
       call bundle%add_array('status', shape(sweep%status), real(sweep%status, wp))
-      call bundle%add_array('quantity', shape(sweep%quantity), sweep%quantity)
-      call bundle%add_array('level', shape(sweep%level), sweep%level)
-      call bundle%add_array('conforms', shape(sweep%conforms), merge(1.0_wp, 0.0_wp, sweep%conforms))
-      call bundle%add_array('margin', shape(sweep%margin), sweep%margin)
-      call bundle%add_array('verdict', shape(sweep%verdict), merge(1.0_wp, 0.0_wp, sweep%verdict))
-      call bundle%add_array('floor_value', shape(sweep%floor_value), sweep%floor_value)
+      i = 1
+      do while (i <= size(sweep%columns))
+         n = count(sweep%columns%result == sweep%columns(i)%result)
+         call bundle%add_array(sweep%columns(i)%result, pack([n, size(sweep%status)], [n > 1, .true.]), &
+            sweep%values(i:i + n - 1, :))
+         i = i + n
+      end do
       call bundle%move_array('force', sweep%force)
    end subroutine add_samples
 

@@ -21,8 +21,8 @@ module thud_floor_answers
    use thud_modes, only: get_mode_values
    use thud_plate, only: get_plate_radiation, get_surface_mass, get_total_loss
    use thud_receiver, only: get_mobility, receiver_type
+   use thud_records, only: add_history, add_room_level
    use thud_request, only: request_type
-   use thud_result_bundle, only: add_history, add_room_level
    use thud_room, only: box_type, check_below, get_area, get_rating_index, new_box, place, room_level_type
    use thud_room_prediction, only: predict_room
    implicit none (type, external)
@@ -132,7 +132,7 @@ contains
       else
          call drop_on_floor(case, state, on_floor, error)
          if (allocated(error) .or. .not. allocated(on_floor)) return
-         call add_history(bundle, 'on_floor.', on_floor)
+         call add_history(bundle, 'floor_', on_floor)
          if (.not. case%has_room) return
          call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, prediction, error)
       end if

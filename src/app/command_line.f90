@@ -1,9 +1,9 @@
 !> The command line of the executable.
 module thud_command_line
    use thud_blas_threads, only: use_one_blas_thread
+   use thud_bundle, only: bundle_type
    use thud_case, only: case_type
    use thud_case_text, only: describe_keys
-   use thud_compute, only: results_type
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
    use thud_kinds, only: wp
@@ -15,7 +15,7 @@ module thud_command_line
    use thud_screen, only: print_message, print_results, red, write_screen, yellow
    use thud_suggestion, only: get_suggestion
    use thud_system, only: prepare_process, standard_output
-   use thud_text, only: newline, quoted, wrap_lines
+   use thud_text, only: join, newline, quoted, wrap_lines
    implicit none (type, external)
    private
 
@@ -65,7 +65,7 @@ contains
       integer, intent(out) :: exit_code
       type(request_type) :: request
       type(case_type), target :: case
-      type(results_type) :: results
+      type(bundle_type) :: records
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
       integer :: i
@@ -86,7 +86,7 @@ contains
          if (allocated(error)) then
             continue
          else if (request%samples == '') then
-            call run_case(request%case_file, request%options, case, results, outcome, error)
+            call run_case(request%case_file, request%options, case, records, outcome, error)
          else
             call run_samples(request%case_file, request%samples, request%threads, request%options, outcome, error)
          end if
@@ -109,7 +109,7 @@ contains
       type(request_type), intent(out) :: request
       !> Set if an argument is unknown, missing or given twice.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: argument, number, suggestion
+      character(len=:), allocatable :: argument, number, suggestion, text
       integer :: i
 
       request%options%output = ''
@@ -119,9 +119,15 @@ contains
       do while (i <= command_argument_count())
          argument = get_argument(i)
          select case (argument)
-         case ('-h', '--help', '--version', '--keys', '--schema')
-            call get_information(argument, request%information)
-            return
+         case ('--version')
+            request%information = 'thud '//version
+         case ('--keys')
+            call describe_keys(text)
+            call wrap_lines(text, request%information)
+         case ('--schema')
+            call get_schema(request%information)
+         case ('-h', '--help')
+            call wrap_lines(help(), request%information)
          case ('--replace')
             request%options%replace = .true.
          case ('--all')
@@ -142,9 +148,7 @@ contains
          case default
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
-               error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--replace, --all, --samples TABLE, --threads N, --check, --quiet, --verbose, --keys, --schema, ' &
-                  //'--help, --version')
+               error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: '//join(known_options))
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one (commands such as run ' &
                   //'and predict belong to thud-driver)')
@@ -152,7 +156,7 @@ contains
                request%case_file = argument
             end if
          end select
-         if (allocated(error)) return
+         if (allocated(error) .or. allocated(request%information)) return
          i = i + 1
       end do
       if (.not. allocated(request%case_file)) then
@@ -167,26 +171,6 @@ contains
          error = input_error('--verbose contradicts --quiet; allowed: one of them')
       end if
    end subroutine parse_arguments
-
-   !> The text that an option shows instead of a run.
-   subroutine get_information(option, information)
-      !> One of -h, --help, --version, --keys and --schema.
-      character(len=*), intent(in) :: option
-      character(len=:), allocatable, intent(out) :: information
-      character(len=:), allocatable :: keys
-
-      select case (option)
-      case ('--version')
-         information = 'thud '//version
-      case ('--keys')
-         call describe_keys(keys)
-         call wrap_lines(keys, information)
-      case ('--schema')
-         call get_schema(information)
-      case default
-         call wrap_lines(help(), information)
-      end select
-   end subroutine get_information
 
    !> Reads the value of an option.
    subroutine take_value(i, option, allowed, value, error)

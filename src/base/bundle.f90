@@ -1,4 +1,5 @@
-!> Named results: any number of texts, numbers and arrays, described by a header for callers.
+!> Results as a list of records: texts, numbers and arrays, each with a name. Files and callers in other languages get results
+!> from this list, which is made once (`thud_records`).
 module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
@@ -7,28 +8,38 @@ module thud_bundle
    implicit none (type, external)
    private
 
-   public :: bundle_type, retrieve, store
+   public :: bundle_type, record_type, retrieve, store
 
-   !> A number or an array.
-   type :: item_type
-      !> The numbers, in Fortran's array order: [:, :, :].
+   !> A text, a number or an array.
+   type :: record_type
+      !> Group, empty if the record has none, and name.
+      character(len=32) :: group = '', name = ''
+      !> `text`, `real`, `whole` for integers, or `flag` for 0 and 1, which mean false and true.
+      character(len=5) :: kind = 'real'
+      !> SI unit or remark.
+      character(len=40) :: unit = ''
+      !> The text, perhaps of several lines.
+      character(len=:), allocatable :: text
+      !> The numbers, in Fortran's array order; none of a text: [:, :, :].
       real(wp), allocatable :: values(:, :, :)
-   end type item_type
+   end type record_type
 
-   !> Texts and arrays, each with its name.
+   !> Records, each with its name.
    type :: bundle_type
-      private
-      !> One line per text, number or array: name, tab and form. The form is `t` and the length for a text, the extents, each
-      !> followed by a comma, for an array, and empty for a number.
-      character(len=:), allocatable, public :: header
+      !> One line per record: group with a point, name, tab and form. The form is `t` and the length for a text, the extents,
+      !> each followed by a comma, for an array, and empty for a number.
+      character(len=:), allocatable :: header
       !> All texts, concatenated.
-      character(len=:), allocatable, public :: text
-      !> Numbers and arrays; the first `n_item` are used.
-      type(item_type), allocatable :: items(:)
-      !> Number of numbers and arrays.
-      integer :: n_item = 0
+      character(len=:), allocatable :: text
+      !> The records; the first `n_record` are used.
+      type(record_type), allocatable :: records(:)
+      !> Number of records.
+      integer :: n_record = 0
+      !> Group of the records to add.
+      character(len=32) :: group = ''
    contains
       procedure :: add_text
+      procedure :: add_texts
       procedure :: add_number
       procedure :: add_array
       procedure :: move_array
@@ -43,31 +54,56 @@ contains
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name, text
 
-      call add_line(self, name, 't'//to_text(len(text)))
+      call add_record(self, name, [len(text)], text)
+      allocate (self%records(self%n_record)%values(0, 1, 1))
       if (.not. allocated(self%text)) self%text = ''
       self%text = self%text//text
    end subroutine add_text
 
+   !> Adds a list of texts, as the lines of a text.
+   subroutine add_texts(self, name, texts)
+      class(bundle_type), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      !> The texts, whose trailing blanks are dropped: [n_text].
+      character(len=*), intent(in) :: texts(:)
+      character(len=:), allocatable :: lines
+      integer :: i
+
+      lines = trim(texts(1))
+      do i = 2, size(texts)
+         lines = lines//newline//trim(texts(i))
+      end do
+      call self%add_text(name, lines)
+   end subroutine add_texts
+
    !> Adds a number.
-   subroutine add_number(self, name, value)
+   subroutine add_number(self, name, value, unit, kind)
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: value
+      !> See `record_type` (default: no unit, `real`).
+      character(len=*), intent(in), optional :: unit, kind
       integer :: extents(0)
 
-      call self%add_array(name, extents, [value])
+      call self%add_array(name, extents, [value], unit, kind)
    end subroutine add_number
 
    !> Adds an array of any rank.
-   subroutine add_array(self, name, extents, values)
+   subroutine add_array(self, name, extents, values, unit, kind)
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
       !> Extents of the array: [rank].
       integer, intent(in) :: extents(:)
       real(wp), intent(in) :: values(*)
+      !> See `record_type` (default: no unit, `real`).
+      character(len=*), intent(in), optional :: unit, kind
 
-      call new_item(self, name, extents)
-      self%items(self%n_item)%values = reshape(values(:product(extents)), [product(extents), 1, 1])
+      call add_record(self, name, extents)
+      associate (record => self%records(self%n_record))
+         record%values = reshape(values(:product(extents)), [product(extents), 1, 1])
+         if (present(unit)) record%unit = unit
+         if (present(kind)) record%kind = kind
+      end associate
    end subroutine add_array
 
    !> Adds an array of rank 3 without copying it.
@@ -77,53 +113,57 @@ contains
       !> The array, unallocated afterwards: [:, :, :].
       real(wp), allocatable, intent(inout) :: values(:, :, :)
 
-      call new_item(self, name, shape(values))
-      call move_alloc(values, self%items(self%n_item)%values)
+      call add_record(self, name, shape(values))
+      call move_alloc(values, self%records(self%n_record)%values)
    end subroutine move_array
 
-   !> Adds a line to the header.
-   subroutine add_line(self, name, form)
-      type(bundle_type), intent(inout) :: self
-      !> Name and form, as in the header.
-      character(len=*), intent(in) :: name, form
-
-      if (.not. allocated(self%header)) self%header = ''
-      self%header = self%header//trim(name)//tab//trim(form)//newline
-   end subroutine add_line
-
-   !> Adds an item without values.
-   subroutine new_item(self, name, extents)
-      type(bundle_type), intent(inout) :: self
+   !> Adds a record without values, and its line of the header.
+   subroutine add_record(self, name, extents, text)
+      class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
-      !> Extents of its array: [rank].
+      !> Extents of the array: [rank].
       integer, intent(in) :: extents(:)
-      type(item_type), allocatable :: more(:)
+      !> The text, if it is one.
+      character(len=*), intent(in), optional :: text
       character(len=12*size(extents)) :: form
+      type(record_type), allocatable :: more(:)
       integer :: i
 
-      write (form, '(*(i0,","))') extents
-      call add_line(self, name, form)
-      if (.not. allocated(self%items)) allocate (self%items(4))
-      if (self%n_item == size(self%items)) then
-         allocate (more(2*self%n_item))
-         do i = 1, self%n_item
-            call move_alloc(self%items(i)%values, more(i)%values)
+      if (.not. allocated(self%records)) allocate (self%records(4))
+      if (self%n_record == size(self%records)) then
+         allocate (more(2*self%n_record))
+         do i = 1, self%n_record
+            associate (old => self%records(i))
+               more(i) = record_type(group=old%group, name=old%name, kind=old%kind, unit=old%unit)
+               call move_alloc(old%text, more(i)%text)
+               call move_alloc(old%values, more(i)%values)
+            end associate
          end do
-         call move_alloc(more, self%items)
+         call move_alloc(more, self%records)
       end if
-      self%n_item = self%n_item + 1
-   end subroutine new_item
+      self%n_record = self%n_record + 1
+      self%records(self%n_record) = record_type(group=self%group, name=name)
+      write (form, '(*(i0,","))') extents
+      if (present(text)) then
+         self%records(self%n_record)%kind = 'text'
+         self%records(self%n_record)%text = text
+         form = 't'//to_text(len(text))
+      end if
+      if (.not. allocated(self%header)) self%header = ''
+      if (self%group /= '') self%header = self%header//trim(self%group)//'.'
+      self%header = self%header//trim(name)//tab//trim(form)//newline
+   end subroutine add_record
 
-   !> Count of the numbers in all items.
+   !> Count of the numbers in all records.
    pure function count_values(self) result(n)
       class(bundle_type), intent(in) :: self
       integer :: n
       integer :: i
 
-      n = sum([(size(self%items(i)%values), i=1, self%n_item)])
+      n = sum([(size(self%records(i)%values), i=1, self%n_record)])
    end function count_values
 
-   !> Copies the numbers of all items, in the order of the header.
+   !> Copies the numbers of all records, in the order of the header.
    subroutine copy_values(self, values)
       class(bundle_type), intent(in) :: self
       !> The numbers: [count_values].
@@ -131,19 +171,19 @@ contains
       integer :: i, at
 
       at = 0
-      do i = 1, self%n_item
-         call append(size(self%items(i)%values), self%items(i)%values)
+      do i = 1, self%n_record
+         call append(size(self%records(i)%values), self%records(i)%values)
       end do
 
    contains
 
-      !> Appends the numbers of one item.
-      subroutine append(n, item)
+      !> Appends the numbers of one record, without a copy of them.
+      subroutine append(n, numbers)
          !> Count of the numbers.
          integer, intent(in) :: n
-         real(wp), intent(in) :: item(n)
+         real(wp), intent(in) :: numbers(n)
 
-         values(at + 1:at + n) = item
+         values(at + 1:at + n) = numbers
          at = at + n
       end subroutine append
 

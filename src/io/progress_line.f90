@@ -55,7 +55,6 @@ contains
       character(len=*), intent(in) :: unit
       character(len=line_length) :: line
       integer(int64) :: now
-      real(wp) :: remaining
       integer :: status
 
       call system_clock(now)
@@ -64,14 +63,10 @@ contains
       latest_done = done
       if (real(now - latest, wp) < min_interval*real(rate, wp)) return
       latest = now
-      if (whole > 0.0_wp .and. done > 0.0_wp) then
-         remaining = real(now - first, wp)/real(rate, wp)*(whole - done)/done
-         line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed, at most ' &
-            //fixed(remaining, 0)//' s left'
-         call write_text(standard_error, achar(13)//line, status)
-      else
-         call write_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', status)
-      end if
+      line = 'thud: '//fixed(done, 0)//' '//unit//' computed'
+      if (whole > 0.0_wp .and. done > 0.0_wp) line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit &
+         //' computed, at most '//fixed(real(now - first, wp)/real(rate, wp)*(whole - done)/done, 0)//' s left'
+      call write_text(standard_error, achar(13)//line, status)
       shown = status == 0
    end subroutine print_line
 

@@ -1,10 +1,8 @@
 !> A run of many samples from end to end: reads a case and a table, and writes one row of results per sample, in chunks, so
 !> that the memory does not grow with the table.
 module thud_samples_run
-   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type, get_full_key, keep_impact_only
    use thud_case_text, only: get_case_text
-   use thud_compute, only: get_assessed_force
    use thud_constants, only: version
    use thud_ensemble, only: suits_batch
    use thud_error, only: error_type, input_error
@@ -15,9 +13,9 @@ module thud_samples_run
    use thud_run, only: load_case, outcome_type, run_options_type
    use thud_sample_report, only: get_sample_header, get_sample_rows
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
+   use thud_screen_tables, only: get_defaults_lines, get_force_title
    use thud_sweep, only: new_sweep, solve_sweep, sweep_type
    use thud_system, only: path_length
-   use thud_table, only: get_defaults_lines, get_force_title, get_span_row
    use thud_text, only: newline, replaced, to_text
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
@@ -37,8 +35,6 @@ module thud_samples_run
       integer :: samples = 0, computed = 0, conforming = 0
       !> Message of the first sample that failed.
       character(len=1024) :: failure = ''
-      !> Minimum and maximum of contact time, s, and octave levels of the assessed force, dB: [octave_count + 1, 2].
-      real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
 
 contains
@@ -90,7 +86,17 @@ contains
       outcome%warning = to_text(tally%samples - tally%computed)//' of ' &
          //to_text(tally%samples)//' samples have no results, such as: '//trim(tally%failure)
       outcome%conforms = tally%conforming == tally%samples
-      call format_tally(case, table, tally, outcome%table)
+      outcome%table = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline &
+         //'  '//to_text(tally%samples)//trim(merge(' sample, ', ' samples,', tally%samples == 1))//' ' &
+         //to_text(tally%computed)//' computed, '//to_text(tally%conforming)//' conform to '
+      if (any(table%names == 'source') .or. any(table%names == 'force')) then
+         outcome%table = outcome%table//'all their limits.'//newline
+      else
+         outcome%table = outcome%table//'all limits of the '//replaced(trim(case%source), '_', ' ')//' by the ' &
+            //get_force_title(case%level_force)//'.'//newline
+      end if
+      outcome%table = outcome%table &
+         //'  The samples state no numerical errors; a run of a single case states its own.'//newline
       outcome%table = outcome%table//get_defaults_lines(case)
    end subroutine run_samples
 
@@ -127,7 +133,12 @@ contains
                parts(i))
          end do
          !$omp end parallel do
-         call add(tally, sweep, get_assessed_force(case))
+         i = findloc(sweep%status /= 0, .true., dim=1)
+         if (i > 0 .and. tally%failure == '') tally%failure = sweep%reason(i)%text
+         tally%samples = tally%samples + n
+         tally%computed = tally%computed + count(sweep%status == 0)
+         ! The last column is the verdict.
+         tally%conforming = tally%conforming + count(sweep%values(size(sweep%columns), :) > 0.0_wp)
          do i = 1, threads
             call add_text(results, parts(i)%get_text(), error)
          end do
@@ -138,57 +149,5 @@ contains
       if (.not. allocated(error) .and. tally%computed == 0) error = input_error(trim(table%path)//': none of ' &
          //to_text(tally%samples)//' samples has results, such as: '//trim(tally%failure))
    end subroutine write_samples
-
-   !> Adds samples to a tally.
-   pure subroutine add(tally, sweep, force)
-      type(tally_type), intent(inout) :: tally
-      type(sweep_type), intent(in) :: sweep
-      !> Index of the force whose levels are summarized.
-      integer, intent(in) :: force
-      real(wp) :: values(octave_count + 1)
-      integer :: i
-
-      tally%samples = tally%samples + size(sweep%status)
-      do i = 1, size(sweep%status)
-         if (sweep%status(i) /= 0) then
-            if (tally%failure == '') tally%failure = sweep%reason(i)%text
-            cycle
-         end if
-         tally%computed = tally%computed + 1
-         if (sweep%verdict(i)) tally%conforming = tally%conforming + 1
-         values = [sweep%quantity(1, i), sweep%level(:octave_count, force, i)]
-         tally%span(:, 1) = min(tally%span(:, 1), values)
-         tally%span(:, 2) = max(tally%span(:, 2), values)
-      end do
-   end subroutine add
-
-   !> Text for the screen.
-   subroutine format_tally(case, table, tally, text)
-      type(case_type), intent(in) :: case
-      type(sample_table_type), intent(in) :: table
-      type(tally_type), intent(in) :: tally
-      character(len=:), allocatable, intent(out) :: text
-      type(band_type) :: octaves(octave_count)
-      integer :: i
-
-      text = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline &
-         //'  '//to_text(tally%samples)//trim(merge(' sample, ', ' samples,', tally%samples == 1))//' ' &
-         //to_text(tally%computed)//' computed, '//to_text(tally%conforming)//' conform to '
-      if (any(table%names == 'source') .or. any(table%names == 'force')) then
-         text = text//'all their limits.'//newline
-      else
-         text = text//'all limits of the '//replaced(trim(case%source), '_', ' ')//' by the ' &
-            //get_force_title(case%level_force)//'.'//newline
-      end if
-      if (tally%computed == 0) return
-      octaves = get_octaves()
-      do i = 1, octave_count
-         ! A range of levels from different forces or methods would mean nothing.
-         if (any(table%names == 'force') .or. any(table%names == 'method')) exit
-         text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
-      end do
-      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 2, 'ms') &
-         //'  The samples state no numerical errors; a run of a single case states its own.'//newline
-   end subroutine format_tally
 
 end module thud_samples_run

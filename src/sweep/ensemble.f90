@@ -203,7 +203,8 @@ contains
 
       !$omp critical (thud_projections)
       associate (projection => projections%window(window), length => get_window_length(window))
-         if (projection%n_sample == 0) call new_band_projection(length, projections%sample_rate, projections%bands, projection)
+         if (projection%n_sample == 0) call new_band_projection(length, projections%sample_rate, projections%bands, &
+            projection)
          has_matrices = projection%n_sample > 0
       end associate
       !$omp end critical (thud_projections)

@@ -8,13 +8,11 @@ module thud_sweep
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
    use thud_column, only: column_type
-   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, get_assessed_force, impact_type, &
-      prepare_floor, scope_type
+   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, impact_type, prepare_floor, scope_type
    use thud_ensemble, only: block_result_type, fill_samples, get_record, projections_type, set_projections, solve_drops, &
       suits_batch
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, key_length
-   use thud_floor_columns, only: column_name_length, get_floor_columns, get_floor_values
    use thud_floor_model, only: floor_state_type
    use thud_floor_result, only: floor_result_type
    use thud_force_history, only: force_count, force_history_type
@@ -23,6 +21,7 @@ module thud_sweep
    use thud_power, only: not_a_number
    use thud_quantities, only: get_quantities, sample_quantity_count
    use thud_registry, only: floor_names
+   use thud_result_column, only: get_result_columns, result_column_type, set_floor_values, set_source_values
    use thud_room, only: room_level_type
    use thud_sampling, only: check_sampling, get_sample_count
    use thud_shell_samples, only: block_size, get_blocks, sample_type
@@ -53,20 +52,10 @@ module thud_sweep
       integer, allocatable :: status(:)
       !> Messages of the errors: [n_sample].
       type(reason_type), allocatable :: reason(:)
-      !> The quantities of samples, SI units: [sample_quantity_count, n_sample].
-      real(wp), allocatable :: quantity(:, :)
-      !> Levels, dB: [n_band, force_count, n_sample].
-      real(wp), allocatable :: level(:, :, :)
-      !> The source conforms, by each force: [force_count, n_sample].
-      logical, allocatable :: conforms(:, :)
-      !> Minimum distance of the octave levels of the assessed force to their limits, dB, > 0 inside: [n_sample].
-      real(wp), allocatable :: margin(:)
-      !> The source conforms, by the assessed force: [n_sample].
-      logical, allocatable :: verdict(:)
-      !> Names, with units, of the additional columns of cases with a floor: [n_column].
-      character(len=column_name_length), allocatable :: floor_column(:)
-      !> Values of these columns: [n_column, n_sample].
-      real(wp), allocatable :: floor_value(:, :)
+      !> Columns of the results: [n_column].
+      type(result_column_type), allocatable :: columns(:)
+      !> Their values, for a flag 0 or 1: [n_column, n_sample].
+      real(wp), allocatable :: values(:, :)
       !> Forces, N; of size 0 if not wanted: [n_time, force_count, n_sample].
       real(wp), allocatable :: force(:, :, :)
    end type sweep_type
@@ -98,7 +87,7 @@ contains
 
       call get_level_bands(case%bands, sweep%bands, sweep%first_band)
       sweep%levels = levels
-      sweep%floor_column = get_floor_columns(case, sweep%bands(sweep%first_band:))
+      sweep%columns = get_result_columns(case, sweep%bands, sweep%first_band)
       call set_projections(sweep%projections, case%sampling%sample_rate, sweep%bands, get_sample_count(case%sampling))
    end subroutine new_sweep
 
@@ -128,8 +117,7 @@ contains
    subroutine clear(sweep)
       type(sweep_type), intent(inout) :: sweep
 
-      if (allocated(sweep%status)) deallocate (sweep%status, sweep%reason, sweep%conforms, sweep%margin, sweep%verdict, &
-         sweep%quantity, sweep%level, sweep%floor_value)
+      if (allocated(sweep%status)) deallocate (sweep%status, sweep%reason, sweep%values)
       if (allocated(sweep%force)) deallocate (sweep%force)
    end subroutine clear
 
@@ -233,19 +221,13 @@ contains
       integer :: status
 
       call clear(sweep)
-      allocate (sweep%status(n_sample), sweep%reason(n_sample), sweep%quantity(sample_quantity_count, n_sample), &
-         sweep%level(size(sweep%bands), force_count, n_sample), sweep%conforms(force_count, n_sample), &
-         sweep%margin(n_sample), sweep%verdict(n_sample), sweep%floor_value(size(sweep%floor_column), n_sample))
+      allocate (sweep%status(n_sample), sweep%reason(n_sample))
+      sweep%values = spread(merge(0.0_wp, not_a_number, sweep%columns%is_flag), 2, n_sample)
       allocate (sweep%force(n_time, force_count, n_sample), stat=status, errmsg=message)
       if (status /= 0) then
          error = input_error('the forces of '//to_text(n_sample)//' samples have no space in memory; allowed: fewer at ' &
             //'a time')
-         return
       end if
-      sweep%conforms = .false.
-      sweep%verdict = .false.
-      sweep%margin = not_a_number
-      sweep%floor_value = not_a_number
    end subroutine set_size
 
    !> Computes one sample, not in a batch.
@@ -268,7 +250,6 @@ contains
       type(floor_result_type) :: floor
       type(room_level_type) :: room
       type(error_type), allocatable :: error
-      real(wp), allocatable :: all_quantities(:)
       integer :: i
 
       scope = scope_type(levels=sweep%levels, energies=.false., room=sweep%levels)
@@ -282,27 +263,25 @@ contains
       if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, shared%floor, on_floor, error)
       if (.not. allocated(error)) call assess_floor(case, scope, shared%floor, shared%impact, on_floor, floor, room, error)
       sweep%status(sample) = 0
-      sweep%quantity(:, sample) = not_a_number
-      sweep%level(:, :, sample) = not_a_number
-      if (size(sweep%force) > 0) sweep%force(:, :, sample) = not_a_number
       if (allocated(error)) then
          sweep%status(sample) = error%code
          sweep%reason(sample)%text = error%message
+         if (size(sweep%force) > 0) sweep%force(:, :, sample) = not_a_number
          return
       end if
-      if (case%has_floor) call get_floor_values(case, size(sweep%bands) - sweep%first_band + 1, sweep%levels, &
-         shared%impact, on_floor, floor, room, sweep%floor_value(:, sample))
-      associate (history => shared%impact%history, assessment => shared%impact%assessment)
-         all_quantities = get_quantities(history)
-         sweep%quantity(:, sample) = all_quantities(:sample_quantity_count)
+      associate (history => shared%impact%history, assessment => shared%impact%assessment, &
+         values => sweep%values(:, sample), quantity => get_quantities(shared%impact%history))
+         if (sweep%levels) then
+            call set_source_values(case, assessment%criteria(:, 1), quantity(:sample_quantity_count), assessment%level, &
+               all(conforms(assessment%criteria), dim=1), values)
+         else
+            values(:sample_quantity_count) = quantity(:sample_quantity_count)
+         end if
+         if (case%has_floor) call set_floor_values(case, shared%impact, on_floor, floor, room, sweep%columns, values)
          if (size(sweep%force) > 0) then
             sweep%force(:, 1, sample) = history%elastic_force
             sweep%force(:, 2, sample) = history%floor_force
          end if
-         if (.not. sweep%levels) return
-         sweep%level(:, :, sample) = assessment%level
-         sweep%conforms(:, sample) = all(conforms(assessment%criteria), dim=1)
-         call set_verdict(case, assessment%criteria(:, 1), sample, sweep)
       end associate
    end subroutine solve_sample
 
@@ -344,24 +323,6 @@ contains
       yes = any(field%owner == [character(len=key_length) :: 'floor', 'room', floor_names])
    end function is_of_floor
 
-   !> Sets margin and verdict of a sample, by the assessed force.
-   subroutine set_verdict(case, criteria, sample, sweep)
-      !> The case of the sample.
-      type(case_type), intent(in) :: case
-      !> Criteria of the source, octaves first, of which only the ranges are used: [criterion_count].
-      type(criterion_type), intent(in) :: criteria(:)
-      !> Index of the sample; its levels must have been computed.
-      integer, intent(in) :: sample
-      type(sweep_type), intent(inout) :: sweep
-      integer :: force
-
-      force = get_assessed_force(case)
-      sweep%verdict(sample) = sweep%conforms(force, sample)
-      associate (level => sweep%level(:octave_count, force, sample), octaves => criteria(:octave_count))
-         sweep%margin(sample) = minval(min(level - octaves%lower, octaves%upper - level))
-      end associate
-   end subroutine set_verdict
-
    !> Computes samples of the shell model in batches; threads share blocks of samples.
    subroutine solve_batch(case, columns, values, threads, sweep, error)
       type(case_type), intent(in), target :: case
@@ -397,7 +358,7 @@ contains
          type(error_type), allocatable :: thread_error
          real(wp), allocatable :: force(:)
          character(len=128) :: message
-         integer :: i, n_row, n_time, start, status
+         integer :: i, j, n_row, n_time, start, status
 
          start = 1
          n_row = force_count*block_size
@@ -417,7 +378,9 @@ contains
             associate (indices => order(first(i):first(i + 1) - 1))
                call solve_drops(samples(indices), case%sampling, criteria, sweep%levels, sweep%projections, force(start), &
                   block)
-               call store_block(case, criteria, indices, force(start), block, sweep)
+               do j = 1, size(indices)
+                  if (block%computed(j)) call store_sample(j, indices(j), block, force(start))
+               end do
             end associate
          end do
          !$omp end do
@@ -426,36 +389,24 @@ contains
          !$omp end critical (thud_sweep_error)
       end subroutine solve_blocks
 
+      !> Stores the results of a sample.
+      subroutine store_sample(i, sample, block, force)
+         !> Index of the sample in the block, and among all samples.
+         integer, intent(in) :: i, sample
+         type(block_result_type), intent(in) :: block
+         !> Forces of the block, N: [force_count block_size, n_written].
+         real(wp), intent(in) :: force(force_count*block_size, block%n_written)
+         integer :: j
+
+         sweep%status(sample) = 0
+         sweep%values(:sample_quantity_count, sample) = block%quantity(:, i)
+         if (sweep%levels) call set_source_values(case, criteria, block%quantity(:, i), block%level(:, :, i), &
+            block%conforms(:, i), sweep%values(:, sample))
+         do j = 1, merge(force_count, 0, size(sweep%force) > 0)
+            sweep%force(:, j, sample) = get_record(force, i, j, block%n_written, size(sweep%force, 1))
+         end do
+      end subroutine store_sample
+
    end subroutine solve_batch
-
-   !> Stores the results of one block.
-   subroutine store_block(case, criteria, indices, force, block, sweep)
-      type(case_type), intent(in) :: case
-      !> Criteria of the source: [criterion_count].
-      type(criterion_type), intent(in) :: criteria(:)
-      !> Indices of the samples: [n_in_block].
-      integer, intent(in) :: indices(:)
-      type(block_result_type), intent(in) :: block
-      !> Forces of the block, N: [force_count block_size, n_written].
-      real(wp), intent(in) :: force(force_count*block_size, block%n_written)
-      type(sweep_type), intent(inout) :: sweep
-      integer :: i, j
-
-      do i = 1, size(indices)
-         if (.not. block%computed(i)) cycle
-         associate (sample => indices(i))
-            sweep%status(sample) = 0
-            sweep%quantity(:, sample) = block%quantity(:, i)
-            sweep%level(:, :, sample) = not_a_number
-            do j = 1, merge(force_count, 0, size(sweep%force) > 0)
-               sweep%force(:, j, sample) = get_record(force, i, j, block%n_written, size(sweep%force, 1))
-            end do
-            if (.not. sweep%levels) cycle
-            sweep%level(:, :, sample) = block%level(:, :, i)
-            sweep%conforms(:, sample) = block%conforms(:, i)
-            call set_verdict(case, criteria, sample, sweep)
-         end associate
-      end do
-   end subroutine store_block
 
 end module thud_sweep

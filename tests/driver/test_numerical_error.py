@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -147,7 +148,7 @@ def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, ru
     numbers = [f"{finer:.2f}", "dB", f"{change:.2f}", f"{error:.2f}"]
     assert lines[-1] == ["level,", "500", "Hz", "octave", *numbers]
     assert "finer octave" not in shown
-    assert "(16000 samples per second)" in shown
+    assert re.search(r"sample rate +16\.00 kHz", shown)
     assert "exceeded" not in shown
     assert "-0.00" not in shown
 
@@ -155,15 +156,15 @@ def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, ru
 FINE_MESH = {"radial_elements": 4, "polar_elements": 34}
 RESOLUTIONS = {
     "&model name = 'finite_element' / &mesh radial_elements = 3, polar_elements = 24 /": (
-        "mesh 3 x 24\n", "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
+        ("radial elements 3", "polar elements 24"), "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
     ),
     "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
-        "10 rings, modes up to 300 Hz, substeps 1\n",
+        ("rings 10", "highest frequency 300.0 Hz", "substeps 1"),
         "&modal_ball rings, highest_frequency (now 10, 300 Hz)",
         {"rings": 14, "highest_frequency": 1960.0},
     ),
     "&model name = 'modal_ball' /": (
-        "40 rings, modes up to 1400 Hz, substeps 1\n", "", {"rings": 56},
+        ("rings 40", "highest frequency 1.400 kHz", "substeps 1"), "", {"rings": 56},
     ),
 }  # fmt: skip
 
@@ -174,7 +175,8 @@ def test_resolution_is_stated(text: str, case_file: CaseFile, run: Run) -> None:
     shown, keys, finer = RESOLUTIONS[text]
     path = case_file(f"&ball / &drop / {text} &sampling verify = .true. /")
     result = run(path, "--verbose", "--output", "results")
-    assert f"resolution: {shown}" in result.stdout
+    lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
+    assert set(shown) <= set(lines)
     assert "penetration" not in result.stdout
     assert keys in result.stderr
     quantities = thud.solve(thud.read_case(path)).model_quantities

@@ -26,14 +26,13 @@ def test_threads_share_no_lengths_of_texts() -> None:
     }
     assert deferred == {
         "command_line.f90",
-        "csv.f90",
         "file.f90",
         "quantities.f90",
-        "report.f90",
-        "room_report.f90",
+        "room_table.f90",
         "schema.f90",
+        "samples_run.f90",
         "screen.f90",
-        "table.f90",
+        "screen_tables.f90",
     }
 
 

@@ -28,6 +28,8 @@ api = _core.thud_api
 
 # The status of an interrupt is this number plus the number of the signal.
 _INTERRUPTED = 128
+# Units at the ends of the names of columns.
+_UNIT = re.compile("_(m|s|N|J|Hz|Pa|dB|m_per_s|m_per_Ns|s_kg)$")
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
@@ -109,6 +111,16 @@ def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
 def text(value: bytes) -> str:
     """Return the text in bytes of the library; invalid UTF-8 becomes surrogate escapes."""
     return value.decode(errors="surrogateescape")
+
+
+def texts(group: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the warnings in a group of an answer."""
+    return tuple(text(group["warning"]).split("\n")) if group else ()
+
+
+def without_units(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns of a table of the library by their names without units."""
+    return {_UNIT.sub("", name): values for name, values in columns.items()}
 
 
 def version() -> str:

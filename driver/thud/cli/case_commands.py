@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base.bridge import ask, text
+from thud.base.bridge import ask, text, texts
 from thud.base.checks import refuse
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
@@ -97,7 +97,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
             "run", path=os.fsencode(path), folder=os.fsencode(folder), all=options.all,
             verbose=options.verbose, progress=not options.quiet,
         )  # fmt: skip
-        print_notes(f"{path}: {text(value)}" for value in answer.get("warnings", {}).values())
+        print_notes(f"{path}: {value}" for value in texts(answer.get("warnings", {})))
         results.write_into(folder, _figures(answer, options))
     if not options.quiet:
         print_results(text(answer["table"]).removesuffix("\n"))
@@ -143,7 +143,7 @@ def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     if options.no_figures and not options.animation:
         return contents
     case = Case.from_text(text(answer["case"]))
-    impact = new_impact(case, answer) if "samples" in answer else None
+    impact = new_impact(case, answer) if "force" in answer else None
     modes = new_modes(case.ball, answer) if "modes" in answer else None
     curve = new_curve(case, answer) if "compression" in answer else None
     moving = {"motion": impact, "floor_motion": impact and impact.on_floor}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
 from thud.base.arguments import check_arguments
-from thud.base.bridge import ask
+from thud.base.bridge import ask, without_units
 from thud.base.display import Displayed
 from thud.base.extras import data_frame
 from thud.case.case import Case, case_text, new_model
@@ -118,4 +118,4 @@ def compress(
 
 def new_curve(case: Case, answer: Bundle) -> CompressionCurve:
     """Return the curve in a bundle of the library."""
-    return CompressionCurve(case, **answer["compression"])
+    return CompressionCurve(case, **without_units(answer["compression"]))

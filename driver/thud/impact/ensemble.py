@@ -26,7 +26,7 @@ from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key, key_owners
 from thud.impact.outcomes import Ensemble
-from thud.impact.quantities import ROOM_LEVEL, ROOM_RATING
+from thud.impact.quantities import ROOM_BAND, ROOM_RATING
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
+    from thud.base._schema import BandSet, LimitsSource, ModelName
     from thud.base.key import Key
 
 MAX_THREADS = 1024
@@ -179,49 +179,25 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         parameters=columns,
         status=results["status"],
         reason=results["reason"],
-        **dict(zip(SAMPLE_QUANTITIES, results["quantity"].T, strict=True)),
-        levels=_by_bands(results["level"], base.levels.bands),
+        **{name: results[name] for name in SAMPLE_QUANTITIES},
+        levels={
+            (force, kind): results[f"{force}_{kind}"]
+            for kind in BANDWIDTHS for force in FORCES if f"{force}_{kind}" in results
+        },
         margin=results["margin"],
-        conforms=results["verdict"],
-        elastic_conforms=results["conforms"][:, 0],
-        floor_conforms=results["conforms"][:, 1],
+        conforms=results["conforms"] != 0,
+        elastic_conforms=results["elastic_conforms"] != 0,
+        floor_conforms=results["floor_conforms"] != 0,
         elastic_force=force[:, 0] if forces else None,
         floor_force=force[:, 1] if forces else None,
         sample_rate=base.sampling.sample_rate,
-        **_floor_results(results["floor_value"], base),
-    )
-
-
-def _floor_results(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
-    """Return the additional fields of `Ensemble` for cases with a floor."""
-    if not case.floor:
-        return {}
-    requested = case.levels.bands
-    kinds = [bands for bands in BANDWIDTHS if requested in {bands, "both"}]
-    ends = np.cumsum([len(get_bands(bands).nominal) for bands in kinds])
-    *levels, others = np.split(values, ends, axis=1)
-    results: dict[str, Any] = {
-        "contact_levels": dict(zip(kinds, levels, strict=True)),
-        "floor_work": others[:, 0],
-    }
-    if case.room:
-        results |= {ROOM_LEVEL: others[:, 1:-1], ROOM_RATING: others[:, -1]}
-    return results
-
-
-def _by_bands(
-    level: NDArray[np.float64], requested: LevelsBands
-) -> dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]:
-    """Return levels by force and bands; the last axis has octaves, then other requested bands."""
-    result = {}
-    start = 0
-    for bands in BANDWIDTHS:
-        if bands in {BANDWIDTHS[0], requested} or requested == "both":
-            stop = start + len(get_bands(bands).nominal)
-            for i, force in enumerate(FORCES):
-                result[force, bands] = level[:, i, start:stop]
-            start = stop
-    return result
+        contact_levels={
+            kind: results[f"contact_{kind}"] for kind in BANDWIDTHS if f"contact_{kind}" in results
+        },
+        floor_work=results.get("floor_work"),
+        room_level=results.get(ROOM_BAND),
+        room_rating=results.get(ROOM_RATING),
+    )  # fmt: skip
 
 
 def _compute(  # noqa: PLR0913 - the arguments of the library
@@ -242,17 +218,8 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
     status = answer["status"].astype(np.int32)
     reason = np.full(len(numbers), "", dtype=object)
     reason[status != 0] = text(answer["reasons"]).split("\n")[:-1]
-    return {
-        "status": status,
-        "reason": reason,
-        "quantity": answer["quantity"].T,
-        "level": answer["level"].T,
-        "conforms": answer["conforms"].T != 0,
-        "margin": answer["margin"],
-        "verdict": answer["verdict"] != 0,
-        "floor_value": answer["floor_value"].T,
-        "force": answer["force"].T,
-    }
+    del answer["reasons"]
+    return {name: values.T for name, values in answer.items()} | {"status": status, "reason": reason}
 
 
 def _columns(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.bridge import ask
+from thud.base.bridge import ask, without_units
 from thud.base.checks import require_choice, require_pair
 from thud.base.extras import require_extra
 from thud.base.immutable import Immutable
@@ -165,18 +165,21 @@ def new_floor_impact(
     case: Case, answer: Bundle, blocked_force: NDArray[np.float64]
 ) -> FloorImpact | None:
     """Return the impact on a mobile floor from an answer of the library; None if it has none."""
-    prefix = "on_floor."
-    floor_answer = {key[len(prefix) :]: answer[key] for key in answer if key.startswith(prefix)}
-    if not floor_answer:
+    if "floor_force" not in answer:
         return None
-    common = impact_fields(case, floor_answer, ())
-    points = zip(
-        getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()), strict=True
-    )
+    columns = without_units(answer["floor_force"])
+    velocities = [values for name, values in columns.items() if name.startswith("point_")]
     impact = FloorImpact(
-        **common, **floor_answer["floor"], blocked_force=blocked_force,
-        point_velocity=np.empty((0, len(blocked_force))),
-    )  # fmt: skip
-    if velocities := [impact.velocity_at(x, y) for x, y in points]:
+        **impact_fields(case, answer, "floor_"),
+        warnings=(),
+        blocked_force=blocked_force,
+        floor_displacement=columns["floor_displacement"],
+        floor_velocity=columns["floor_velocity"],
+        floor_work=answer["floor_summary"]["floor_work"],
+        point_velocity=np.array(velocities).reshape(-1, len(blocked_force)),
+    )
+    points = [*zip(getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()))]
+    if points and not velocities:
+        velocities = [impact.velocity_at(x, y) for x, y in points]
         impact = replace(impact, point_velocity=np.array(velocities))
     return impact

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.arguments import check_arguments
-from thud.base.bridge import ask, text
+from thud.base.bridge import ask, texts, without_units
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
@@ -134,15 +134,15 @@ def free_modes(
 
 def new_modes(ball: Ball, answer: Bundle) -> FreeModes:
     """Return the free modes in a bundle of the library."""
-    modes = answer["modes"]
+    modes, shapes = without_units(answer["modes"]), answer["mode_shapes"]
     return FreeModes(
         ball,
         modes["frequency"],
         modes["harmonic"].astype(np.int32),
-        modes["participation"],
-        np.stack((modes["r"], modes["z"]), axis=-1),
-        np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
-        tuple(map(text, answer.get("warnings", {}).values())),
+        modes["pole_participation"],
+        np.stack((shapes["r"], shapes["z"]), axis=-1),
+        np.moveaxis(shapes["shape"], (-1, 0), (0, -1)),
+        texts(answer.get("warnings", {})),
     )
 
 

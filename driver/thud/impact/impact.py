@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import ImpactQuantities
+from thud.base._schema import IMPACT_QUANTITIES, ImpactQuantities
+from thud.base.bridge import without_units
 from thud.base.checks import require_choice, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
     from thud.level.assessment import Verdict
 
 
+# Columns of every history; components of the force follow the motion, which are the first ones.
+_COLUMNS = ("time", "deflection", "velocity", "elastic_force", "floor_force")
+_N_MOTION = 3
 OCTAVE_NAMES = ("octave_31_5", "octave_63", "octave_125", "octave_250", "octave_500")
 
 
@@ -330,17 +334,28 @@ class Impact(ImpactQuantities, Displayed):
         return {}
 
 
-def impact_fields(case: Case, answer: Bundle, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """Return arguments of `Impact` or `FloorImpact` from an answer of the library."""
-    samples, quantities = answer["samples"], answer["quantities"]
+def impact_fields(case: Case, answer: Bundle, prefix: str = "") -> dict[str, Any]:
+    """Return arguments of `Impact` or `FloorImpact` from results of the library by name.
+
+    The names of the groups begin with a prefix.
+    """
+    columns = without_units(answer[f"{prefix}force"])
+    names = list(columns)
+    histories = answer.get(f"{prefix}model_histories", {})
+    snapshots = answer.get(f"{prefix}snapshots")
+    summary = answer[f"{prefix}summary"]
     return {
         "case": case,
-        "time": np.arange(len(samples["deflection"])) / quantities["sample_rate"],
-        **samples,
-        "components": answer["components"],
-        "model_histories": answer.get("model_histories", {}),
-        "model_quantities": answer.get("model_quantities", {}),
-        "warnings": warnings,
-        "motion": new_motion(**answer["motion"]) if "motion" in answer else None,
-        **quantities,
+        **{name: columns[name] for name in _COLUMNS},
+        "components": {
+            name: columns[name] for name in names[_N_MOTION : names.index("elastic_force")]
+        },
+        "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
+        "model_quantities": dict(answer.get(f"{prefix}model_quantities", {})),
+        "motion": new_motion(without_units(snapshots)) if snapshots else None,
+        # Files have no unknown errors.
+        **{
+            name: summary.get(name, math.nan) if name.endswith("_error") else summary[name]
+            for name in IMPACT_QUANTITIES
+        },
     }

@@ -14,6 +14,7 @@ from thud.impact.mesh_files import require_ending, vtu_file
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
@@ -101,11 +102,21 @@ class Motion(Immutable):
         return field
 
 
-def new_motion(**fields: NDArray[np.float64]) -> Motion:
-    """Return snapshots with the axes in the order of `Motion`."""
+def new_motion(columns: Mapping[str, NDArray[np.float64]]) -> Motion:
+    """Return the snapshots in the columns of ``snapshots.csv``, by their names without units."""
+    size = (-1, int(columns["ring"][-1]), int(columns["line"][-1]))
+    grids = {name: values.reshape(size).swapaxes(1, 2) for name, values in columns.items()}
+
+    def vectors(radial: str, upward: str) -> NDArray[np.float64]:
+        return np.stack((grids[radial], grids[upward]), axis=-1)
+
     return Motion(
-        **{
-            name: values if name == "start" else np.moveaxis(values, -1, 0)
-            for name, values in fields.items()
-        }
+        grids["time"][:, 0, 0],
+        vectors("start_radius", "start_height")[0],
+        vectors("radius", "height"),
+        vectors("radial_velocity", "upward_velocity"),
+        grids["contact_pressure"][..., -1],
+        grids["contact_shear"][..., -1],
+        grids["cavity_pressure"][:, 0, 0],
+        grids["floor_displacement"][:, 0, 0],
     )

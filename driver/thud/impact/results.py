@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,33 +10,26 @@ from typing import TYPE_CHECKING, Any
 import f90nml.scanner
 import numpy as np
 
-from thud.base._schema import IMPACT_QUANTITIES
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.case.case import Case
-from thud.impact.floor_impact import FloorImpact
-from thud.impact.impact import Impact
-from thud.impact.motion import Motion
+from thud.impact.compute import new_impact
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
+
+    from thud.impact.impact import Impact
 
 # The scanner of f90nml prints its tables on the screen before it raises an error.
 f90nml.scanner.print = lambda *_: None
 
 # Endings of the files that are read.
 _ENDINGS = (".nml", ".csv")
-# Columns of ``force.csv`` for fields of `Impact`; columns of components follow the first three.
-_COLUMNS = {
-    "time": "time_s",
-    "deflection": "deflection_m",
-    "velocity": "velocity_m_per_s",
-    "elastic_force": "elastic_force_N",
-    "floor_force": "floor_force_N",
-}
-_N_MOTION_COLUMN = 3
+# Tables of a drop; those on a mobile floor have a prefix.
+_TABLES = [
+    f"{prefix}{name}" for prefix in ("", "floor_")
+    for name in ("force", "model_histories", "snapshots")
+]  # fmt: skip
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -96,60 +88,18 @@ class _Files(dict[str, str]):
 
 
 def _new_impact(files: _Files) -> Impact:
-    """Return the impact of a result directory."""
-    case = Case.from_text(files["effective.nml"])
-    numbers = f90nml.reads(files["summary.nml"])
-    history, _ = _read_history(files, "", numbers["summary"], numbers.get("model_quantities", {}))
-    messages = _texts(numbers.get("warnings", {}).get("warning", []))
-    on_floor = None
-    if "floor_summary" in numbers:
-        scalars, others = numbers["floor_summary"], numbers.get("floor_model_quantities", {})
-        floor_history, columns = _read_history(files, "floor_", scalars, others)
-        on_floor = FloorImpact(
-            case=case,
-            warnings=(),
-            blocked_force=columns.pop("blocked_force_N"),
-            floor_displacement=columns.pop("floor_displacement_m"),
-            floor_velocity=columns.pop("floor_velocity_m_per_s"),
-            floor_work=scalars["floor_work"],
-            point_velocity=np.array([*columns.values()]).reshape(-1, len(floor_history["time"])),
-            **floor_history,
-        )
-    return Impact(case=case, warnings=messages, on_floor=on_floor, **history)
-
-
-def _read_history(
-    files: _Files, prefix: str, scalars: Mapping[str, float], model_quantities: Mapping[str, float]
-) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
-    """Return fields of `Impact` from the files with a prefix, and the columns of a floor."""
-    force = _table(files[f"{prefix}force.csv"])
-    file_name = f"{prefix}model_histories.csv"
-    histories = _table(files[file_name]) if file_name in files else {}
-    # Columns: motion, components of the force, total forces, motion of the floor.
-    columns = list(force)
-    last = columns.index("floor_force_N")
-    history = {
-        **{name: force[column] for name, column in _COLUMNS.items()},
-        "components": {
-            name[: -len("_N")]: force[name] for name in columns[_N_MOTION_COLUMN : last - 1]
-        },
-        "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
-        "model_quantities": dict(model_quantities),
-        "motion": _read_motion(files, prefix) if f"{prefix}snapshots.csv" in files else None,
-        **{name: scalars[name] for name in IMPACT_QUANTITIES if not name.endswith("_error")},
-        # The file has no unknown errors.
-        **{
-            name: scalars.get(name, math.nan)
-            for name in IMPACT_QUANTITIES
-            if name.endswith("_error")
-        },
-    }
-    return history, {name: force[name] for name in columns[last + 1 :]}
-
-
-def _texts(value: str | list[str]) -> tuple[str, ...]:
-    """Return the texts of a key; f90nml returns a single text as a string, not as a list."""
-    return (value,) if isinstance(value, str) else tuple(value)
+    """Return the impact of a result directory, whose files are the groups of the library."""
+    answer: dict[str, Any] = dict(f90nml.reads(files["summary.nml"]))
+    if "warnings" in answer:
+        # f90nml returns a single text as a string, not as a list.
+        messages = answer["warnings"]["warning"]
+        messages = messages if isinstance(messages, list) else [messages]
+        answer["warnings"] = {"warning": "\n".join(messages).encode()}
+    required = ("force", "floor_force") if "floor_summary" in answer else ("force",)
+    for name in _TABLES:
+        if name in required or f"{name}.csv" in files:
+            answer[name] = _table(files[f"{name}.csv"])
+    return new_impact(Case.from_text(files["effective.nml"]), answer)
 
 
 def _table(text: str) -> dict[str, NDArray[np.float64]]:
@@ -160,24 +110,3 @@ def _table(text: str) -> dict[str, NDArray[np.float64]]:
         message = "a value is not finite"
         raise ValueError(message)
     return dict(zip(names.split(","), columns, strict=True))
-
-
-def _read_motion(files: _Files, prefix: str) -> Motion:
-    """Return the snapshots of ``snapshots.csv``."""
-    columns = _table(files[f"{prefix}snapshots.csv"])
-    size = (-1, int(columns["ring"][-1]), int(columns["line"][-1]))
-    grids = {name: values.reshape(size).swapaxes(1, 2) for name, values in columns.items()}
-
-    def vectors(radial: str, upward: str) -> NDArray[np.float64]:
-        return np.stack((grids[radial], grids[upward]), axis=-1)
-
-    return Motion(
-        grids["time_s"][:, 0, 0],
-        vectors("start_radius_m", "start_height_m")[0],
-        vectors("radius_m", "height_m"),
-        vectors("radial_velocity_m_per_s", "upward_velocity_m_per_s"),
-        grids["contact_pressure_Pa"][..., -1],
-        grids["contact_shear_Pa"][..., -1],
-        grids["cavity_pressure_Pa"][:, 0, 0],
-        grids["floor_displacement_m"][:, 0, 0],
-    )

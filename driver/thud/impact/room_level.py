@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import RATINGS
-from thud.base.bridge import text
+from thud.base.bridge import text, texts, without_units
 from thud.base.errors import NumericalError
 from thud.base.immutable import Immutable
 from thud.level.rating import PredictedRating
@@ -100,30 +100,35 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
     """Return the level from a bundle of the library; None without one."""
     if "room" not in answer:
         return None
-    bands, room = answer["room_bands"], answer["room"]
+    bands, room = without_units(answer["room_levels"]), answer["room"]
+    frequency = bands.pop("nominal")
+    shares = [bands.pop(name) for name in list(bands) if name.endswith("_share")]
     if not (is_known := np.isfinite(bands["level"])).all():
-        frequencies = ", ".join(f"{f:g}" for f in bands["frequency"][~is_known])
+        frequencies = ", ".join(f"{f:g}" for f in frequency[~is_known])
         message = (
             f"&room: the level in the room is not finite at {frequencies} Hz: a value of the "
             "floor or the room is too extreme to be computed"
         )
         raise NumericalError(message)
-    contributions = dict(sorted(answer["room_contributions"].items(), key=lambda entry: -entry[1]))
-    length, width, height = answer["room_size"]["sides"].tolist()
+    summary = answer["room_summary"]
+    names = text(summary["contribution"]).split("\n")
+    contributions = dict(
+        sorted(zip(names, summary["contributed"].tolist()), key=lambda entry: -entry[1])
+    )
+    length, width, height = room["sides"].tolist()
     return RoomLevel(
+        frequency=frequency,
         **bands,
-        octave_level=answer["room_octaves"]["level"],
-        path_shares=answer["room_paths"]["share"],
+        octave_level=answer["room_octaves"]["level_dB"],
+        path_shares=np.stack(shares, axis=-1),
         mass_per_area=room["surface_mass"],
         volume=room["volume"],
         size=(length, width, height),
         n_modal=int(room["n_modal"]),
         crossover=room["crossover"],
         ratings={
-            name: PredictedRating(
-                name, answer["room_ratings"][name], room["uncertainty"], contributions
-            )
-            for name in RATINGS
+            name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
+            for name, level in zip(RATINGS, summary["level"])
         },
-        floor_warnings=tuple(map(text, answer.get("room_warnings", {}).values())),
+        floor_warnings=texts(answer.get("room_warnings", {})),
     )

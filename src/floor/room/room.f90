@@ -15,8 +15,8 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: add_ratings, band_record_type, box_type, check_below, check_below_subceiling, check_room, finished_room
-   public :: get_area, get_band_records, get_completed_room, get_rating_index, get_reverberation_times, get_room_fields
+   public :: add_ratings, box_type, check_below, check_below_subceiling, check_room, finished_room
+   public :: get_area, get_completed_room, get_rating_index, get_reverberation_times, get_room_fields
    public :: modal_radiation, new_box, of_thirds, place, positions_of_rating, room_level_type, room_type
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
@@ -157,15 +157,6 @@ module thud_room
       !> Probability that the requirement of the room is met.
       real(wp) :: probability = 0.0_wp
    end type room_level_type
-
-   !> A quantity of a prediction in its bands.
-   type :: band_record_type
-      character(len=name_length) :: name
-      !> Unit, empty for ratios.
-      character(len=8) :: unit
-      !> Values: [n_band].
-      real(wp), allocatable :: values(:)
-   end type band_record_type
 
 contains
 
@@ -393,23 +384,6 @@ contains
 
       total = 10*log10(sum(10**(level/10)))
    end function get_sum
-
-   !> The quantities of a prediction in its bands, for all that writes them.
-   pure function get_band_records(prediction) result(records)
-      type(room_level_type), intent(in) :: prediction
-      type(band_record_type), allocatable :: records(:)
-
-      records = [ &
-         band_record_type('level', 'dB', prediction%level), &
-         band_record_type('uncertainty', 'dB', prediction%uncertainty), &
-         band_record_type('simple_level', 'dB', prediction%edge_level(:, 1)), &
-         band_record_type('clamped_level', 'dB', prediction%edge_level(:, 2)), &
-         band_record_type('energy', 'J', prediction%energy), &
-         band_record_type('conductance', 's/kg', prediction%conductance), &
-         band_record_type('radiation_factor', '', prediction%radiation_factor), &
-         band_record_type('loss_factor', '', prediction%loss_factor), &
-         band_record_type('reverberation_time', 's', prediction%reverberation_time)]
-   end function get_band_records
 
    !> Index of the rating that is asked for.
    pure function get_rating_index(room) result(number)

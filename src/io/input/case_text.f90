@@ -5,7 +5,7 @@ module thud_case_text
       is_used, new_case, set_floor_air, set_standard_modulus
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
-   use thud_namelist_text, only: group_type, parse_groups
+   use thud_namelist_text, only: assignment_type, parse_namelist
    use thud_registry, only: floor_names
    use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, newline, quoted, shortened, to_text
@@ -37,36 +37,35 @@ contains
       !> Allow a room without a floor (default: false).
       logical, intent(in), optional :: room_alone
       logical :: needs_floor
-      type(group_type), allocatable :: groups(:)
+      type(assignment_type), allocatable :: given(:)
       type(field_type), allocatable :: fields(:)
       logical, allocatable :: stated(:)
-      integer :: i, j
+      integer :: i
 
       call new_case(case)
       if (len(default_name) <= name_length) case%name = default_name
-      call parse_groups(text, groups, error)
+      call parse_namelist(text, given, error)
+      if (size(given) == 0 .and. .not. allocated(error)) error = input_error('there is no namelist group; allowed: files ' &
+         //'with groups such as '//join_quoted(main_groups))
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
       allocate (stated(size(fields)), source=.false.)
-      case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
-      case%has_floor = any([(groups(i)%name == 'floor', i=1, size(groups))])
-      case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
-      case%has_compression = any([(groups(i)%name == 'compression', i=1, size(groups))])
-      case%has_unknowns = any([(groups(i)%name == 'unknowns', i=1, size(groups))])
-      case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
-      call check_groups(groups, fields, error)
+      case%has_modes = any(given%group == 'modes')
+      case%has_floor = any(given%group == 'floor')
+      case%has_room = any(given%group == 'room')
+      case%has_compression = any(given%group == 'compression')
+      case%has_unknowns = any(given%group == 'unknowns')
+      case%has_impact = any(given%group == 'model') .or. .not. case%has_modes
+      do i = 1, merge(size(main_groups), 1, case%has_impact)
+         if (all(given%group /= main_groups(i))) case%left_out = trim(case%left_out)//' &'//main_groups(i)
+      end do
+      do i = 1, size(given)
+         if (.not. allocated(error)) call assign(given, i, fields, stated, error)
+      end do
       needs_floor = case%has_room
       if (present(room_alone)) needs_floor = needs_floor .and. .not. room_alone
       if (needs_floor .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &
          '&room is given without &floor; allowed: both, for the level in the room below')
-      do i = 1, merge(size(main_groups), 1, case%has_impact)
-         if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
-         case%left_out = trim(case%left_out)//' &'//main_groups(i)
-      end do
-      do i = 1, size(groups)
-         if (allocated(error)) return
-         call assign_group(groups(i), fields, stated, error)
-      end do
       if (present(directory) .and. .not. allocated(error)) call resolve_paths(fields, directory, error)
       if (allocated(error)) return
       case%unstated = pack(get_full_key(fields), fields%is_calibrated .and. .not. stated)
@@ -75,7 +74,7 @@ contains
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
-      if (.not. allocated(error)) call check_use(groups, case, error)
+      if (.not. allocated(error)) call check_use(given, case, error)
       if (present(unchecked)) then
          if (unchecked) return
       end if
@@ -106,9 +105,9 @@ contains
    end subroutine resolve_paths
 
    !> Returns an error if the case does not use a group.
-   subroutine check_use(groups, case, error)
-      !> Groups of the file: [n_group].
-      type(group_type), intent(in) :: groups(:)
+   subroutine check_use(given, case, error)
+      !> Assignments of the file: [n_assignment].
+      type(assignment_type), intent(in) :: given(:)
       type(case_type), intent(in), target :: case
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
@@ -117,85 +116,63 @@ contains
 
       allocate (fields, source=get_fields(case))
       fields = pack(fields, is_used(case, fields))
-      do i = 1, size(groups)
-         if (any(fields%group == groups(i)%name)) cycle
+      do i = 1, size(given)
+         if (any(fields%group == given(i)%group)) cycle
          where = 'with &modes alone'
          if (case%has_impact) where = 'with &model: name = '//quoted(case%model)
-         if (case%has_impact .and. any(floor_names == groups(i)%name)) then
+         if (case%has_impact .and. any(floor_names == given(i)%group)) then
             where = 'without &floor'
             if (case%has_floor) where = 'with &floor: name = '//quoted(case%floor)
          end if
-         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing '//where &
+         error = input_error('&'//trim(given(i)%group)//' in line '//to_text(given(i)%line)//' does nothing '//where &
             //'; allowed: '//join_quoted(distinct(fields%group)))
          return
       end do
    end subroutine check_use
 
-   !> Returns an error if a group is unknown or given twice, or if there is none.
-   subroutine check_groups(groups, fields, error)
-      !> Groups of the file: [n_group].
-      type(group_type), intent(in) :: groups(:)
+   !> Sets the variable of an assignment.
+   subroutine assign(given, i, fields, stated, error)
+      !> Assignments of the file: [n_assignment].
+      type(assignment_type), intent(in) :: given(:)
+      !> Index of the assignment.
+      integer, intent(in) :: i
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: suggestion
-      integer :: i, j
-
-      if (size(groups) == 0) error = input_error('there is no namelist group; allowed: files with groups such as ' &
-         //join_quoted(main_groups))
-      do i = 1, size(groups)
-         if (.not. any(fields%group == groups(i)%name)) then
-            call get_suggestion(groups(i)%name, fields%group, suggestion)
-            error = input_error('&'//shortened(groups(i)%name)//' in line '//to_text(groups(i)%line) &
-               //' is not a known group'//suggestion//'; allowed: '//join_quoted(distinct(fields%group)))
-            return
-         end if
-         do j = 1, i - 1
-            if (groups(j)%name /= groups(i)%name) cycle
-            error = input_error('&'//groups(i)%name//' is given twice, in line '//to_text(groups(j)%line) &
-               //' and in line '//to_text(groups(i)%line)//'; allowed: once')
-            return
-         end do
-      end do
-   end subroutine check_groups
-
-   !> Sets the variables of one group.
-   subroutine assign_group(group, fields, stated, error)
-      type(group_type), intent(in) :: group
-      !> Known keys: [n_field].
-      type(field_type), intent(in) :: fields(:)
-      !> Set for the keys of the group: [n_field].
+      !> Set for the key: [n_field].
       logical, intent(inout) :: stated(:)
-      !> Set if a key is unknown or given twice, or its value has the wrong type.
+      !> Set if group or key is unknown or given twice, or the value has the wrong type.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: allowed, suggestion
-      logical :: is_meant(size(fields))
-      integer :: i, j
+      character(len=:), allocatable :: allowed, suggestion, label
+      integer :: earlier, field
 
-      do i = 1, size(group%assignments)
-         associate (assignment => group%assignments(i))
-            is_meant = fields%group == group%name .and. fields%key == assignment%key
-            stated = stated .or. is_meant
-            if (.not. any(is_meant)) then
-               call get_suggestion(assignment%key, pack(fields%key, fields%group == group%name), suggestion)
-               allowed = join_quoted(distinct(pack(fields%key, fields%group == group%name)))
-               if (len(allowed) > longest_list) allowed = 'the keys that thud --keys lists'
-               error = input_error('&'//group%name//': '//shortened(assignment%key)//' in line '//to_text(assignment%line) &
-                  //' is not a known key'//suggestion//'; allowed: '//allowed)
-            else if (any([(group%assignments(j)%key == assignment%key, j=1, i - 1)])) then
-               error = input_error('&'//group%name//': '//assignment%key//' is given a second time in line ' &
-                  //to_text(assignment%line)//'; allowed: once')
-            else if (assignment%value == '') then
-               call fields(findloc(is_meant, .true., dim=1))%get_allowed(allowed)
-               error = input_error('&'//group%name//': '//assignment%key//' in line '//to_text(assignment%line) &
-                  //' has no value; allowed: '//allowed)
-            else
-               call fields(findloc(is_meant, .true., dim=1))%set_from_text(assignment%value, error)
-            end if
-         end associate
-         if (allocated(error)) return
-      end do
-   end subroutine assign_group
+      associate (group => given(i)%group, key => given(i)%key, keys => pack(fields%key, fields%group == given(i)%group))
+         earlier = findloc(given(:i - 1)%group == group .and. given(:i - 1)%key == key, .true., dim=1)
+         field = findloc(fields%group == group .and. fields%key == key, .true., dim=1)
+         label = '&'//shortened(trim(group))//': '//shortened(trim(key))//' in line '//to_text(given(i)%line)
+         if (key == '') label = '&'//shortened(trim(group))//' in line '//to_text(given(i)%line)
+         if (size(keys) == 0) then
+            call get_suggestion(trim(group), fields%group, suggestion)
+            error = input_error(label//' is not a known group'//suggestion//'; allowed: ' &
+               //join_quoted(distinct(fields%group)))
+         else if (earlier > 0) then
+            error = input_error(label//' is given a second time, after line '//to_text(given(earlier)%line) &
+               //'; allowed: once')
+         else if (key == '') then
+            return
+         else if (field == 0) then
+            call get_suggestion(trim(key), keys, suggestion)
+            allowed = join_quoted(distinct(keys))
+            if (len(allowed) > longest_list) allowed = 'the keys that thud --keys lists'
+            error = input_error(label//' is not a known key'//suggestion//'; allowed: '//allowed)
+         else if (given(i)%value == '') then
+            call fields(field)%get_allowed(allowed)
+            error = input_error(label//' has no value; allowed: '//allowed)
+         else
+            stated = stated .or. fields%group == group .and. fields%key == key
+            call fields(field)%set_from_text(given(i)%value, error)
+         end if
+      end associate
+   end subroutine assign
 
    !> Texts without repetition, in their order.
    pure function distinct(texts) result(once)

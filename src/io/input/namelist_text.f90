@@ -1,32 +1,23 @@
-!> Splits the text of an input file into namelist groups and assignments. Fortran's namelist `read` reads the values later;
-!> alone it could not distinguish a missing group from an unterminated one, nor name the key of a bad value.
+!> Splits the text of an input file into the assignments of its namelist groups. Fortran's namelist `read` reads the values
+!> later; alone it could not distinguish a missing group from an unterminated one, nor name the key of a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
+   use thud_field, only: name_length
    use thud_text, only: lower_case, newline, replaced, shortened, tab, to_text
    implicit none (type, external)
    private
 
-   public :: group_type, parse_groups
+   public :: assignment_type, parse_namelist
 
-   !> One `key = value`.
+   !> One `key = value`, or the beginning of a group.
    type :: assignment_type
-      !> Key in lower case.
-      character(len=:), allocatable :: key
+      !> Group and key in lower case; the key is empty at the beginning of the group.
+      character(len=name_length) :: group = '', key = ''
       !> Text of the value as written, without comments.
       character(len=:), allocatable :: value
-      !> Line of the key.
+      !> Line of the key or of the `&`.
       integer :: line = 0
    end type assignment_type
-
-   !> One namelist group.
-   type :: group_type
-      !> Name in lower case.
-      character(len=:), allocatable :: name
-      !> Line of the `&`.
-      integer :: line = 0
-      !> Assignments, in order: [n_assignment].
-      type(assignment_type), allocatable :: assignments(:)
-   end type group_type
 
    !> Characters allowed in names.
    character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
@@ -36,29 +27,27 @@ module thud_namelist_text
 
 contains
 
-   !> All groups of a text, in order.
-   subroutine parse_groups(text, groups, error)
+   !> All groups of a text and their assignments, in order.
+   subroutine parse_namelist(text, assignments, error)
       !> Text of the input file.
       character(len=*), intent(in) :: text
-      !> The groups: [n_group].
-      type(group_type), allocatable, intent(out) :: groups(:)
+      !> Each group, followed by its assignments: [n_assignment].
+      type(assignment_type), allocatable, intent(out) :: assignments(:)
       !> Set if the text does not consist of terminated groups.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: clean, structure
-      type(group_type) :: group
       integer :: start, gap
 
-      allocate (groups(0))
+      allocate (assignments(0))
       call separate(text, clean, structure, error)
       start = 1
       do while (.not. allocated(error))
          gap = verify(structure(start:), blanks)
          if (gap == 0) return
          start = start + gap - 1
-         call read_group(clean, structure, start, group, error)
-         if (.not. allocated(error)) groups = [groups, group]
+         call read_group(clean, structure, start, assignments, error)
       end do
-   end subroutine parse_groups
+   end subroutine parse_namelist
 
    !> Replaces comments by blanks, and in a second copy also quoted text by `x`.
    subroutine separate(text, clean, structure, error)
@@ -107,58 +96,58 @@ contains
    end subroutine separate
 
    !> Reads one group.
-   subroutine read_group(clean, structure, start, group, error)
+   subroutine read_group(clean, structure, start, assignments, error)
       !> Text without comments; the same without quoted text.
       character(len=*), intent(in) :: clean, structure
       !> Position of the first character of the group; afterwards that behind its end.
       integer, intent(inout) :: start
-      type(group_type), intent(out) :: group
+      !> Groups and assignments so far: [n_assignment].
+      type(assignment_type), allocatable, intent(inout) :: assignments(:)
       !> Set if no group starts here, it has no end, or a part of it is not `key = value`.
       type(error_type), allocatable, intent(out) :: error
-      type(assignment_type) :: assignment
+      type(assignment_type) :: new
+      character(len=:), allocatable :: label
       logical :: closed
-      integer :: begin, finish, equals, first, last, next_first
+      integer :: begin, finish, equals, first, last
 
-      group%line = line_of(structure, start)
+      new%line = line_of(structure, start)
       begin = start + verify(structure(start + 1:)//' ', name_characters)
       if (structure(start:start) /= '&' .or. begin == start + 1) then
-         error = input_error('line '//to_text(group%line)//' stands outside a group; ' &
+         error = input_error('line '//to_text(new%line)//' stands outside a group; ' &
             //"allowed: groups '&name key = value /' and comments after '!'")
          return
       end if
-      group%name = structure(start + 1:begin - 1)
-      allocate (group%assignments(0))
+      new%group = structure(start + 1:begin - 1)
+      new%value = ''
+      assignments = [assignments, new]
+      label = '&'//shortened(trim(new%group))
       ! The group ends with `/` or `&end`.
       finish = begin - 1 + scan(structure(begin:), '/&')
       closed = finish >= begin
       if (closed) closed = structure(finish:finish) == '/' .or. index(structure(finish:)//' ', '&end') == 1
       if (.not. closed) then
-         error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line) &
-            //" is not terminated; allowed: a '/' at the end of the group")
+         error = input_error(label//' in line '//to_text(new%line)//" is not terminated; allowed: a '/' at the end of the " &
+            //'group')
          return
       end if
       start = finish + merge(1, len('&end'), structure(finish:finish) == '/')
-      finish = finish - 1
-      call find_key(structure(:finish), begin, first, last, equals)
-      if (verify(structure(begin:min(first - 1, finish)), blanks//',') > 0) then
-         call get_value(clean(begin:finish), assignment%value)
-         error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line)//": '" &
-            //shortened(assignment%value)//"' is not an assignment; allowed: 'key = value'")
-         return
-      end if
-      do while (first <= finish)
-         assignment%line = line_of(structure, first)
-         if (last < first) then
-            error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(assignment%line) &
-               //" has no key; allowed: 'key = value'")
-            return
+      do
+         call find_key(structure(:finish - 1), begin, first, last, equals)
+         call get_value(clean(begin:first - 1), new%value)
+         if (new%key /= '') then
+            assignments = [assignments, new]
+         else if (new%value /= '') then
+            call get_value(clean(begin:finish - 1), new%value)
+            error = input_error(label//' in line '//to_text(new%line)//": '"//shortened(new%value) &
+               //"' is not an assignment; allowed: 'key = value'")
          end if
-         assignment%key = structure(first:last)
+         if (allocated(error) .or. first >= finish) return
+         new%line = line_of(structure, first)
+         if (last < first) error = input_error(label//': an equals sign in line '//to_text(new%line) &
+            //" has no key; allowed: 'key = value'")
+         if (allocated(error)) return
+         new%key = structure(first:last)
          begin = equals + 1
-         call find_key(structure(:finish), begin, next_first, last, equals)
-         call get_value(clean(begin:min(next_first - 1, finish)), assignment%value)
-         group%assignments = [group%assignments, assignment]
-         first = next_first
       end do
    end subroutine read_group
 

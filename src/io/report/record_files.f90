@@ -1,0 +1,165 @@
+!> Records as text: a group of them as a table of comma-separated values, or as a namelist group.
+module thud_record_files
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
+   use thud_bundle, only: bundle_type, record_type
+   use thud_kinds, only: wp
+   use thud_text, only: join, join_quoted, newline, to_text
+   use thud_text_buffer, only: text_buffer_type
+   implicit none (type, external)
+   private
+
+   public :: get_history_csv, get_namelist, get_table_csv
+
+   !> Maximum length of a text in a list, such as a warning.
+   integer, parameter :: cell_length = 256
+
+   !> Width of a number with all digits and its comma.
+   integer, parameter :: width = 25
+
+   !> Format of a row of numbers with all digits.
+   character(len=*), parameter :: row_form = '(*(es24.16e3,:,","))'
+
+contains
+
+   !> A group of histories, the first column their times, with all digits.
+   subroutine get_history_csv(bundle, group, text)
+      type(bundle_type), intent(in) :: bundle
+      character(len=*), intent(in) :: group
+      !> The table with a header; empty if the results have no such group.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: cells, row
+      real(wp), allocatable :: columns(:, :)
+      integer, allocatable :: found(:)
+      logical :: at_rest
+      integer :: i, at
+
+      call find_group(bundle, group, found, text)
+      if (text == '') return
+      at = len(text)
+      allocate (columns(size(bundle%records(found(1))%values), size(found)))
+      do i = 1, size(found)
+         columns(:, i) = bundle%records(found(i))%values(:, 1, 1)
+      end do
+      allocate (character(len=width*(size(found) - 1)) :: cells)
+      allocate (character(len=width*size(found)) :: row)
+      text = text//repeat(' ', size(columns, 1)*len(row))
+      at_rest = .false.
+      do i = 1, size(columns, 1)
+         ! Formatting takes most of a run's time; the zeros after the release are formatted once.
+         if (.not. at_rest .or. any(abs(columns(i, 2:)) > 0.0_wp)) write (cells, row_form) columns(i, 2:)
+         at_rest = .not. any(abs(columns(i, 2:)) > 0.0_wp)
+         write (row, row_form) columns(i, 1)
+         row(width:) = ','//cells
+         row(len(row):) = newline
+         text(at + 1:at + len(row)) = row
+         at = at + len(row)
+      end do
+   end subroutine get_history_csv
+
+   !> A group as a table with as many digits as its numbers need; the cells of unknown numbers are empty.
+   subroutine get_table_csv(bundle, group, text)
+      type(bundle_type), intent(in) :: bundle
+      character(len=*), intent(in) :: group
+      !> The table with a header; empty if the results have no such group.
+      character(len=:), allocatable, intent(out) :: text
+      type(text_buffer_type) :: buffer
+      character(len=cell_length), allocatable :: column(:), cells(:, :)
+      integer, allocatable :: found(:)
+      integer :: i, j
+
+      call find_group(bundle, group, found, text)
+      if (text == '') return
+      call buffer%append(text)
+      do j = 1, size(found)
+         call get_cells(bundle%records(found(j)), column)
+         if (j == 1) allocate (cells(size(column), size(found)))
+         cells(:, j) = column
+      end do
+      do i = 1, size(cells, 1)
+         do j = 1, size(found)
+            call buffer%append(trim(cells(i, j))//merge(newline, ',', j == size(found)))
+         end do
+      end do
+      text = buffer%get_text()
+   end subroutine get_table_csv
+
+   !> A group as a namelist group behind an empty line, without unknown numbers.
+   subroutine get_namelist(bundle, group, text)
+      type(bundle_type), intent(in) :: bundle
+      character(len=*), intent(in) :: group
+      !> The group; empty if the results have no such group.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=cell_length), allocatable :: cells(:)
+      integer, allocatable :: found(:)
+      integer :: i
+
+      call find_group(bundle, group, found, text)
+      if (text /= '') text = newline//'&'//trim(group)//newline
+      do i = 1, size(found)
+         associate (record => bundle%records(found(i)))
+            call get_cells(record, cells)
+            if (record%kind == 'text') then
+               text = text//'   '//trim(record%name)//' = '//join_quoted(cells)
+            else if (all(cells == '')) then
+               cycle
+            else
+               text = text//'   '//trim(record%name)//' = '//join(cells)
+            end if
+            if (record%unit /= '') text = text//' ! '//trim(record%unit)
+         end associate
+         text = text//newline
+      end do
+      if (text /= '') text = text//'/'//newline
+   end subroutine get_namelist
+
+   !> Indices of the records of a group, and their names as the header of a table.
+   pure subroutine find_group(bundle, group, found, header)
+      type(bundle_type), intent(in) :: bundle
+      character(len=*), intent(in) :: group
+      !> The indices: [n].
+      integer, allocatable, intent(out) :: found(:)
+      !> The names with commas between them; empty if the results have no such group.
+      character(len=:), allocatable, intent(out) :: header
+      integer :: i
+
+      header = ''
+      allocate (found(0))
+      do i = 1, bundle%n_record
+         if (bundle%records(i)%group /= group) cycle
+         found = [found, i]
+         header = header//trim(merge(',', ' ', size(found) > 1))//trim(bundle%records(i)%name)
+      end do
+      if (header /= '') header = header//newline
+   end subroutine find_group
+
+   !> The numbers or the lines of a record, each as text.
+   subroutine get_cells(record, cells)
+      type(record_type), intent(in) :: record
+      !> The cells, empty for NaN: [n].
+      character(len=cell_length), allocatable, intent(out) :: cells(:)
+      integer :: i, at, length
+
+      allocate (cells(size(record%values)))
+      do i = 1, size(cells)
+         associate (value => record%values(i, 1, 1))
+            select case (record%kind)
+            case ('whole')
+               cells(i) = to_text(nint(value))
+            case ('flag')
+               cells(i) = merge('.true. ', '.false.', value > 0.0_wp)
+            case default
+               cells(i) = to_text(value)
+               if (ieee_is_nan(value)) cells(i) = ''
+            end select
+         end associate
+      end do
+      if (record%kind /= 'text') return
+      at = 1
+      do while (at <= len(record%text) + 1)
+         length = index(record%text(at:)//newline, newline) - 1
+         cells = [cells, [character(len=cell_length) :: record%text(at:at + length - 1)]]
+         at = at + length + 1
+      end do
+   end subroutine get_cells
+
+end module thud_record_files

@@ -1,0 +1,422 @@
+!> Results as tables on the screen.
+module thud_screen_tables
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_case, only: case_type, get_model_number, get_unstated_fields
+   use thud_compression, only: compression_type
+   use thud_compute, only: get_assessed_force, impact_type, results_type
+   use thud_constants, only: version
+   use thud_error, only: error_type
+   use thud_field, only: field_type
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_force_history, only: force_count, force_history_type, force_names
+   use thud_free_modes, only: free_modes_type
+   use thud_kinds, only: wp
+   use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
+      sample_quantity_count, show
+   use thud_records, only: get_verdict_word
+   use thud_refined_drop, only: finer_prefix, finer_quantities
+   use thud_room_table, only: get_room_table
+   use thud_source_limits, only: combine_verdicts, criterion_count, criterion_type, get_verdict, verdict_conforms, &
+      verdict_names, verdict_undecided
+   use thud_text, only: fixed, flush_right, newline, padded, replaced, screen_width, significant, to_text
+   implicit none (type, external)
+   private
+
+   public :: get_defaults_lines, get_force_title, get_impact_table, get_screen_tables, get_verification_rows
+
+   !> Numerical error of a level above which it is shown, dB.
+   real(wp), parameter :: shown_error = 0.1_wp
+
+   !> Width of the names of rows.
+   integer, parameter :: name_width = 22
+
+contains
+
+   !> All tables of a case.
+   subroutine get_screen_tables(case, results, verbose, text)
+      type(case_type), intent(in) :: case
+      type(results_type), intent(in) :: results
+      !> Also show the quantities of the model.
+      logical, intent(in) :: verbose
+      character(len=:), allocatable, intent(out) :: text
+
+      text = 'thud '//version//'   case '//trim(case%name)
+      if (case%has_impact) text = text//'   model '//trim(case%model)
+      text = text//newline
+      if (case%has_modes) text = text//newline//get_modes_table(results%modes)
+      if (case%has_impact) text = text//newline//get_impact_table(case, results%impact, verbose)
+      if (allocated(results%on_floor)) text = text//newline//get_floor_table(case, results)
+      if (allocated(results%room%bands)) text = text//newline//get_room_table(case, results%room, &
+         results%impact%history%contact_time, allocated(results%on_floor))
+      text = text//get_defaults_lines(case)
+      if (case%has_compression) text = text//newline//get_compression_table(results%compression)
+   end subroutine get_screen_tables
+
+   !> Levels of the assessed force and quantities of the drop on a rigid floor, with limits and verdicts.
+   function get_impact_table(case, impact, verbose) result(text)
+      type(case_type), intent(in) :: case
+      type(impact_type), intent(in) :: impact
+      !> Also show the quantities of the model.
+      logical, intent(in) :: verbose
+      character(len=:), allocatable :: text
+      real(wp) :: values(history_quantity_count)
+      character(len=:), allocatable :: verdict
+      integer :: verdicts(criterion_count)
+      integer :: i, assessed, other
+
+      assessed = get_assessed_force(case)
+      other = force_count + 1 - assessed
+      associate (history => impact%history, criteria => impact%assessment%criteria(:, assessed), &
+         bands => impact%assessment%bands, level => impact%assessment%level)
+         verdicts = get_verdict(criteria)
+         ! In most models both forces are equal.
+         if (.not. any(abs(level(:, other) - level(:, assessed)) > 0.0_wp)) other = 0
+         text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
+         if (other > 0) text = text//flush_right(trim(merge('floor force  ', 'elastic force', &
+            force_names(other) == 'floor')), screen_width - len(text))
+         text = text//newline
+         do i = 1, octave_count
+            text = text//level_row(i, criteria(i))
+         end do
+         do i = octave_count + 1, size(criteria)
+            text = text//quantity_row(get_quantity(criteria(i)%name), criteria(i)%value, criteria(i))
+         end do
+         text = text//newline
+         do i = octave_count + 1, size(bands)
+            text = text//level_row(i)
+         end do
+         if (size(bands) > octave_count) text = text//newline
+         values = get_quantities(history)
+         do i = 1, sample_quantity_count
+            ! Quantities with limits are listed above.
+            if (any(criteria%name == quantities(i)%name) .or. is_peak_of_other(quantities(i), case)) cycle
+            text = text//quantity_row(quantities(i), values(i))
+         end do
+         if (verbose) text = text//model_quantity_rows(history, '')
+         do i = 1, octave_count
+            associate (error => history%numerical_error%octave(i))
+               if (history%numerical_error%known .and. (error > shown_error .or. verdicts(i) == verdict_undecided)) &
+                  text = text//row('error at '//get_band_name(bands(i))//' Hz', fixed(error, 2), 'dB')
+            end associate
+         end do
+         if (.not. history%numerical_error%known) text = text//row('numerical error', 'unknown', '')
+         verdict = 'the source '//trim(verdict_names(combine_verdicts(verdicts)))
+         if (combine_verdicts(verdicts) == verdict_undecided) verdict = 'it is undecided whether the source conforms'
+         text = text//get_verification_rows(history)//newline//'  With these values '//verdict//' to the limits of the ' &
+            //replaced(trim(case%source), '_', ' ')//': it meets ' &
+            //to_text(count(verdicts == verdict_conforms))//' of '//to_text(size(criteria))//' criteria'
+         if (any(verdicts == verdict_undecided)) text = text//'; '//to_text(count(verdicts == verdict_undecided)) &
+            //' undecided by the numerical error'
+         text = text//'.'//newline//'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
+      end associate
+
+   contains
+
+      !> Row with the level of a band, by both forces if they differ.
+      function level_row(band, criterion) result(line)
+         !> Index of the band.
+         integer, intent(in) :: band
+         !> Limits of the level, if there are any.
+         type(criterion_type), intent(in), optional :: criterion
+         character(len=:), allocatable :: line
+
+         associate (assessment => impact%assessment)
+            line = row(get_level_title(assessment%bands(band)), fixed(assessment%level(band, assessed), 2), 'dB', &
+               criterion, 1.0_wp)
+            if (other == 0) return
+            line = line(:len(line) - 1)
+            line = line//flush_right(fixed(assessment%level(band, other), 2)//' dB', screen_width - len(line))//newline
+         end associate
+      end function level_row
+
+   end function get_impact_table
+
+   !> Name of the level of a band.
+   function get_level_title(band) result(title)
+      type(band_type), intent(in) :: band
+      character(len=name_width) :: title
+
+      title = 'level, '//get_band_name(band)//' Hz '//band%set
+   end function get_level_title
+
+   !> Table that compares the drops on mobile and rigid floor.
+   function get_floor_table(case, results) result(text)
+      type(case_type), intent(in) :: case
+      !> Results with a drop on a mobile floor.
+      type(results_type), intent(in) :: results
+      character(len=:), allocatable :: text
+      character(len=:), allocatable :: deviation
+      real(wp) :: values(history_quantity_count, 2)
+      type(band_type) :: octaves(octave_count)
+      integer :: i
+
+      associate (rigid => results%impact%history, moving => results%on_floor, floor => results%floor, &
+         level => results%impact%assessment%level(results%impact%assessment%first_band:, 2))
+         text = '  '//padded('on '//trim(case%floor), name_width)//'   blocked       contact    difference       energy' &
+            //newline
+         do i = 1, size(floor%bands)
+            text = text//'  '//get_level_title(floor%bands(i))//cell(fixed(level(i), 2), 'dB') &
+               //cell(fixed(floor%contact_level(i), 2), 'dB')//cell(fixed(floor%contact_level(i) - level(i), 2), 'dB') &
+               //with_prefix(floor%energy(i), 'J', 3, 8)//newline
+         end do
+         text = text//newline
+         values = reshape([get_quantities(rigid), get_quantities(moving)], shape(values))
+         do i = 1, sample_quantity_count
+            if (is_peak_of_other(quantities(i), case)) cycle
+            associate (shown => quantities(i)%display_scale*values(i, :))
+               call add_row(quantities(i)%title, show(quantities(i), shown(1)), show(quantities(i), shown(2)), &
+                  quantities(i)%display_unit)
+            end associate
+         end do
+         call add_row('velocity of the floor', '-', significant(1.0e3_wp*maxval(abs(moving%floor_velocity)), 3), 'mm/s')
+         call add_row('its displacement', '-', significant(1.0e3_wp*maxval(abs(moving%floor_displacement)), 3), 'mm')
+         associate (work => get_quantity('floor_work'))
+            call add_row(work%title, '-', show(work, work%display_scale*moving%floor_work), work%display_unit)
+         end associate
+         octaves = get_octaves()
+         do i = 1, octave_count
+            if (moving%numerical_error%octave(i) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', &
+               fixed(rigid%numerical_error%octave(i), 2), fixed(moving%numerical_error%octave(i), 2), 'dB')
+         end do
+         deviation = fixed(1.0e2_wp*(floor%total_energy/max(moving%floor_work, tiny(1.0_wp)) - 1), 2)
+         if (deviation == '0.00') deviation = 'less than 0.01'
+         text = text//get_verification_rows(moving)//newline//'  The energy by the mobility of the floor, in all ' &
+            //'frequencies, differs by '//deviation//' %.'//newline
+      end associate
+
+   contains
+
+      !> Adds a number of both drops.
+      subroutine add_row(title, rigid, moving, unit)
+         character(len=*), intent(in) :: title
+         !> Values on rigid and mobile floor, in the shown unit, as text.
+         character(len=*), intent(in) :: rigid, moving
+         character(len=*), intent(in) :: unit
+
+         text = text//'  '//padded(title, name_width)//merge(cell(rigid, '    '), cell(rigid, unit), rigid == '-') &
+            //trim(cell(moving, unit))//newline
+      end subroutine add_row
+
+      !> A number with its unit in a column.
+      pure function cell(number, unit) result(text)
+         character(len=*), intent(in) :: number, unit
+         character(len=15) :: text
+
+         text = flush_right(number, 10)//' '//unit
+      end function cell
+
+   end function get_floor_table
+
+   !> Whether a quantity is the peak of the force that is not assessed.
+   pure function is_peak_of_other(quantity, case) result(yes)
+      type(quantity_type), intent(in) :: quantity
+      type(case_type), intent(in) :: case
+      logical :: yes
+
+      yes = quantity%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
+   end function is_peak_of_other
+
+   !> Lines that name the main groups missing from the file, and the values of the standard ball for keys that it does not
+   !> state.
+   function get_defaults_lines(case) result(lines)
+      type(case_type), intent(in), target :: case
+      !> The lines; empty if nothing is missing.
+      character(len=:), allocatable :: lines
+      character(len=:), allocatable :: value
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      lines = ''
+      if (case%left_out /= '') lines = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
+      allocate (fields, source=get_unstated_fields(case))
+      ! Without a wall the modulus has no effect.
+      if (.not. case%models(get_model_number(case))%model%get_standard_modulus() > 0.0_wp) fields = fields(:0)
+      if (size(fields) > 0) lines = lines//'  Not stated, so of the standard ball:'
+      do i = 1, size(fields)
+         call fields(i)%get_text(value)
+         lines = lines//' '//trim(fields(i)%key)//' = '//trim(value//' '//fields(i)%unit) &
+            //merge(newline, ',', i == size(fields))
+      end do
+   end function get_defaults_lines
+
+   !> Name of a force in tables for readers.
+   pure function get_force_title(force) result(title)
+      !> One of `force_names`.
+      character(len=*), intent(in) :: force
+      character(len=merge(18, 13, force == 'floor')) :: title
+
+      title = merge('force on the floor', 'elastic force     ', force == 'floor')
+   end function get_force_title
+
+   !> Table of the free modes for the screen.
+   function get_modes_table(modes) result(text)
+      type(free_modes_type), intent(in) :: modes
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = '  free modes     frequency   harmonic   participation'//newline &
+         //'                       Hz                of the pole'//newline
+      do i = 1, size(modes%frequency)
+         text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 2), 19) &
+            //flush_right(to_text(modes%harmonic(i)), 11)//flush_right(fixed(modes%participation(i), 3), 16)//newline
+      end do
+   end function get_modes_table
+
+   !> Table of the quasi-static compression for the screen: last point, secant stiffness there and at the first deflection
+   !> above 0.
+   function get_compression_table(compression) result(text)
+      type(compression_type), intent(in) :: compression
+      character(len=:), allocatable :: text
+
+      associate (deflection => compression%deflection, force => compression%force, n => size(compression%force))
+         text = '  quasi-static compression between plates'//newline &
+            //row('peak deflection', fixed(1.0e3_wp*deflection(n), 2), 'mm') &
+            //row('force there', significant(force(n), 4), 'N') &
+            //row('secant stiffness', significant(force(n)/deflection(n)/1.0e3_wp, 4), 'kN/m') &
+            //row('at the first point', significant(force(2)/deflection(2)/1.0e3_wp, 4), 'kN/m')
+      end associate
+   end function get_compression_table
+
+   !> Row for a quantity, with its limits if there are any.
+   function quantity_row(quantity, value, criterion) result(text)
+      type(quantity_type), intent(in) :: quantity
+      !> Value, in SI units.
+      real(wp), intent(in) :: value
+      !> Limits, in SI units.
+      type(criterion_type), intent(in), optional :: criterion
+      character(len=:), allocatable :: text
+
+      text = row(quantity%title, show(quantity, quantity%display_scale*value), quantity%display_unit, criterion, &
+         quantity%display_scale)
+   end function quantity_row
+
+   !> Row for a number, with its limits if there are any.
+   function row(name, value, unit, criterion, scale) result(text)
+      character(len=*), intent(in) :: name
+      !> Text of the value in the shown unit.
+      character(len=*), intent(in) :: value
+      !> The shown unit.
+      character(len=*), intent(in) :: unit
+      !> Limits, in SI units.
+      type(criterion_type), intent(in), optional :: criterion
+      !> Factor from the SI unit to the shown unit.
+      real(wp), intent(in), optional :: scale
+      character(len=:), allocatable :: text
+
+      text = '  '//padded(name, name_width)//flush_right(value, 10)//' '//padded(unit, 5)
+      if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale) &
+         //get_verdict_word(criterion)
+      text = trim(text)//newline
+   end function row
+
+   !> Minimum and maximum conforming value in the shown unit; a single number if they are equal.
+   pure function get_limits(criterion, scale) result(text)
+      type(criterion_type), intent(in) :: criterion
+      !> Factor from the SI unit to the shown unit.
+      real(wp), intent(in) :: scale
+      character(len=:), allocatable :: text
+
+      text = flush_right(short(criterion%lower*scale), 7)
+      if (criterion%upper > criterion%lower) text = text//' to '//short(criterion%upper*scale)
+      text = padded(text, 18)
+   end function get_limits
+
+   !> Rows with the quantities of the model.
+   function model_quantity_rows(history, prefix) result(rows)
+      type(force_history_type), intent(in) :: history
+      !> `finer_prefix` for the resolution of the drop at a finer one, or empty.
+      character(len=*), intent(in) :: prefix
+      character(len=:), allocatable :: rows
+      integer :: i
+
+      rows = ''
+      do i = 1, size(history%model_quantity_name)
+         associate (name => history%model_quantity_name(i), value => history%model_quantity(i), &
+            unit => history%model_quantity_unit(i))
+            if ((index(name, finer_prefix) == 1 .neqv. prefix /= '') .or. any(finer_quantities == name)) cycle
+            ! On a hard floor there is none.
+            if (name == 'maximum_penetration' .and. .not. value > 0.0_wp) cycle
+            rows = rows//'  '//padded(replaced(trim(name(len(prefix) + 1:)), '_', ' '), name_width)
+            if (unit /= '') then
+               rows = rows//with_prefix(value, trim(unit), 4, 10)//newline
+            else if (abs(value - anint(value)) > 0.0_wp) then
+               rows = rows//flush_right(significant(value, 4), 10)//newline
+            else
+               rows = rows//flush_right(fixed(value, 0), 10)//newline
+            end if
+         end associate
+      end do
+   end function model_quantity_rows
+
+   !> A number with significant digits and the prefix of its unit: ` 90.9 mJ`.
+   pure function with_prefix(value, unit, digits, width) result(text)
+      !> Value in the unit without prefix.
+      real(wp), intent(in) :: value
+      character(len=*), intent(in) :: unit
+      integer, intent(in) :: digits
+      !> Width of the number.
+      integer, intent(in) :: width
+      character(len=:), allocatable :: text
+      character(len=*), parameter :: prefixes(-3:3) = ['n', 'u', 'm', ' ', 'k', 'M', 'G']
+      integer :: power
+
+      power = floor(log10(max(abs(value), tiny(1.0_wp)))/3)
+      if (abs(power) > 3) power = 0
+      text = flush_right(significant(value*10.0_wp**(-3*power), digits), width)//' '//trim(adjustl(prefixes(power)//unit))
+   end function with_prefix
+
+   !> Rows that compare a result with that at a finer resolution and with the stated error; none if it is not verified.
+   function get_verification_rows(history) result(rows)
+      type(force_history_type), intent(in) :: history
+      character(len=:), allocatable :: rows
+      type(band_type) :: octaves(octave_count)
+      type(quantity_type) :: quantity, error_quantity
+      type(error_type), allocatable :: error
+      character(len=:), allocatable :: line
+      real(wp) :: values(history_quantity_count), level(octave_count)
+      real(wp) :: value, change, stated
+      integer :: i, first
+
+      rows = ''
+      first = findloc(history%model_quantity_name, finer_quantities(1), dim=1)
+      if (first == 0) return
+      octaves = get_octaves()
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, octaves, 'exact', level, error)
+      if (allocated(error)) return
+      rows = newline//'  at a finer resolution      value          change    stated error'//newline &
+         //model_quantity_rows(history, finer_prefix)
+      values = get_quantities(history)
+      do i = 1, size(finer_quantities)
+         associate (name => finer_quantities(i) (len(finer_prefix) + 1:), finer => history%model_quantity(first - 1 + i))
+            error_quantity = get_quantity(trim(name)//'_error')
+            if (i <= octave_count) then
+               quantity = error_quantity
+               quantity%title = get_level_title(octaves(i))
+               value = level(i)
+            else
+               quantity = get_quantity(name)
+               value = values(findloc(quantities%name, name, dim=1))
+            end if
+            line = quantity_row(quantity, finer)
+            change = (finer - value)*quantity%display_scale
+            stated = values(findloc(quantities%name, error_quantity%name, dim=1))*quantity%display_scale
+            rows = rows//padded(line(:len(line) - 1), 40)//flush_right(fixed(change, error_quantity%decimals), 8) &
+               //flush_right(fixed(stated, error_quantity%decimals), 16)
+            ! As far as the decimals show it.
+            if (abs(change) > stated + 0.5_wp*10.0_wp**(-error_quantity%decimals)) rows = rows//'  exceeded'
+            rows = rows//newline
+         end associate
+      end do
+   end function get_verification_rows
+
+   !> A limit with up to three decimals, without trailing zeros.
+   pure function short(value) result(text)
+      real(wp), intent(in) :: value
+      character(len=:), allocatable :: text
+
+      text = fixed(value, 3)
+      text = text(:verify(text, '0', back=.true.))
+      if (text(len(text):) == '.') text = text(:len(text) - 1)
+   end function short
+
+end module thud_screen_tables
