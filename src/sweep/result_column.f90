@@ -42,51 +42,43 @@ contains
       type(result_column_type), allocatable :: columns(:)
       integer :: i
 
-      columns = [(get_column(quantities(i)%name, quantities(i)%unit), i=1, sample_quantity_count)]
+      allocate (columns(0))
+      do i = 1, sample_quantity_count
+         columns = [columns, get_columns(quantities(i)%name, quantities(i)%unit)]
+      end do
       do i = 1, force_count
-         columns = [columns, get_level_columns(force_names(i), bands)]
+         columns = [columns, get_columns(force_names(i), 'dB', bands)]
          columns(size(columns) - size(bands) + 1:size(columns) - size(bands) + first_band - 1)%is_wanted = .false.
       end do
       do i = 1, force_count
-         columns = [columns, get_column(trim(force_names(i))//'_conforms', is_flag=.true.)]
+         columns = [columns, get_columns(trim(force_names(i))//'_conforms', '')]
       end do
-      if (case%has_floor) columns = [columns, get_level_columns('contact', bands(first_band:)), &
-         get_column('floor_work', 'J')]
-      if (case%has_floor .and. case%has_room) columns = [columns, get_level_columns('room', get_rated_bands('third')), &
-         get_column('room_rating', 'dB')]
-      columns = [columns, get_column('margin', 'dB'), get_column('conforms', is_flag=.true.)]
+      if (case%has_floor) columns = [columns, get_columns('contact', 'dB', bands(first_band:)), &
+         get_columns('floor_work', 'J')]
+      if (case%has_floor .and. case%has_room) columns = [columns, get_columns('room', 'dB', get_rated_bands('third')), &
+         get_columns('room_rating', 'dB')]
+      columns = [columns, get_columns('margin', 'dB'), get_columns('conforms', '')]
+      columns%is_flag = index(columns%result, 'conforms') > 0
    end function get_result_columns
 
-   !> Column of a result without bands.
-   pure function get_column(name, unit, is_flag) result(column)
+   !> Columns of one result.
+   function get_columns(name, unit, bands) result(columns)
       character(len=*), intent(in) :: name
-      !> SI unit or dB (default: none).
-      character(len=*), intent(in), optional :: unit
-      !> See `result_column_type` (default: false).
-      logical, intent(in), optional :: is_flag
-      type(result_column_type) :: column
-
-      column = result_column_type(name, name)
-      if (present(is_flag)) column%is_flag = is_flag
-      if (.not. present(unit)) return
-      if (unit /= '') column%name = trim(name)//'_'//replaced(trim(unit), ' ', '_')
-   end function get_column
-
-   !> Columns of levels in bands.
-   function get_level_columns(prefix, bands) result(columns)
-      !> What the levels are of.
-      character(len=*), intent(in) :: prefix
-      !> The bands: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> The columns: [n_band].
-      type(result_column_type) :: columns(size(bands))
+      !> SI unit or dB.
+      character(len=*), intent(in) :: unit
+      !> Bands of one or more sets, whose name is added (default: a single number): [n_band].
+      type(band_type), intent(in), optional :: bands(:)
+      type(result_column_type), allocatable :: columns(:)
       integer :: i
 
-      do i = 1, size(bands)
-         columns(i)%result = trim(prefix)//'_'//bands(i)%set
-         columns(i)%name = trim(columns(i)%result)//'_'//get_band_name(bands(i))//'_Hz_dB'
+      columns = [result_column_type(name, name)]
+      if (present(bands)) columns = [(result_column_type(trim(name)//'_'//bands(i)%set, trim(name)//'_' &
+         //trim(bands(i)%set)//'_'//get_band_name(bands(i))//'_Hz'), i=1, size(bands))]
+      if (unit == '') return
+      do i = 1, size(columns)
+         columns(i)%name = trim(columns(i)%name)//'_'//replaced(trim(unit), ' ', '_')
       end do
-   end function get_level_columns
+   end function get_columns
 
    !> Sets the values that follow from the force on a rigid floor.
    pure subroutine set_source_values(case, criteria, quantity, level, conforms, values)

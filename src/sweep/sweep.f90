@@ -136,12 +136,21 @@ contains
       !> Set if `check_samples` fails, there is not enough memory, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: remaining(:)
-      integer :: i
+      character(len=128) :: message
+      integer :: i, status
 
       call check_samples(case, columns, forces, error)
       if (allocated(error)) return
-      call set_size(sweep, size(values, 2), merge(get_sample_count(case%sampling), 0, forces), error)
-      if (allocated(error)) return
+      call clear(sweep)
+      allocate (sweep%status(size(values, 2)), sweep%reason(size(values, 2)))
+      sweep%values = spread(merge(0.0_wp, not_a_number, sweep%columns%is_flag), 2, size(values, 2))
+      allocate (sweep%force(merge(get_sample_count(case%sampling), 0, forces), force_count, size(values, 2)), stat=status, &
+         errmsg=message)
+      if (status /= 0) then
+         error = input_error('the forces of '//to_text(size(values, 2))//' samples have no space in memory; allowed: ' &
+            //'fewer at a time')
+         return
+      end if
       remaining = [(i, i=1, size(values, 2))]
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, sweep, error)
@@ -208,27 +217,6 @@ contains
          call check_sampling(case%sampling, error)
       end if
    end subroutine check_samples
-
-   !> Allocates the results of samples.
-   subroutine set_size(sweep, n_sample, n_time, error)
-      type(sweep_type), intent(inout) :: sweep
-      integer, intent(in) :: n_sample
-      !> Length of the forces; 0 if they are not wanted.
-      integer, intent(in) :: n_time
-      !> Set if there is not enough memory.
-      type(error_type), allocatable, intent(out) :: error
-      character(len=128) :: message
-      integer :: status
-
-      call clear(sweep)
-      allocate (sweep%status(n_sample), sweep%reason(n_sample))
-      sweep%values = spread(merge(0.0_wp, not_a_number, sweep%columns%is_flag), 2, n_sample)
-      allocate (sweep%force(n_time, force_count, n_sample), stat=status, errmsg=message)
-      if (status /= 0) then
-         error = input_error('the forces of '//to_text(n_sample)//' samples have no space in memory; allowed: fewer at ' &
-            //'a time')
-      end if
-   end subroutine set_size
 
    !> Computes one sample, not in a batch.
    subroutine solve_sample(case, fields, columns, values, sample, shared, sweep)

@@ -155,18 +155,16 @@ def test_results_on_a_floor_are_read_back(run: Run, case_file: CaseFile, model: 
     }.items():  # fmt: skip
         assert [float(row[name]) for row in rows] == pytest.approx(values, rel=1e-9, abs=1e-12)
     table = done.stdout.partition("on oscillator")[2].splitlines()
-    number = re.compile(r"(?<= )-(?= )|\d+(?:\.\d+)?")
+    number = re.compile(r"\d+(?:\.\d+)?")
     shown = {line[2:24].strip(): number.findall(line[24:]) for line in table}
     for name in ("peak_force", "contact_time", "restitution", "impulse"):
-        numbers = [QUANTITIES[name].show(getattr(drop, name)) for drop in (found, moved)]
-        assert shown[name.replace("_", " ")] == numbers
+        assert shown[name.replace("_", " ")] == [QUANTITIES[name].show(getattr(moved, name))]
     for name, value in (
         ("velocity of the floor", abs(moved.floor_velocity).max()),
         ("its displacement", abs(moved.floor_displacement).max()),
     ):
-        assert shown[name][0] == "-"
-        assert float(shown[name][1]) == pytest.approx(1e3 * value, rel=5e-3)
-    assert shown["energy to the floor"] == ["-", QUANTITIES["floor_work"].show(moved.floor_work)]
+        assert float(shown[name][0]) == pytest.approx(1e3 * value, rel=5e-3)
+    assert shown["energy to the floor"] == [QUANTITIES["floor_work"].show(moved.floor_work)]
     differ = f"{100 * (energy.total / moved.floor_work - 1):z.2f}"
     differ = "less than 0.01" if differ == "0.00" else differ
     assert f"in all frequencies, differs by {differ} %" in " ".join(done.stdout.split())

@@ -59,7 +59,6 @@ contains
       !> Also show the quantities of the model.
       logical, intent(in) :: verbose
       character(len=:), allocatable :: text
-      real(wp) :: values(history_quantity_count)
       character(len=:), allocatable :: verdict
       integer :: verdicts(criterion_count)
       integer :: i, assessed, other
@@ -86,19 +85,9 @@ contains
             text = text//level_row(i)
          end do
          if (size(bands) > octave_count) text = text//newline
-         values = get_quantities(history)
-         do i = 1, sample_quantity_count
-            ! Quantities with limits are listed above.
-            if (any(criteria%name == quantities(i)%name) .or. is_peak_of_other(quantities(i), case)) cycle
-            text = text//quantity_row(quantities(i), values(i))
-         end do
+         text = text//quantity_rows(case, history, criteria%name)
          if (verbose) text = text//model_quantity_rows(history, '')
-         do i = 1, octave_count
-            associate (error => history%numerical_error%octave(i))
-               if (history%numerical_error%known .and. (error > shown_error .or. verdicts(i) == verdict_undecided)) &
-                  text = text//row('error at '//get_band_name(bands(i))//' Hz', fixed(error, 2), 'dB')
-            end associate
-         end do
+         text = text//error_rows(history, verdicts(:octave_count) == verdict_undecided)
          if (.not. history%numerical_error%known) text = text//row('numerical error', 'unknown', '')
          verdict = 'the source '//trim(verdict_names(combine_verdicts(verdicts)))
          if (combine_verdicts(verdicts) == verdict_undecided) verdict = 'it is undecided whether the source conforms'
@@ -139,82 +128,73 @@ contains
       title = 'level, '//get_band_name(band)//' Hz '//band%set
    end function get_level_title
 
-   !> Table that compares the drops on mobile and rigid floor.
+   !> Levels and quantities of the drop on a mobile floor.
    function get_floor_table(case, results) result(text)
       type(case_type), intent(in) :: case
       !> Results with a drop on a mobile floor.
       type(results_type), intent(in) :: results
       character(len=:), allocatable :: text
-      character(len=:), allocatable :: deviation
-      real(wp) :: values(history_quantity_count, 2)
+      character(len=:), allocatable :: deviation, line
+      integer :: i
+
+      associate (history => results%on_floor, floor => results%floor, &
+         blocked => results%impact%assessment%level(results%impact%assessment%first_band:, 2))
+         text = '  '//padded('on '//trim(case%floor), 27)//padded('contact', 13)//padded('- blocked', 15)//'energy'//newline
+         do i = 1, size(floor%bands)
+            line = row(get_level_title(floor%bands(i)), fixed(floor%contact_level(i), 2), 'dB')
+            text = text//padded(line(:len(line) - 1), 40)//flush_right(fixed(floor%contact_level(i) - blocked(i), 2), 8) &
+               //' dB  '//with_prefix(floor%energy(i), 'J', 3, 8)//newline
+         end do
+         text = text//newline//quantity_rows(case, history, [character(len=1) ::]) &
+            //row('velocity of the floor', significant(1.0e3_wp*maxval(abs(history%floor_velocity)), 3), 'mm/s') &
+            //row('its displacement', significant(1.0e3_wp*maxval(abs(history%floor_displacement)), 3), 'mm') &
+            //quantity_row(get_quantity('floor_work'), history%floor_work) &
+            //error_rows(history, spread(.false., 1, octave_count))
+         deviation = fixed(1.0e2_wp*(floor%total_energy/max(history%floor_work, tiny(1.0_wp)) - 1), 2)
+         if (deviation == '0.00') deviation = 'less than 0.01'
+         text = text//get_verification_rows(history)//newline//'  The energy by the mobility of the floor, in all ' &
+            //'frequencies, differs by '//deviation//' %.'//newline
+      end associate
+   end function get_floor_table
+
+   !> Rows with the quantities of a drop, without the peak of the force that is not assessed.
+   function quantity_rows(case, history, listed) result(rows)
+      type(case_type), intent(in) :: case
+      type(force_history_type), intent(in) :: history
+      !> Names of quantities that another row shows: [n].
+      character(len=*), intent(in) :: listed(:)
+      character(len=:), allocatable :: rows
+      real(wp) :: values(history_quantity_count)
+      character(len=18) :: other
+      integer :: i
+
+      rows = ''
+      other = merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
+      values = get_quantities(history)
+      do i = 1, sample_quantity_count
+         if (any(listed == quantities(i)%name) .or. quantities(i)%name == other) cycle
+         rows = rows//quantity_row(quantities(i), values(i))
+      end do
+   end function quantity_rows
+
+   !> Rows with large numerical errors of octave levels.
+   function error_rows(history, matters) result(rows)
+      type(force_history_type), intent(in) :: history
+      !> The error matters, however small: [octave_count].
+      logical, intent(in) :: matters(:)
+      character(len=:), allocatable :: rows
       type(band_type) :: octaves(octave_count)
       integer :: i
 
-      associate (rigid => results%impact%history, moving => results%on_floor, floor => results%floor, &
-         level => results%impact%assessment%level(results%impact%assessment%first_band:, 2))
-         text = '  '//padded('on '//trim(case%floor), name_width)//'   blocked       contact    difference       energy' &
-            //newline
-         do i = 1, size(floor%bands)
-            text = text//'  '//get_level_title(floor%bands(i))//cell(fixed(level(i), 2), 'dB') &
-               //cell(fixed(floor%contact_level(i), 2), 'dB')//cell(fixed(floor%contact_level(i) - level(i), 2), 'dB') &
-               //with_prefix(floor%energy(i), 'J', 3, 8)//newline
-         end do
-         text = text//newline
-         values = reshape([get_quantities(rigid), get_quantities(moving)], shape(values))
-         do i = 1, sample_quantity_count
-            if (is_peak_of_other(quantities(i), case)) cycle
-            associate (shown => quantities(i)%display_scale*values(i, :))
-               call add_row(quantities(i)%title, show(quantities(i), shown(1)), show(quantities(i), shown(2)), &
-                  quantities(i)%display_unit)
-            end associate
-         end do
-         call add_row('velocity of the floor', '-', significant(1.0e3_wp*maxval(abs(moving%floor_velocity)), 3), 'mm/s')
-         call add_row('its displacement', '-', significant(1.0e3_wp*maxval(abs(moving%floor_displacement)), 3), 'mm')
-         associate (work => get_quantity('floor_work'))
-            call add_row(work%title, '-', show(work, work%display_scale*moving%floor_work), work%display_unit)
+      rows = ''
+      octaves = get_octaves()
+      do i = 1, octave_count
+         associate (error => history%numerical_error%octave(i))
+            if (history%numerical_error%known .and. (error > shown_error .or. matters(i))) rows = rows &
+               //row('error at '//get_band_name(octaves(i))//' Hz', fixed(error, 2), 'dB')
          end associate
-         octaves = get_octaves()
-         do i = 1, octave_count
-            if (moving%numerical_error%octave(i) > shown_error) call add_row('error at '//get_band_name(octaves(i))//' Hz', &
-               fixed(rigid%numerical_error%octave(i), 2), fixed(moving%numerical_error%octave(i), 2), 'dB')
-         end do
-         deviation = fixed(1.0e2_wp*(floor%total_energy/max(moving%floor_work, tiny(1.0_wp)) - 1), 2)
-         if (deviation == '0.00') deviation = 'less than 0.01'
-         text = text//get_verification_rows(moving)//newline//'  The energy by the mobility of the floor, in all ' &
-            //'frequencies, differs by '//deviation//' %.'//newline
-      end associate
-
-   contains
-
-      !> Adds a number of both drops.
-      subroutine add_row(title, rigid, moving, unit)
-         character(len=*), intent(in) :: title
-         !> Values on rigid and mobile floor, in the shown unit, as text.
-         character(len=*), intent(in) :: rigid, moving
-         character(len=*), intent(in) :: unit
-
-         text = text//'  '//padded(title, name_width)//merge(cell(rigid, '    '), cell(rigid, unit), rigid == '-') &
-            //trim(cell(moving, unit))//newline
-      end subroutine add_row
-
-      !> A number with its unit in a column.
-      pure function cell(number, unit) result(text)
-         character(len=*), intent(in) :: number, unit
-         character(len=15) :: text
-
-         text = flush_right(number, 10)//' '//unit
-      end function cell
-
-   end function get_floor_table
-
-   !> Whether a quantity is the peak of the force that is not assessed.
-   pure function is_peak_of_other(quantity, case) result(yes)
-      type(quantity_type), intent(in) :: quantity
-      type(case_type), intent(in) :: case
-      logical :: yes
-
-      yes = quantity%name == merge('peak_elastic_force', 'peak_force        ', case%level_force == 'floor')
-   end function is_peak_of_other
+      end do
+   end function error_rows
 
    !> Lines that name the main groups missing from the file, and the values of the standard ball for keys that it does not
    !> state.
