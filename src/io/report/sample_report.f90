@@ -10,9 +10,9 @@ module thud_sample_report
 
    public :: get_sample_header, get_sample_rows
 
-   !> Width of a number with all digits, and its format.
-   integer, parameter :: width = 24
-   character(len=*), parameter :: form = '(*(es24.16e3))'
+   !> Width of a comma and a number with all digits, and their format.
+   integer, parameter :: width = 25
+   character(len=*), parameter :: form = '(*(:,",",es24.16e3))'
 
 contains
 
@@ -46,26 +46,38 @@ contains
       type(sweep_type), intent(in) :: sweep
       type(text_buffer_type), intent(out) :: rows
       character(len=width) :: cell
-      character(len=width*size(sweep%columns)) :: cells
-      integer :: i, j
+      character(len=width*size(sweep%columns)) :: cells, row
+      logical :: is_number(size(sweep%columns))
+      integer :: i, j, n, at
 
+      is_number = sweep%columns%is_wanted .and. .not. sweep%columns%is_flag
       do i = first, last
          call rows%append(to_text(before + i))
          do j = 1, size(table%names)
             associate (field => table%fields(j))
                write (cell, form) values(j, i)
-               if (field%n_choice > 0) cell = field%choices(nint(values(j, i)))
-               call rows%append(','//trim(cell))
+               if (field%n_choice > 0) cell = ','//field%choices(nint(values(j, i)))
+               call rows%append(trim(cell))
             end associate
          end do
-         write (cells, form) sweep%values(:, i)
-         do j = 1, size(sweep%columns)
-            if (.not. sweep%columns(j)%is_wanted) cycle
-            cell = cells((j - 1)*width + 1:j*width)
-            if (sweep%columns(j)%is_flag) cell = merge('yes', 'no ', sweep%values(j, i) > 0.0_wp)
-            if (sweep%status(i) /= 0) cell = ''
-            call rows%append(','//trim(cell))
-         end do
+         if (sweep%status(i) == 0) then
+            write (cells, form) pack(sweep%values(:, i), is_number)
+            n = 0
+            at = 0
+            do j = 1, size(is_number)
+               if (is_number(j)) then
+                  row(n + 1:n + width) = cells(at + 1:at + width)
+                  at = at + width
+                  n = n + width
+               else if (sweep%columns(j)%is_flag) then
+                  row(n + 1:) = merge(',yes', ',no ', sweep%values(j, i) > 0.0_wp)
+                  n = n + merge(4, 3, sweep%values(j, i) > 0.0_wp)
+               end if
+            end do
+            call rows%append(row(:n))
+         else
+            call rows%append(repeat(',', count(sweep%columns%is_wanted)))
+         end if
          call rows%append(','//to_text(sweep%status(i))//',')
          if (sweep%status(i) /= 0) then
             associate (reason => sweep%reason(i)%text)
