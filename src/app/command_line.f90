@@ -148,7 +148,8 @@ contains
          case default
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
-               error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: '//join(known_options))
+               error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: ' &
+                  //join(known_options))
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one (commands such as run ' &
                   //'and predict belong to thud-driver)')

@@ -1,5 +1,5 @@
-!> Results as a list of records: texts, numbers and arrays, each with a name. Files and callers in other languages get results
-!> from this list, which is made once (`thud_records`).
+!> Results as a list of records: texts, numbers and arrays, each with a name. Files and callers in other languages get
+!> results from this list, which is made once (`thud_records`).
 module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type

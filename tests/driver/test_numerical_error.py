@@ -156,7 +156,8 @@ def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, ru
 FINE_MESH = {"radial_elements": 4, "polar_elements": 34}
 RESOLUTIONS = {
     "&model name = 'finite_element' / &mesh radial_elements = 3, polar_elements = 24 /": (
-        ("radial elements 3", "polar elements 24"), "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
+        ("radial elements 3", "polar elements 24"),
+        "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
     ),
     "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
         ("rings 10", "highest frequency 300.0 Hz", "substeps 1"),

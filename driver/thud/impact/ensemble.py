@@ -219,7 +219,10 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
     reason = np.full(len(numbers), "", dtype=object)
     reason[status != 0] = text(answer["reasons"]).split("\n")[:-1]
     del answer["reasons"]
-    return {name: values.T for name, values in answer.items()} | {"status": status, "reason": reason}
+    return {name: values.T for name, values in answer.items()} | {
+        "status": status,
+        "reason": reason,
+    }
 
 
 def _columns(

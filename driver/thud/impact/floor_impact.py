@@ -176,10 +176,12 @@ def new_floor_impact(
         floor_displacement=columns["floor_displacement"],
         floor_velocity=columns["floor_velocity"],
         floor_work=answer["floor_summary"]["floor_work"],
-        point_velocity=np.array(velocities).reshape(-1, len(blocked_force)),
+        point_velocity=np.array(velocities),
     )
-    points = [*zip(getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()))]
-    if points and not velocities:
-        velocities = [impact.velocity_at(x, y) for x, y in points]
-        impact = replace(impact, point_velocity=np.array(velocities))
-    return impact
+    if velocities:
+        return impact
+    points = zip(
+        getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()), strict=True
+    )
+    velocities = [impact.velocity_at(x, y) for x, y in points]
+    return replace(impact, point_velocity=np.array(velocities).reshape(-1, len(blocked_force)))

@@ -112,9 +112,8 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         raise NumericalError(message)
     summary = answer["room_summary"]
     names = text(summary["contribution"]).split("\n")
-    contributions = dict(
-        sorted(zip(names, summary["contributed"].tolist()), key=lambda entry: -entry[1])
-    )
+    contributed = zip(names, summary["contributed"].tolist(), strict=True)
+    contributions = dict(sorted(contributed, key=lambda entry: -entry[1]))
     length, width, height = room["sides"].tolist()
     return RoomLevel(
         frequency=frequency,
@@ -128,7 +127,7 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
         crossover=room["crossover"],
         ratings={
             name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
-            for name, level in zip(RATINGS, summary["level"])
+            for name, level in zip(RATINGS, summary["level"], strict=True)
         },
         floor_warnings=texts(answer.get("room_warnings", {})),
     )

@@ -158,7 +158,7 @@ contains
             error = input_error(label//' is given a second time, after line '//to_text(given(earlier)%line) &
                //'; allowed: once')
          else if (key == '') then
-            return
+            continue
          else if (field == 0) then
             call get_suggestion(trim(key), keys, suggestion)
             allowed = join_quoted(distinct(keys))

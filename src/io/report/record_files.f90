@@ -98,13 +98,10 @@ contains
       do i = 1, size(found)
          associate (record => bundle%records(found(i)))
             call get_cells(record, cells)
-            if (record%kind == 'text') then
-               text = text//'   '//trim(record%name)//' = '//join_quoted(cells)
-            else if (all(cells == '')) then
-               cycle
-            else
-               text = text//'   '//trim(record%name)//' = '//join(cells)
-            end if
+            if (record%kind /= 'text' .and. all(cells == '')) cycle
+            text = text//'   '//trim(record%name)//' = '
+            if (record%kind == 'text') text = text//join_quoted(cells)
+            if (record%kind /= 'text') text = text//join(cells)
             if (record%unit /= '') text = text//' ! '//trim(record%unit)
          end associate
          text = text//newline
