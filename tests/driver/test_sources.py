@@ -30,7 +30,6 @@ def test_threads_share_no_lengths_of_texts() -> None:
         "quantities.f90",
         "room_table.f90",
         "schema.f90",
-        "samples_run.f90",
         "screen.f90",
         "screen_tables.f90",
     }
