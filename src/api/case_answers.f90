@@ -4,8 +4,8 @@ module thud_case_answers
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text
    use thud_column, only: column_type, find_columns
-   use thud_compression, only: compression_type
-   use thud_compute, only: compress_case, compute, results_type, scope_type
+   use thud_compression, only: compression_type, compute_compression
+   use thud_compute, only: compute, results_type, scope_type
    use thud_constants, only: get_compiler, version
    use thud_error, only: error_type, input_error
    use thud_field, only: name_length
@@ -102,7 +102,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(compression_type) :: compression
 
-      call compress_case(case, compression, error)
+      call compute_compression(case%compression, case%ball, case%models(get_model_number(case))%model, compression, error)
       if (.not. allocated(error)) call add_compression(bundle, compression)
    end subroutine answer_compression
 

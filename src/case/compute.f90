@@ -1,11 +1,10 @@
 !> Computes all results that a case asks for: free modes, quasi-static compression, the drop on a rigid floor with its levels
 !> and criteria, the drop on the floor of the case, the level in the room below, and warnings. It reads and writes no files.
 module thud_compute
-   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    !$ use omp_lib, only: omp_get_max_threads
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, get_floor_number, get_model_number, get_modes_ball
-   use thud_compression, only: compression_type, get_deflections, get_pressed_ball
+   use thud_compression, only: compression_type, compute_compression
    use thud_error, only: error_type
    use thud_floor_model, only: floor_state_type
    use thud_floor_result, only: floor_result_type, get_floor_result
@@ -22,11 +21,12 @@ module thud_compute
    use thud_source_limits, only: combine_verdicts, conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_verdict, verdict_conforms
    use thud_system, only: is_forked
-   use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings, warning_length
+   use thud_validity_limit, only: warning_length
+   use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings
    implicit none (type, external)
    private
 
-   public :: assess_floor, assessment_type, compress_case, compute, compute_impact, drop_on_floor, get_assessed_force
+   public :: assess_floor, assessment_type, compute, compute_impact, drop_on_floor, get_assessed_force
    public :: impact_type, is_conforming, prepare_floor, results_type, scope_type
 
    !> Memory per sample of a record, including transforms and text, bytes; measured.
@@ -93,7 +93,8 @@ contains
          '&sampling: so many samples', 'a lower sample_rate or duration', error)
       if (case%has_modes .and. .not. allocated(error)) call get_free_modes(get_modes_ball(case), case%modes%count, &
          results%modes, error)
-      if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
+      if (case%has_compression .and. .not. allocated(error)) call compute_compression(case%compression, case%ball, &
+         case%models(get_model_number(case))%model, results%compression, error)
       if (case%has_impact .and. .not. allocated(error)) call compute_drops(case, scope, results%state, results%impact, &
          results%on_floor, error)
       if (case%has_impact .and. .not. allocated(error)) call assess_floor(case, scope, results%state, results%impact, &
@@ -139,17 +140,14 @@ contains
 
       n_thread = 1
       !$ if (case%has_floor .and. is_forked == 0) n_thread = min(2, omp_get_max_threads())
-      if (n_thread == 1) then
-         call compute_impact(case, scope, impact, error)
-         if (.not. allocated(error)) call prepare_floor(case, state, error)
-         if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, state, on_floor, error)
-         return
-      end if
       !$omp parallel do num_threads(n_thread) schedule(static, 1)
       do i = 1, 2
-         if (i == 1) call compute_impact(case, scope, impact, error)
-         if (i == 2) call prepare_floor(case, state, floor_error)
-         if (i == 2 .and. .not. allocated(floor_error)) call drop_on_floor(case, state, on_floor, floor_error)
+         if (i == 1) then
+            call compute_impact(case, scope, impact, error)
+         else if (n_thread == 2 .or. .not. allocated(error)) then
+            call prepare_floor(case, state, floor_error)
+            if (.not. allocated(floor_error)) call drop_on_floor(case, state, on_floor, floor_error)
+         end if
       end do
       !$omp end parallel do
       if (.not. allocated(error)) call move_alloc(floor_error, error)
@@ -207,20 +205,6 @@ contains
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
 
-   !> Quasi-static compression of a case's ball, computed by its model.
-   subroutine compress_case(case, compression, error)
-      type(case_type), intent(in) :: case
-      type(compression_type), intent(out) :: compression
-      !> Set if the model has no compression, or the ball cannot be pressed so far.
-      type(error_type), allocatable, intent(out) :: error
-
-      allocate (compression%deflection, source=get_deflections(case%compression))
-      allocate (compression%force, mold=compression%deflection)
-      associate (model => case%models(get_model_number(case))%model)
-         call model%compress(get_pressed_ball(case%compression, case%ball), compression%deflection, compression%force, error)
-      end associate
-   end subroutine compress_case
-
    !> Levels and criteria of the force history of a case, for both forces.
    subroutine assess(case, history, assessment, error)
       type(case_type), intent(in) :: case
@@ -249,9 +233,8 @@ contains
             if (allocated(error)) return
             criteria%value = [level(:octave_count), history%contact_time, history%restitution, &
                real(get_peak_count(force, history%sample_rate), wp), case%ball%mass, case%drop%height]
-            criteria(:octave_count + 2)%error = ieee_value(1.0_wp, ieee_quiet_nan)
-            if (history%numerical_error%known) criteria(:octave_count + 2)%error = [history%numerical_error%octave, &
-               history%numerical_error%contact_time, history%numerical_error%restitution]
+            criteria(:octave_count + 2)%error = [history%numerical_error%octave, history%numerical_error%contact_time, &
+               history%numerical_error%restitution]
          end associate
       end do
    end subroutine assess

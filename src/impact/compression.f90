@@ -5,12 +5,12 @@ module thud_compression
    use thud_field, only: field_type, name_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, integer_field, real_field
+   use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_compression, compression_options_type, compression_type, get_compression_fields, get_deflections, &
-      get_pressed_ball
+   public :: check_compression, compression_options_type, compression_type, compute_compression, get_compression_fields
 
    !> Options of the group `&compression`.
    type :: compression_options_type
@@ -63,32 +63,24 @@ contains
       end if
    end subroutine check_compression
 
-   !> Deflections of the points, equally spaced from 0.
-   pure function get_deflections(options) result(deflection)
-      type(compression_options_type), intent(in) :: options
-      !> Approach of the plates, m: [points].
-      real(wp) :: deflection(options%points)
-      integer :: i
-
-      deflection = [(options%max_deflection*real(i, wp)/(options%points - 1), i=0, options%points - 1)]
-   end function get_deflections
-
-   !> The ball, with its gas in the state that it has in the press.
-   pure function get_pressed_ball(options, ball) result(pressed)
+   !> Quasi-static compression of a ball by a model, at deflections equally spaced from 0.
+   subroutine compute_compression(options, ball, model, compression, error)
       type(compression_options_type), intent(in) :: options
       type(ball_type), intent(in) :: ball
+      class(source_model_type), intent(in) :: model
+      type(compression_type), intent(out) :: compression
+      !> Set if the model has no compression, or the ball cannot be pressed so far.
+      type(error_type), allocatable, intent(out) :: error
       type(ball_type) :: pressed
+      integer :: i
 
       pressed = ball
-      select case (options%gas)
-      case ('vented')
-         ! Without ambient pressure there is no overpressure at any volume.
-         pressed%ambient_pressure = 0.0_wp
-      case ('isothermal')
-         pressed%heat_capacity_ratio = 1.0_wp
-      case default
-         continue
-      end select
-   end function get_pressed_ball
+      ! Without ambient pressure there is no overpressure at any volume.
+      if (options%gas == 'vented') pressed%ambient_pressure = 0.0_wp
+      if (options%gas == 'isothermal') pressed%heat_capacity_ratio = 1.0_wp
+      compression%deflection = [(options%max_deflection*real(i, wp)/(options%points - 1), i=0, options%points - 1)]
+      allocate (compression%force, mold=compression%deflection)
+      call model%compress(pressed, compression%deflection, compression%force, error)
+   end subroutine compute_compression
 
 end module thud_compression

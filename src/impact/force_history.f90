@@ -11,8 +11,7 @@ module thud_force_history
    private
 
    public :: add_model_quantity, add_to_means, check_samples, clear_flight, continue_to_zero, force_count, force_history_type
-   public :: force_names, get_model_quantity, has_quantity, holds_impulse, max_residual, new_force_history
-   public :: numerical_error_type
+   public :: force_names, get_model_quantity, holds_impulse, max_residual, new_force_history, numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
    !> is below 1e-9 at the default step.
@@ -81,7 +80,7 @@ module thud_force_history
       real(wp) :: touch_time = 0.0_wp
       !> Time from first touch to release, s.
       real(wp) :: contact_time = 0.0_wp
-      !> Contact time resolved between steps, s, if `contact_time` is a whole number of steps; 0 if `contact_time` is exact.
+      !> Contact time resolved between steps, s; `solve_drop` sets it where a model does not.
       real(wp) :: exact_contact_time = 0.0_wp
       !> Maximum force on the floor, N; low-passed if the model has spikes that no force plate records.
       real(wp) :: peak_force = 0.0_wp
@@ -99,6 +98,8 @@ module thud_force_history
       real(wp) :: impulse_residual = 0.0_wp
       !> |energy at release + loss - energy at first touch|, divided by the energy at first touch.
       real(wp) :: energy_residual = 0.0_wp
+      !> Octave levels of the force on the floor, dB, from `solve_drop`; NaN if it has none.
+      real(wp) :: octave_level(octave_count) = not_a_number
       !> Estimated error divided by the difference from a coarser resolution, if the model converges more slowly than others.
       real(wp) :: error_ratio = 0.0_wp
       !> Errors due to the resolution.
@@ -185,22 +186,14 @@ contains
       history%model_quantity = [history%model_quantity, value]
    end subroutine add_model_quantity
 
-   !> Whether the model has stated a quantity.
-   pure function has_quantity(history, name) result(yes)
-      type(force_history_type), intent(in) :: history
-      character(len=*), intent(in) :: name
-      logical :: yes
-
-      yes = any(history%model_quantity_name == name)
-   end function has_quantity
-
    !> A quantity that the model has stated.
    pure function get_model_quantity(history, name) result(value)
       type(force_history_type), intent(in) :: history
       character(len=*), intent(in) :: name
+      !> The value; 0 if there is none.
       real(wp) :: value
 
-      value = history%model_quantity(findloc(history%model_quantity_name == name, .true., dim=1))
+      value = sum(history%model_quantity, mask=history%model_quantity_name == name)
    end function get_model_quantity
 
    !> A history of zero force, all arrays allocated and zero.

@@ -2,16 +2,17 @@
 !> levels of the octaves agree. Its numerical error (modes left out, rings, elements, time steps and samples) is estimated by
 !> the change from a coarser level.
 module thud_refined_drop
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use thud_ball, only: ball_type
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_constants, only: pi
    use thud_drop, only: drop_type
    use thud_error, only: error_type, signal_base
    use thud_force_exposure, only: get_force_exposure_levels
-   use thud_force_history, only: add_model_quantity, force_history_type, get_model_quantity, has_quantity, &
-      numerical_error_type
+   use thud_force_history, only: add_model_quantity, force_history_type, get_model_quantity, numerical_error_type
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
+   use thud_power, only: not_a_number
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: resolution_type, source_model_type
@@ -19,7 +20,7 @@ module thud_refined_drop
    implicit none (type, external)
    private
 
-   public :: finer_prefix, finer_quantities, get_resolution_keys, resolution_quantities, solve_drop
+   public :: finer_prefix, finer_quantities, get_resolution, max_error, resolution_quantities, solve_drop
 
    !> Error of an octave level above which a finer resolution is tried, dB.
    real(wp), parameter :: max_error = 0.2_wp
@@ -34,6 +35,9 @@ module thud_refined_drop
 
    !> Beginning of the names of the quantities of a drop at a finer resolution.
    character(len=*), parameter :: finer_prefix = 'finer_'
+
+   !> Units of these quantities.
+   character(len=2), parameter :: finer_units(*) = [character(len=2) :: 'dB', 'dB', 'dB', 'dB', 'dB', 's', '', 'N']
 
    !> Quantities of models that state the resolution, with the names of the keys that set it.
    character(len=24), parameter :: resolution_quantities(*) = [character(len=24) :: 'radial_elements', 'polar_elements', &
@@ -58,38 +62,34 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       class(source_model_type), allocatable :: shared, refined
       type(force_history_type) :: drops(0:max_level)
-      type(force_history_type) :: none
       type(motion_type), allocatable :: motion
       type(sampling_type) :: refined_sampling
       type(resolution_type) :: resolution
       real(wp) :: min_error(octave_count)
       integer :: level
-      logical :: is_fine, is_last
+      logical :: is_fine, is_verification
 
       allocate (shared, source=model)
-      refined_sampling = sampling
-      call shared%refine(ball, 0, none, refined_sampling, refined, resolution)
-      call refined%solve(ball, drop, refined_sampling, drops(0), error, receiver)
-      if (allocated(error)) then
-         if (error%code >= signal_base .or. error%has_short_record) return
-         drops(0) = none
-      end if
       is_fine = .false.
-      do level = 1, max_level
+      do level = 0, max_level
          refined_sampling = sampling
-         call shared%refine(ball, level, drops(level - 1), refined_sampling, refined, resolution)
-         is_last = is_fine .or. .not. resolution%lowers_error
+         call shared%refine(ball, level, drops(max(level - 1, 0)), refined_sampling, refined, resolution)
+         is_verification = is_fine .or. .not. resolution%lowers_error
          ! The error is not known if the coarsest resolution fails and there is one level.
-         if (is_last .and. drops(level - 1)%numerical_error%known .and. .not. sampling%verify) exit
+         if (is_verification .and. drops(max(level - 1, 0))%numerical_error%known .and. .not. sampling%verify) exit
          call refined%solve(ball, drop, refined_sampling, drops(level), error, receiver)
          if (allocated(error)) then
-            if (level == 1 .or. error%code >= signal_base) return
+            if (level == 1 .or. error%code >= signal_base .or. level == 0 .and. error%has_short_record) return
             ! The result stands without the finer one; `get_warnings` reports a missing verification.
             deallocate (error)
-            exit
+            if (level > 0) exit
+            drops(0) = force_history_type()
+            cycle
          end if
+         call complete(drops(level))
+         if (level == 0) cycle
          resolution%ratio = max(resolution%ratio, drops(level)%error_ratio)
-         if (is_last) then
+         if (is_verification) then
             if (.not. drops(level - 1)%numerical_error%known) call estimate_error(drops(level), 1 + resolution%ratio, &
                min_error, drops(level - 1))
             if (sampling%verify) call add_verification(drops(level), drops(level - 1))
@@ -107,6 +107,17 @@ contains
       call move_alloc(motion, history%motion)
    end subroutine solve_drop
 
+   !> Sets what follows from the samples of a history: the octave levels, and a contact time that the model does not resolve.
+   subroutine complete(history)
+      type(force_history_type), intent(inout) :: history
+      type(error_type), allocatable :: error
+
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', history%octave_level, &
+         error)
+      if (allocated(error)) history%octave_level = not_a_number
+      if (.not. history%exact_contact_time > 0.0_wp) history%exact_contact_time = history%contact_time
+   end subroutine complete
+
    !> Estimates the error of a force history by its difference from a coarser one.
    subroutine estimate_error(coarse, ratio, min_error, history)
       !> The same drop at a coarser resolution; its sampling rate may be lower.
@@ -117,34 +128,31 @@ contains
       real(wp), intent(in) :: min_error(:)
       !> The history; its errors are set.
       type(force_history_type), intent(inout) :: history
-      real(wp) :: level(octave_count, 3), change(octave_count)
+      real(wp), dimension(octave_count) :: change, level
       real(wp) :: time_change, peak_change, first_order_ratio, interval
       integer :: i
       type(error_type), allocatable :: error
 
-      call get_force_exposure_levels(coarse%floor_force, coarse%sample_rate, get_octaves(), 'exact', level(:, 1), error)
-      if (allocated(error)) return
-      call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', level(:, 2), error)
-      if (allocated(error)) return
-      change = abs(level(:, 2) - level(:, 1))
+      change = abs(history%octave_level - coarse%octave_level)
+      if (any(ieee_is_nan(change))) return
       peak_change = abs(history%peak_force - coarse%peak_force)
-      time_change = abs(get_contact_time(history) - get_contact_time(coarse))
+      time_change = abs(history%exact_contact_time - coarse%exact_contact_time)
       if (size(coarse%floor_force) == size(history%floor_force)) then
          ! Levels may agree by chance, the forces do not.
          call get_force_exposure_levels(history%floor_force - coarse%floor_force, history%sample_rate, get_octaves(), &
-            'exact', level(:, 3), error)
+            'exact', level, error)
          if (allocated(error)) return
-         change = max(change, in_phase*20/log(10.0_wp)*10**((level(:, 3) - level(:, 2))/20))
+         change = max(change, in_phase*20/log(10.0_wp)*10**((level - history%octave_level)/20))
          ! The root of the mean square of the difference during the contact.
-         peak_change = max(peak_change, sqrt(sum(10**(level(:, 3)/10))/history%contact_time))
+         peak_change = max(peak_change, sqrt(sum(10**(level/10))/history%contact_time))
       else if (coarse%sample_rate < history%sample_rate .and. .not. history%has_means) then
          ! Half the rate leaves out every other sample, which changes the spectrum by that of the samples with alternating
          ! signs. Levels may agree by chance: aliasing has one sign or the other, as the force ends before or after the
          ! middle of a sampling interval.
          call get_force_exposure_levels([(merge(1, -1, mod(i, 2) == 1)*history%floor_force(i), &
-            i=1, size(history%floor_force))], history%sample_rate, get_octaves(), 'exact', level(:, 3), error)
+            i=1, size(history%floor_force))], history%sample_rate, get_octaves(), 'exact', level, error)
          if (allocated(error)) return
-         change = max(change, 20/log(10.0_wp)*10**((level(:, 3) - level(:, 2))/20))
+         change = max(change, 20/log(10.0_wp)*10**((level - history%octave_level)/20))
       end if
       change = ratio*change
       if (history%has_means) change = change + get_mean_loss(history)
@@ -186,8 +194,8 @@ contains
       real(wp) :: level(1)
 
       force = 0.0_wp
-      if (.not. has_quantity(history, 'highest_frequency')) return
       octave%upper = min(get_model_quantity(history, 'highest_frequency'), history%sample_rate/2)
+      if (.not. octave(1)%upper > 0.0_wp) return
       octave%lower = octave%upper/2
       call get_force_exposure_levels(history%floor_force, history%sample_rate, octave, 'exact', level, error)
       if (.not. allocated(error)) force = sqrt(10**(level(1)/10)/history%contact_time)
@@ -204,7 +212,6 @@ contains
       octaves = get_octaves()
       phase = pi*octaves%upper/history%sample_rate
       loss = -20*log10(sin(phase)/phase)
-      if (.not. has_quantity(history, 'substeps')) return
       ! Two samples share the middle step of an odd number in half, which is lost in part; at the center of the octave,
       ! because spectra of contacts fall.
       substeps = get_model_quantity(history, 'substeps')
@@ -216,18 +223,14 @@ contains
       type(force_history_type), intent(in) :: finer
       !> The history; its model quantities get `finer_quantities`.
       type(force_history_type), intent(inout) :: history
-      real(wp) :: level(octave_count)
-      type(error_type), allocatable :: error
+      real(wp) :: values(size(finer_quantities))
       integer :: i
 
-      call get_force_exposure_levels(finer%floor_force, finer%sample_rate, get_octaves(), 'exact', level, error)
-      if (allocated(error)) return
-      do i = 1, octave_count
-         call add_model_quantity(history, finer_quantities(i), 'dB', level(i))
+      values = [finer%octave_level, finer%exact_contact_time, finer%restitution, finer%peak_force]
+      if (any(ieee_is_nan(values))) return
+      do i = 1, size(values)
+         call add_model_quantity(history, finer_quantities(i), finer_units(i), values(i))
       end do
-      call add_model_quantity(history, finer_quantities(octave_count + 1), 's', get_contact_time(finer))
-      call add_model_quantity(history, finer_quantities(octave_count + 2), '', finer%restitution)
-      call add_model_quantity(history, finer_quantities(octave_count + 3), 'N', finer%peak_force)
       do i = 1, size(finer%model_quantity)
          if (any(resolution_quantities == finer%model_quantity_name(i))) call add_model_quantity(history, &
             finer_prefix//finer%model_quantity_name(i), finer%model_quantity_unit(i), finer%model_quantity(i))
@@ -236,29 +239,20 @@ contains
          finer%sample_rate)
    end subroutine add_verification
 
-   !> The keys that set the resolution of a result, with its values.
-   pure subroutine get_resolution_keys(history, text)
+   !> The resolution of a result, by the keys that set it.
+   pure function get_resolution(history) result(text)
       type(force_history_type), intent(in) :: history
-      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: text
+      integer :: i
 
-      if (has_quantity(history, 'radial_elements')) then
-         text = '&mesh radial_elements, polar_elements (now '//fixed(get_model_quantity(history, 'radial_elements'), 0) &
-            //' x '//fixed(get_model_quantity(history, 'polar_elements'), 0)//')'
-      else if (has_quantity(history, 'rings')) then
-         text = '&modal_ball rings, highest_frequency (now '//fixed(get_model_quantity(history, 'rings'), 0)//', ' &
-            //fixed(get_model_quantity(history, 'highest_frequency'), 0)//' Hz)'
-      else
-         text = '&sampling sample_rate (now '//fixed(history%sample_rate, 0)//' Hz)'
-      end if
-   end subroutine get_resolution_keys
-
-   !> The contact time, resolved between steps if possible.
-   pure function get_contact_time(history) result(time)
-      type(force_history_type), intent(in) :: history
-      !> The time, s.
-      real(wp) :: time
-
-      time = merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp)
-   end function get_contact_time
+      text = ''
+      do i = 1, size(resolution_quantities)
+         associate (value => get_model_quantity(history, resolution_quantities(i)))
+            if (value > 0.0_wp) text = text//', '//trim(resolution_quantities(i))//' = '//fixed(value, 0)
+         end associate
+      end do
+      if (text == '') text = ', sample_rate = '//fixed(history%sample_rate, 0)
+      text = text(3:)
+   end function get_resolution
 
 end module thud_refined_drop

@@ -5,15 +5,14 @@ module thud_sampling
    use thud_kinds, only: wp
    use thud_new_field, only: integer_field, logical_field, real_field
    use thud_text, only: to_text
-   use thud_validity_limit, only: validity_limit_type
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields
-   public :: min_contact_samples, sampling_type
+   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, &
+      min_contact_samples, sampling_type
 
    !> Maximum number of samples of a record; more would fill the memory, and no drop needs them.
-   real(wp), parameter :: max_samples = 5.0e6_wp
+   integer, parameter :: max_samples = 5000000
 
    !> Maximum number of integration steps of a record; more would run for minutes.
    real(wp), parameter :: max_steps = 1.0e8_wp
@@ -60,16 +59,16 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> Set if there are too many; the message names the keys, their product and the allowed range.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: samples
+      integer :: samples
 
-      samples = count_samples(sampling)
+      samples = get_sample_count(sampling)
       if (samples > max_samples) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s at sample_rate = ' &
             //to_text(sampling%sample_rate)//' Hz makes '//to_text(samples)//' samples; allowed: up to ' &
             //to_text(max_samples))
-      else if (samples*real(sampling%substeps, wp) > max_steps) then
+      else if (real(samples, wp)*sampling%substeps > max_steps) then
          error = input_error('&sampling: substeps = '//to_text(sampling%substeps)//' with '//to_text(samples) &
-            //' samples makes '//to_text(samples*real(sampling%substeps, wp))//' steps; allowed: up to ' &
+            //' samples makes '//to_text(real(samples, wp)*sampling%substeps)//' steps; allowed: up to ' &
             //to_text(max_steps))
       end if
    end subroutine check_sampling
@@ -87,32 +86,13 @@ contains
          //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
    end subroutine check_contact_samples
 
-   !> Validity limit of levels due to the sampling rate. If a force begins with a jump or a corner, aliasing changes the
-   !> level of the 500 Hz octave by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
-   pure function get_rate_limit(sampling) result(limit)
-      type(sampling_type), intent(in) :: sampling
-      type(validity_limit_type) :: limit
-
-      limit = validity_limit_type('sampling', 'sample_rate in Hz', sampling%sample_rate, lowest=8000.0_wp, &
-         reason='aliasing changes the level at 500 Hz by up to 2 dB', subject='levels hold')
-   end function get_rate_limit
-
-   !> Number of samples of the record.
+   !> Number of samples of the record: one at the beginning of each whole sampling interval.
    pure function get_sample_count(sampling) result(n_sample)
       type(sampling_type), intent(in) :: sampling
-      !> Samples from first touch on, the first one included.
+      !> Samples from first touch on, the first one included; at most 1e8 inside the ranges of the keys.
       integer :: n_sample
 
-      n_sample = int(count_samples(sampling))
+      n_sample = int(sampling%duration*sampling%sample_rate*(1 + rounding))
    end function get_sample_count
-
-   !> Number of whole sampling intervals in the record, each with a sample at its beginning.
-   pure function count_samples(sampling) result(n_sample)
-      type(sampling_type), intent(in) :: sampling
-      !> The number, which may be more than an integer holds.
-      real(wp) :: n_sample
-
-      n_sample = aint(sampling%duration*sampling%sample_rate*(1 + rounding))
-   end function count_samples
 
 end module thud_sampling

@@ -13,11 +13,11 @@ module thud_source_model
    use thud_kinds, only: wp
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
-   use thud_validity_limit, only: get_gravity_limit, get_size_limit, validity_limit_type
+   use thud_validity_limit, only: get_gravity_limit, validity_limit_type
    implicit none (type, external)
    private
 
-   public :: refine_sampling, resolution_type, source_model_type
+   public :: resolution_type, source_model_type
 
    !> A level of resolution, and how the error of a drop at this level follows from its difference from a coarser one. By
    !> default the ratio is somewhat more than the 1/3 of an error that is proportional to the square of the step, as that of
@@ -98,20 +98,21 @@ contains
 
    !> Validity limits of the model for a result; by default those of a source without size and without gravity during the
    !> contact.
-   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, history) result(limits)
       class(source_model_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      type(sampling_type), intent(in) :: sampling
       !> The force.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].
       type(validity_limit_type), allocatable :: limits(:)
 
-      limits = [get_gravity_limit(drop, history), get_size_limit(ball, history)]
+      limits = [get_gravity_limit(drop, history), validity_limit_type('drop', 'deflection over twice outer_radius', &
+         history%max_deflection/(2*ball%outer_radius), highest=1.0_wp, reason='the source is no thicker')]
    end function get_validity_limits
 
-   !> The model and the sampling at a level of resolution; by default `refine_sampling`.
+   !> The model and the sampling at a level of resolution. By default the resolution is that of the input: level 0 has half
+   !> its sampling rate, for the error of samples and steps, and level 2 twice its rate.
    subroutine refine(self, ball, level, coarse, sampling, refined, resolution)
       !> The options of the input, and what the levels share, which level 0 computes.
       class(source_model_type), intent(inout) :: self
@@ -126,22 +127,10 @@ contains
       class(source_model_type), allocatable, intent(out) :: refined
       type(resolution_type), intent(out) :: resolution
 
-      call refine_sampling(level, sampling, resolution)
       allocate (refined, source=self)
-   end subroutine refine
-
-   !> Sampling of models whose resolution is that of the input: level 0 has half its rate, for the error of samples and
-   !> steps, and level 2 twice its rate.
-   subroutine refine_sampling(level, sampling, resolution)
-      !> The level, from 0 to 2.
-      integer, intent(in) :: level
-      type(sampling_type), intent(inout) :: sampling
-      type(resolution_type), intent(out) :: resolution
-
       sampling%sample_rate = sampling%sample_rate*2.0_wp**(level - 1)
-      resolution%lowers_error = level <= 1
-      resolution%reference = level - 1
-   end subroutine refine_sampling
+      resolution = resolution_type(lowers_error=level <= 1, reference=level - 1)
+   end subroutine refine
 
    !> Force on each of two plates in a quasi-static compression; models without one return an error.
    subroutine compress(self, ball, deflection, force, error)

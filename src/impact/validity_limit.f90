@@ -1,6 +1,7 @@
 !> Validity limits of a theory: a quantity, the range in which the theory holds, and the reason. Results outside this range
 !> are computed with a warning.
 module thud_validity_limit
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use thud_ball, only: ball_type, get_density
    use thud_drop, only: drop_type
    use thud_force_history, only: force_history_type
@@ -9,11 +10,10 @@ module thud_validity_limit
    implicit none (type, external)
    private
 
-   public :: get_gravity_limit, get_limit_message, get_size_limit, get_wall_limits, get_wave_limit, is_outside
-   public :: validity_limit_type
+   public :: get_gravity_limit, get_limit_message, get_wall_limits, get_wave_limit, validity_limit_type, warning_length
 
-   !> Length of a message about a limit.
-   integer, parameter :: message_length = 240
+   !> Maximum length of a warning.
+   integer, parameter :: warning_length = 240
 
    !> A validity limit.
    type :: validity_limit_type
@@ -31,21 +31,15 @@ module thud_validity_limit
 
 contains
 
-   !> Whether the quantity lies outside the range.
-   pure function is_outside(limit) result(yes)
-      type(validity_limit_type), intent(in) :: limit
-      logical :: yes
-
-      ! Written so that NaN is outside too.
-      yes = .not. (limit%value >= limit%lowest .and. limit%value <= limit%highest)
-   end function is_outside
-
-   !> Message about a quantity outside the range.
+   !> Message about a quantity outside the range; blank if it is inside.
    pure function get_limit_message(limit) result(message)
       type(validity_limit_type), intent(in) :: limit
-      character(len=message_length) :: message
+      character(len=warning_length) :: message
       logical :: below
 
+      message = ''
+      ! NaN is outside.
+      if (limit%value >= limit%lowest .and. limit%value <= limit%highest) return
       below = limit%value < limit%lowest
       message = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
          //', '//trim(limit%subject)//' '//trim(merge('from ', 'up to', below))//' ' &
@@ -60,7 +54,7 @@ contains
 
       if (.not. abs(value) < 1.0e300_wp) then
          ! A quotient may overflow; messages do not print Infinity.
-         text = 'beyond 1e300'
+         text = merge('unknown     ', 'beyond 1e300', ieee_is_nan(value))
          return
       end if
       write (text, '(es24.2e3)') value
@@ -79,16 +73,6 @@ contains
          reason='gravity acts before first touch only')
    end function get_gravity_limit
 
-   !> Limit of models that do not know the size of the source.
-   pure function get_size_limit(ball, history) result(limit)
-      type(ball_type), intent(in) :: ball
-      type(force_history_type), intent(in) :: history
-      type(validity_limit_type) :: limit
-
-      limit = validity_limit_type('drop', 'deflection over twice outer_radius', &
-         history%max_deflection/(2*ball%outer_radius), highest=1.0_wp, reason='the source is no thicker')
-   end function get_size_limit
-
    !> Limit of the velocity at first touch, as a fraction of the velocity of waves in the wall.
    pure function get_wave_limit(ball, history, highest) result(limit)
       type(ball_type), intent(in) :: ball
@@ -102,33 +86,24 @@ contains
          reason='it is the order of the strain of the wall')
    end function get_wave_limit
 
-   !> Limit of models of linear bending (docs/levels.md). The effective modulus of thick walls, such as that of the standard
-   !> ball, includes what they neglect.
-   pure function get_bending_limit(ball, history) result(limit)
-      type(ball_type), intent(in) :: ball
-      type(force_history_type), intent(in) :: history
-      type(validity_limit_type) :: limit
-      !> Ratio of thickness to outer radius below which a wall is thin.
-      real(wp), parameter :: thin_wall = 0.3_wp
-
-      limit = validity_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/ball%wall_thickness, &
-         highest=2.0_wp, reason='a wall that is pressed further buckles inwards')
-      if (ball%wall_thickness >= thin_wall*ball%outer_radius) return
-      limit%highest = 0.5_wp
-      limit%reason = 'linear bending makes a thin wall too stiff: levels are up to 9 dB off those of finite elements'
-   end function get_bending_limit
-
-   !> Limits of models of an elastic wall that stays close to the sphere: [4].
+   !> Limits of models of an elastic wall that stays close to the sphere: [5].
    pure function get_wall_limits(ball, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
-      type(validity_limit_type) :: limits(4)
+      type(validity_limit_type) :: limits(5)
+      !> Ratio of thickness to outer radius from which on the effective modulus of a wall, as that of the standard ball,
+      !> includes what linear bending neglects (docs/levels.md).
+      real(wp), parameter :: thick_wall = 0.3_wp
 
       associate (radius => ball%outer_radius, wall => ball%wall_thickness)
          limits = [ &
             validity_limit_type('drop', 'deflection over outer_radius', history%max_deflection/radius, highest=0.5_wp, &
             reason='the wall outside the contact stays spherical'), &
-            get_bending_limit(ball, history), &
+            validity_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, &
+            highest=merge(huge(1.0_wp), 0.5_wp, wall >= thick_wall*radius), &
+            reason='linear bending makes a thin wall too stiff: levels are up to 9 dB off those of finite elements'), &
+            validity_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, highest=2.0_wp, &
+            reason='a wall that is pressed further buckles inwards'), &
             get_wave_limit(ball, history, 0.25_wp), &
             validity_limit_type('ball', 'stress of the wall by gauge_pressure over youngs_modulus', &
             ball%gauge_pressure*(radius - wall)/(2*wall*ball%youngs_modulus), highest=0.1_wp, &

@@ -157,11 +157,11 @@ FINE_MESH = {"radial_elements": 4, "polar_elements": 34}
 RESOLUTIONS = {
     "&model name = 'finite_element' / &mesh radial_elements = 3, polar_elements = 24 /": (
         ("radial elements 3", "polar elements 24"),
-        "&mesh radial_elements, polar_elements (now 3 x 24)", FINE_MESH,
+        "raise the resolution, now radial_elements = 3, polar_elements = 24", FINE_MESH,
     ),
     "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
         ("rings 10", "highest frequency 300.0 Hz", "substeps 1"),
-        "&modal_ball rings, highest_frequency (now 10, 300 Hz)",
+        "raise the resolution, now rings = 10, highest_frequency = 300",
         {"rings": 14, "highest_frequency": 1960.0},
     ),
     "&model name = 'modal_ball' /": (

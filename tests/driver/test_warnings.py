@@ -23,7 +23,7 @@ DOUBTFUL = {
     naming("&ball: youngs_modulus", "Pa", 1.6, "10000.0"):
     "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
     " &sampling duration = 10, sample_rate = 2000 / &model name = 'hollow_sphere' /",
-    naming("level", "44", "52 dB"): "&drop height = 1e-7 /"
+    naming("&drop: force exposure level", "sources have from", 4.0, "check the units"): "&drop height = 1e-7 /"
     " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
 }  # fmt: skip
 
@@ -90,12 +90,12 @@ OUTSIDE = {
     " gauge_pressure = 3e5 /",
     naming("&drop: gravity", "contact time", "velocity", 0.2): "&drop height = 0.01 /",
     naming("&sampling: sample_rate", 4000.0, 8000.0): "&sampling sample_rate = 4000 /",
-    naming("octaves", "63 Hz", "1e-12"): "&drop height = 10 / &sampling"
+    naming("&levels: smallest fraction", "octave", "1.0e-12"): "&drop height = 10 / &sampling"
     " duration = 2 / &model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 1, exponent = 3 /",
-    naming("numerical error", "dB", "&mesh", "x 32"): "&drop height = 0.01 /"
+    naming("numerical error", "dB", "polar_elements = 32"): "&drop height = 0.01 /"
     " &ball youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 32 /",
-    naming("numerical error", "dB", "500 Hz", "&modal_ball"): "&model name = 'modal_ball' /"
+    naming("numerical error", "dB", "500 Hz", "rings = 10"): "&model name = 'modal_ball' /"
     " &modal_ball rings = 10, highest_frequency = 300 /",
     naming("&floor: restitution", "-1.0e-6"): "&model name = 'hunt_crossley' /"
     " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"

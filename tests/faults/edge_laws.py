@@ -113,7 +113,7 @@ def _outside(impact: thud.Impact) -> dict[str, bool]:
         "deflection over wall_thickness": linear
         and deep > (0.505 if ball.wall_thickness < 0.3 * radius else 2.01) * ball.wall_thickness,
         "check the units of the input": not 3.9 < total < 92.1,
-        "hold less than 1e-12": lowest < total - 120.1,
+        "smallest fraction of the energy in an octave": lowest < total - 120.1,
         "&floor: restitution is": on_floor is not None and on_floor.restitution < -1e-5,
         "&model: restitution minus 1 is": on_floor is not None and on_floor.restitution > 1 + 1e-5,
     }  # fmt: skip

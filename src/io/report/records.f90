@@ -21,7 +21,8 @@ module thud_records
    use thud_source_limits, only: combine_verdicts, criterion_type, get_verdict, verdict_conforms, verdict_fails, &
       verdict_names
    use thud_text, only: to_text
-   use thud_warnings, only: add_floor_warning, add_height_warning, add_modes_warning, warning_length
+   use thud_validity_limit, only: warning_length
+   use thud_warnings, only: add_floor_warnings, add_modes_warning
    implicit none (type, external)
    private
 
@@ -313,8 +314,7 @@ contains
          call bundle%add_text('verdict', trim(judge_requirement(room)))
       end if
       allocate (warnings(0))
-      call add_floor_warning(case, state, warnings)
-      call add_height_warning(case, state, warnings)
+      call add_floor_warnings(case, state, warnings)
       call add_modes_warning(room, warnings)
       call add_warnings(bundle, 'room_warnings', warnings)
    end subroutine add_room_level

@@ -5,9 +5,7 @@ module thud_screen_tables
    use thud_compression, only: compression_type
    use thud_compute, only: get_assessed_force, impact_type, results_type
    use thud_constants, only: version
-   use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
@@ -352,9 +350,8 @@ contains
       character(len=:), allocatable :: rows
       type(band_type) :: octaves(octave_count)
       type(quantity_type) :: quantity, error_quantity
-      type(error_type), allocatable :: error
       character(len=:), allocatable :: line
-      real(wp) :: values(history_quantity_count), level(octave_count)
+      real(wp) :: values(history_quantity_count)
       real(wp) :: value, change, stated
       integer :: i, first
 
@@ -362,8 +359,6 @@ contains
       first = findloc(history%model_quantity_name, finer_quantities(1), dim=1)
       if (first == 0) return
       octaves = get_octaves()
-      call get_force_exposure_levels(history%floor_force, history%sample_rate, octaves, 'exact', level, error)
-      if (allocated(error)) return
       rows = newline//'  at a finer resolution      value          change    stated error'//newline &
          //model_quantity_rows(history, finer_prefix)
       values = get_quantities(history)
@@ -373,7 +368,7 @@ contains
             if (i <= octave_count) then
                quantity = error_quantity
                quantity%title = get_level_title(octaves(i))
-               value = level(i)
+               value = history%octave_level(i)
             else
                quantity = get_quantity(name)
                value = values(findloc(quantities%name, name, dim=1))

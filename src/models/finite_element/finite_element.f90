@@ -284,11 +284,10 @@ contains
    end function get_standard_modulus
 
    !> The limit of the speed of the ball; the error of the mesh is stated by its numerical error.
-   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, history) result(limits)
       class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
 

@@ -85,11 +85,10 @@ contains
    end function get_standard_modulus
 
    !> Limits of the assumptions: a thin shell, a wall that stays close to the sphere, and no gravity during the contact.
-   function get_validity_limits(self, ball, drop, sampling, history) result(limits)
+   function get_validity_limits(self, ball, drop, history) result(limits)
       class(hollow_sphere_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      type(sampling_type), intent(in) :: sampling
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
 
