@@ -8,8 +8,7 @@ module thud_answer
    use thud_directory_answers, only: answer_check_results, answer_close_results, answer_open_results
    use thud_error, only: error_type, input_error
    use thud_floor_answers, only: answer_floor, answer_mobility_fit
-   use thud_level_answers, only: answer_background, answer_levels, answer_low_pass, answer_peak_count, answer_rating, &
-      answer_standardization
+   use thud_level_answers, only: answer_levels, answer_low_pass, answer_peak_count, answer_rating
    use thud_request, only: request_type
    use thud_text, only: quoted
    implicit none (type, external)
@@ -70,10 +69,6 @@ contains
          call answer_low_pass(request, bundle)
       case ('rating')
          call answer_rating(request, bundle)
-      case ('standardization')
-         call answer_standardization(request, bundle)
-      case ('background')
-         call answer_background(request, bundle)
       case default
          error = input_error(quoted(question)//' is no question of the library')
       end select

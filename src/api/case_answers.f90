@@ -138,11 +138,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(column_type), allocatable :: columns(:)
       type(sweep_type), allocatable :: sweep
+      type(text_buffer_type) :: reasons
       character(len=:), allocatable :: keys
       character(len=name_length), allocatable :: names(:)
       character(len=128) :: message
       real(wp), allocatable :: values(:)
-      integer :: status
+      integer :: i, n, status
 
       call request%get_text('keys', keys)
       allocate (names(nint(request%get_number('key_count'))))
@@ -156,18 +157,6 @@ contains
       call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
          merge(1, nint(request%get_number('threads')), is_forked == 1), request%get_number('forces') > 0.0_wp, sweep, error)
       if (allocated(error)) return
-      call add_samples(bundle, sweep)
-      call release_sweep(sweep)
-   end subroutine answer_samples
-
-   !> Adds the results of samples to a bundle.
-   subroutine add_samples(bundle, sweep)
-      type(bundle_type), intent(inout) :: bundle
-      !> The results; the forces are moved out of them.
-      type(sweep_type), intent(inout) :: sweep
-      type(text_buffer_type) :: reasons
-      integer :: i, n
-
       do i = 1, size(sweep%reason)
          if (allocated(sweep%reason(i)%text)) call reasons%append(sweep%reason(i)%text//newline)
       end do
@@ -181,6 +170,7 @@ contains
          i = i + n
       end do
       call bundle%move_array('force', sweep%force)
-   end subroutine add_samples
+      call release_sweep(sweep)
+   end subroutine answer_samples
 
 end module thud_case_answers

@@ -13,8 +13,7 @@ module thud_level_answers
    implicit none (type, external)
    private
 
-   public :: answer_background, answer_levels, answer_low_pass, answer_peak_count, answer_rating
-   public :: answer_standardization
+   public :: answer_levels, answer_low_pass, answer_peak_count, answer_rating
 
 contains
 
@@ -59,46 +58,33 @@ contains
       call bundle%add_array('force', shape(low), low)
    end subroutine answer_low_pass
 
-   !> Single-number ratings of `levels` in a room, dB, in the rated bands of the set `bands`: A-weighted level, the same
-   !> rounded, class (0 for none) and, for octaves, inverse-A curve rating.
+   !> The `levels` in a room, dB, corrected for the levels `background`, dB, and standardized by `reverberation_time`, s, and
+   !> `volume`, m3, if the request has them. In the rated bands of the set `bands`, if it has one, also their single-number
+   !> ratings: A-weighted level, the same rounded, class (0 for none) and, for octaves, inverse-A curve rating.
    subroutine answer_rating(request, bundle)
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
       character(len=:), allocatable :: set
+      real(wp), allocatable :: levels(:)
+      logical, allocatable :: is_upper_bound(:)
       real(wp) :: a_weighted
 
+      levels = request%get_array('levels')
+      if (request%has('background')) then
+         allocate (is_upper_bound(size(levels)))
+         call correct_for_background(request%get_array('levels'), request%get_array('background'), levels, is_upper_bound)
+         call bundle%add_array('is_upper_bound', shape(levels), merge(1.0_wp, 0.0_wp, is_upper_bound))
+      end if
+      if (request%has('volume')) levels = levels + get_standardization(request%get_array('reverberation_time'), &
+         request%get_number('volume'))
+      call bundle%add_array('levels', shape(levels), levels)
       call request%get_text('bands', set)
-      a_weighted = get_a_weighted_level(set, request%get_array('levels'))
+      if (set == '') return
+      a_weighted = get_a_weighted_level(set, levels)
       call bundle%add_number('a_weighted', a_weighted)
       call bundle%add_number('rounded', real(get_rounded(a_weighted), wp))
       call bundle%add_number('class', real(get_class(a_weighted), wp))
-      if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(request%get_array('levels')), wp))
+      if (set == octave_set) call bundle%add_number('curve', real(get_inverse_a_rating(levels), wp))
    end subroutine answer_rating
-
-   !> `levels`, dB, of a room with `reverberation_time`, s, and `volume`, m3, standardized to the reference room.
-   subroutine answer_standardization(request, bundle)
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-
-      associate (levels => request%get_array('levels'))
-         call bundle%add_array('levels', shape(levels), levels &
-            + get_standardization(request%get_array('reverberation_time'), request%get_number('volume')))
-      end associate
-   end subroutine answer_standardization
-
-   !> `levels`, dB, corrected for the levels `background`, dB, and whether a corrected level is only an upper bound.
-   subroutine answer_background(request, bundle)
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      real(wp), allocatable :: corrected(:)
-      logical, allocatable :: is_upper_bound(:)
-
-      associate (levels => request%get_array('levels'))
-         allocate (corrected(size(levels)), is_upper_bound(size(levels)))
-         call correct_for_background(levels, request%get_array('background'), corrected, is_upper_bound)
-      end associate
-      call bundle%add_array('levels', shape(corrected), corrected)
-      call bundle%add_array('is_upper_bound', shape(corrected), merge(1.0_wp, 0.0_wp, is_upper_bound))
-   end subroutine answer_background
 
 end module thud_level_answers

@@ -3,7 +3,6 @@ module thud_warnings
    use thud_ball, only: ball_type, get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type, get_active_fields, get_model_number, get_unstated_fields
-   use thud_error, only: error_type
    use thud_field, only: field_type, key_length
    use thud_floor_model, only: floor_state_type
    use thud_force_history, only: force_history_type

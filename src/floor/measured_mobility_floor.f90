@@ -10,7 +10,7 @@ module thud_measured_mobility_floor
    use thud_passivity, only: find_violations
    use thud_plate, only: get_plate_fields, plate_type
    use thud_plate_floor, only: plate_floor_type
-   use thud_receiver, only: get_conductance, receiver_type
+   use thud_receiver, only: get_mobility, receiver_type
    use thud_text, only: to_text
    implicit none (type, external)
    private

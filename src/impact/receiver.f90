@@ -10,9 +10,8 @@ module thud_receiver
    implicit none (type, external)
    private
 
-   public :: advance_receiver, can_strike, get_conductance, get_mobility, get_real_sum
-   public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
-   public :: receiver_step_type, receiver_type
+   public :: advance_receiver, can_strike, get_mobility, get_real_sum, get_receiver_velocity, is_rigid
+   public :: new_receiver_motion, new_receiver_step, receiver_motion_type, receiver_step_type, receiver_type
 
    !> Magnitude of pole times step below which series replace the closed forms.
    real(wp), parameter :: small = 0.05_wp
@@ -61,15 +60,6 @@ contains
       if (allocated(receiver%residue)) rigid = rigid .and. .not. any(abs(receiver%residue) > 0.0_wp)
    end function is_rigid
 
-   !> Number of poles.
-   pure function get_pole_count(receiver) result(n_pole)
-      type(receiver_type), intent(in) :: receiver
-      integer :: n_pole
-
-      n_pole = 0
-      if (allocated(receiver%pole)) n_pole = size(receiver%pole)
-   end function get_pole_count
-
    !> Mobility of the point under the source: velocity divided by force.
    pure function get_mobility(receiver, frequency) result(mobility)
       type(receiver_type), intent(in) :: receiver
@@ -91,25 +81,13 @@ contains
       end do
    end function get_mobility
 
-   !> Real part of the mobility: power into the receiver per mean-square force.
-   pure function get_conductance(receiver, frequency) result(conductance)
-      type(receiver_type), intent(in) :: receiver
-      !> Frequencies, Hz: [n].
-      real(wp), intent(in) :: frequency(:)
-      !> The conductance, m/(N s): [n].
-      real(wp) :: conductance(size(frequency))
-
-      conductance = real(get_mobility(receiver, frequency), wp)
-   end function get_conductance
-
    !> A receiver at rest.
    pure function new_receiver_motion(receiver) result(motion)
       type(receiver_type), intent(in) :: receiver
       type(receiver_motion_type) :: motion
-      integer :: n
 
-      n = get_pole_count(receiver)
-      allocate (motion%amplitude(n), source=(0.0_wp, 0.0_wp))
+      allocate (motion%amplitude(0))
+      if (allocated(receiver%pole)) motion%amplitude = spread((0.0_wp, 0.0_wp), 1, size(receiver%pole))
    end function new_receiver_motion
 
    !> Coefficients of steps of one length.
@@ -121,7 +99,8 @@ contains
       complex(wp) :: z
       integer :: k, n
 
-      n = get_pole_count(receiver)
+      n = 0
+      if (allocated(receiver%pole)) n = size(receiver%pole)
       step%interval = interval
       allocate (step%decay(n), step%gain(n), step%travel(n))
       do k = 1, n

@@ -227,7 +227,7 @@ class RoomLevels(Displayed):
     def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
-        result = ask("background", levels=self.measured, background=self.background)
+        result = ask("rating", levels=self.measured, background=self.background)
         return result["levels"], result["is_upper_bound"].astype(bool)
 
 

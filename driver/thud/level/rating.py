@@ -301,9 +301,7 @@ def standardized_level(
         )
     if (times <= 0).any():
         refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
-    answer = ask(
-        "standardization", levels=values, reverberation_time=times, volume=require_volume(volume)
-    )
+    answer = ask("rating", levels=values, reverberation_time=times, volume=require_volume(volume))
     return np.asarray(answer["levels"])
 
 
