@@ -13,50 +13,43 @@ module thud_level_answers
    implicit none (type, external)
    private
 
-   public :: answer_levels, answer_low_pass, answer_peak_count, answer_rating
+   public :: answer_level
 
 contains
 
-   !> Force exposure levels, dB, of the history `force`, N, at `sample_rate`, Hz, in the band set `bands`, by `method`.
-   subroutine answer_levels(request, bundle, error)
+   !> Answers a question on a record `force`, N, at `sample_rate`, Hz, or on levels in a room.
+   subroutine answer_level(question, request, bundle, error)
+      !> `levels`: force exposure levels, dB, in the band set `bands`, by `method`; `peak_count`: number of peaks; `low_pass`:
+      !> the record low-passed at `cutoff`, Hz; `rating`: see `answer_rating`.
+      character(len=*), intent(in) :: question
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
       !> Set if a level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(band_type), allocatable :: bands(:)
       character(len=:), allocatable :: set, method
-      real(wp), allocatable :: levels(:)
+      real(wp), allocatable :: values(:)
 
-      call request%get_text('bands', set)
-      call request%get_text('method', method)
-      bands = get_bands(set)
-      allocate (levels(size(bands)))
-      call get_force_exposure_levels(request%get_array('force'), request%get_number('sample_rate'), bands, method, &
-         levels, error)
-      if (.not. allocated(error)) call bundle%add_array('levels', shape(levels), levels)
-   end subroutine answer_levels
-
-   !> Number of peaks of the history `force`, N, at `sample_rate`, Hz.
-   subroutine answer_peak_count(request, bundle)
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-
-      call bundle%add_number('peak_count', real(get_peak_count(request%get_array('force'), &
-         request%get_number('sample_rate')), wp))
-   end subroutine answer_peak_count
-
-   !> The history `force`, N, at `sample_rate`, Hz, low-passed at `cutoff`, Hz.
-   subroutine answer_low_pass(request, bundle)
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      real(wp), allocatable :: low(:)
-
-      associate (force => request%get_array('force'))
-         allocate (low(size(force)))
-         call get_low_pass(force, request%get_number('sample_rate'), request%get_number('cutoff'), low)
+      associate (force => request%get_array('force'), sample_rate => request%get_number('sample_rate'))
+         select case (question)
+         case ('levels')
+            call request%get_text('bands', set)
+            call request%get_text('method', method)
+            bands = get_bands(set)
+            allocate (values(size(bands)))
+            call get_force_exposure_levels(force, sample_rate, bands, method, values, error)
+            if (.not. allocated(error)) call bundle%add_array('levels', shape(values), values)
+         case ('peak_count')
+            call bundle%add_number('peak_count', real(get_peak_count(force, sample_rate), wp))
+         case ('low_pass')
+            allocate (values(size(force)))
+            call get_low_pass(force, sample_rate, request%get_number('cutoff'), values)
+            call bundle%add_array('force', shape(values), values)
+         case default
+            call answer_rating(request, bundle)
+         end select
       end associate
-      call bundle%add_array('force', shape(low), low)
-   end subroutine answer_low_pass
+   end subroutine answer_level
 
    !> The `levels` in a room, dB, corrected for the levels `background`, dB, and standardized by `reverberation_time`, s, and
    !> `volume`, m3, if the request has them. In the rated bands of the set `bands`, if it has one, also their single-number

@@ -96,7 +96,7 @@ contains
       if (failed) then
          error = numerical_error('&measured_mobility: the zeros of the real part were not found')
       else if (size(omega) > 0) then
-         conductance = get_conductance(receiver, omega/(2*pi))
+         conductance = real(get_mobility(receiver, omega/(2*pi)), wp)
          i = minloc(conductance, dim=1)
          error = input_error('&measured_mobility: the real part of the mobility is '//to_text(conductance(i)) &
             //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
