@@ -9,7 +9,8 @@ module thud_request
 
    !> Texts and arrays, each with its name.
    type :: request_type
-      !> One line per item: its name, a tab, and `t` with the length of a text or `n` with the number of values.
+      !> One line per item: its name, a tab, and, of its characters in `text` or its numbers in `values`, the index of the
+      !> first and how many there are.
       character(len=:), allocatable :: header
       !> All texts, concatenated.
       character(len=:), allocatable :: text
@@ -40,7 +41,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
       integer :: first, length
 
-      call find(self, name, 't', first, length)
+      call find(self, name, first, length)
       text = self%text(first:first + length - 1)
    end subroutine get_text
 
@@ -53,7 +54,7 @@ contains
       real(wp) :: number
       integer :: first, length
 
-      call find(self, name, 'n', first, length)
+      call find(self, name, first, length)
       number = 0.0_wp
       if (present(default)) number = default
       if (length > 0) number = self%values(first)
@@ -67,34 +68,23 @@ contains
       real(wp), pointer, contiguous :: values(:)
       integer :: first, length
 
-      call find(self, name, 'n', first, length)
+      call find(self, name, first, length)
       values => self%values(first:first + length - 1)
    end function get_array
 
    !> Finds an item in the texts or in the values.
-   pure subroutine find(self, name, kind, first, length)
+   pure subroutine find(self, name, first, length)
       type(request_type), intent(in) :: self
       character(len=*), intent(in) :: name
-      !> `t` or `n`.
-      character(len=1), intent(in) :: kind
       !> Index of its first character or value, and their number; `length` is 0 if there is no such item.
       integer, intent(out) :: first, length
-      integer :: begin, middle, end, count
+      integer :: begin
 
       first = 1
       length = 0
-      begin = 1
-      do while (begin <= len(self%header))
-         middle = begin + index(self%header(begin:), tab) - 1
-         end = begin + index(self%header(begin:), newline) - 1
-         if (self%header(middle + 1:middle + 1) == kind) then
-            read (self%header(middle + 2:end - 1), *) count
-            if (self%header(begin:middle - 1) == name) length = count
-            if (self%header(begin:middle - 1) == name) return
-            first = first + count
-         end if
-         begin = end + 1
-      end do
+      if (.not. self%has(name)) return
+      begin = index(newline//self%header, newline//name//tab) + len(name//tab)
+      read (self%header(begin:begin + index(self%header(begin:), newline) - 2), *) first, length
    end subroutine find
 
 end module thud_request

@@ -60,11 +60,11 @@ def _packed(
     for name, value in request.items():
         if isinstance(value, str | bytes):
             encoded = value.encode(errors="surrogateescape") if isinstance(value, str) else value
-            header += f"{name}\tt{len(encoded)}\n"
+            header += f"{name}\t{len(texts) + 1} {len(encoded)}\n"
             texts += encoded
         else:
             size = value.size if isinstance(value, np.ndarray) else 1
-            header += f"{name}\tn{size}\n"
+            header += f"{name}\t{count + 1} {size}\n"
             arrays.append((slice(count, count + size), value))
             count += size
     values = np.zeros(max(1, count))  # f2py does not pass empty arrays

@@ -141,10 +141,11 @@ contains
       do k = 1, motion%n_frame
          do j = 1, size(motion%start, 2)
             do i = 1, size(motion%start, 1)
-               row = [motion%time(k), real(i, wp), real(j, wp), motion%start(i - 1, j - 1, :), &
-                  motion%position(i - 1, j - 1, :, k), motion%velocity(i - 1, j - 1, :, k), &
-                  motion%contact_pressure(i - 1, k), motion%contact_shear(i - 1, k), motion%cavity_pressure(k), &
-                  motion%floor_displacement(k)]
+               associate (snapshot => motion%snapshot(k))
+                  row = [snapshot%time, real(i, wp), real(j, wp), motion%start(i - 1, j - 1, :), &
+                     snapshot%position(i - 1, j - 1, :), snapshot%velocity(i - 1, j - 1, :), &
+                     snapshot%contact_stress(i, [2, 1]), snapshot%cavity_pressure, snapshot%floor_displacement]
+               end associate
                if (j < size(motion%start, 2)) row(10:11) = 0.0_wp
                at = at + 1
                rows(at, :) = row

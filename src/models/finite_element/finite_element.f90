@@ -21,7 +21,7 @@ module thud_finite_element
       material_type, new_material
    use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, get_nodal_areas, mesh_options_type, mesh_type, &
       min_radial, new_mesh
-   use thud_motion, only: start_motion, take_snapshot
+   use thud_motion, only: snapshot_type
    use thud_new_field, only: in_group, integer_field, real_field
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
@@ -401,7 +401,8 @@ contains
       history%touch_time = self%flight_before
       if (self%snapshot_interval > 0.0_wp) then
          allocate (history%motion)
-         call start_motion(run%position, get_frame_count(self, sampling), history%motion)
+         allocate (history%motion%start, source=run%position)
+         allocate (history%motion%snapshot(get_frame_count(self, sampling)))
       end if
       call march(self, run, contacts, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
@@ -454,11 +455,14 @@ contains
                call record_sample(run, i, history)
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
-               associate (r => run%position(:, last, 1), z => run%position(:, last, 2))
-                  if (allocated(history%motion) .and. mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, &
-                     run%position, run%velocity, run%node_impulse/interval/spread(get_nodal_areas(r, z), 2, 2), &
-                     run%state%gas_pressure, run%floor%displacement)
-               end associate
+               if (allocated(history%motion) .and. mod(i - 1, stride) == 0) then
+                  associate (motion => history%motion, r => run%position(:, last, 1), z => run%position(:, last, 2))
+                     motion%n_frame = motion%n_frame + 1
+                     motion%snapshot(motion%n_frame) = snapshot_type(time, run%position, run%velocity, &
+                        run%node_impulse/interval/spread(get_nodal_areas(r, z), 2, 2), run%state%gas_pressure, &
+                        run%floor%displacement)
+                  end associate
+               end if
                run%node_impulse = 0.0_wp
             end if
             call add_to_means(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), &
