@@ -311,12 +311,16 @@ contains
    subroutine check_name(name, error)
       character(len=*), intent(in) :: name
       type(error_type), allocatable, intent(out) :: error
+      !> Devices of Windows, which has no files of these names, whatever their extension.
+      character(len=*), parameter :: devices = '/con/prn/aux/nul/com1/com2/com3/com4/com5/com6/com7/com8/com9' &
+         //'/lpt1/lpt2/lpt3/lpt4/lpt5/lpt6/lpt7/lpt8/lpt9/'
       logical :: usable
       integer :: i
 
       usable = name(1:1) /= ' ' .and. scan(name, '/\:*?"<>|') == 0 &
          .and. scan(trim(name), '.', back=.true.) < len_trim(name) &
-         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name) .and. .not. is_device(name)
+         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name) &
+         .and. index(devices, '/'//trim(lower_case(name(:index(name//'.', '.') - 1)))//'/') == 0
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
             //' characters, without it the name of the file')
@@ -326,16 +330,5 @@ contains
             //'period at its end, and not that of a device of Windows, such as con')
       end if
    end subroutine check_name
-
-   !> Whether Windows has a device of this name, and so no file, whatever its extension is.
-   pure function is_device(name) result(yes)
-      character(len=*), intent(in) :: name
-      logical :: yes
-      character(len=:), allocatable :: stem
-
-      stem = lower_case(name(:index(name//'.', '.') - 1))
-      yes = any(stem == [character(len=3) :: 'con', 'prn', 'aux', 'nul'])
-      if (len_trim(stem) == 4) yes = any(stem(:3) == ['com', 'lpt']) .and. scan(stem(4:4), '123456789') == 1
-   end function is_device
 
 end module thud_case

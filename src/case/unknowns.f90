@@ -89,41 +89,34 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(interval_type) :: interval
       character(len=key_length), allocatable :: known(:)
-      character(len=:), allocatable :: allowed, label, suggestion
-      real(wp) :: low, high, value
+      character(len=:), allocatable :: allowed, range, suggestion
+      real(wp) :: value
       integer :: field
 
-      associate (key => unknowns%key%values(i))
-         label = '&unknowns: '
+      associate (key => unknowns%key%values(i), low => unknowns%low%values(i), high => unknowns%high%values(i))
          field = findloc(fields%key == key, .true., dim=1)
          known = pack(fields%key, .not. fields%is_numerical)
          if (.not. any(known == key)) then
             call get_suggestion(trim(key), known, suggestion)
             suggestion = ' is not allowed'//suggestion
             if (field > 0) suggestion = ' belongs to the computation, and its effect is the numerical error'
-            error = input_error(label//'key = '//quoted(key)//suggestion//'; allowed: '//join_quoted(known))
+            error = input_error('&unknowns: key = '//quoted(key)//suggestion//'; allowed: '//join_quoted(known))
          else if (any(unknowns%key%values(:i - 1) == key)) then
-            error = input_error(label//'key = '//quoted(key)//' is given twice; allowed: once')
+            error = input_error('&unknowns: key = '//quoted(key)//' is given twice; allowed: once')
          end if
          if (allocated(error)) return
-         low = unknowns%low%values(i)
-         high = unknowns%high%values(i)
+         range = 'low = '//to_text(low)//' and high = '//to_text(high)
          value = fields(field)%get_number()
          interval = get_interval(fields, field)
          call fields(field)%get_allowed(allowed, interval)
-         if (.not. interval%contains(low)) then
-            error = input_error(label//'low = '//to_text(low)//' of '//trim(key)//' is not allowed; allowed: '//allowed)
-         else if (.not. interval%contains(high)) then
-            error = input_error(label//'high = '//to_text(high)//' of '//trim(key)//' is not allowed; allowed: '//allowed)
+         if (.not. (interval%contains(low) .and. interval%contains(high) .and. low < high)) then
+            error = input_error('&unknowns: '//range//' of '//trim(key)//' are not allowed; allowed: low < high, '//allowed)
          else if (fields(field)%derived_at_zero .and. .not. low > 0.0_wp) then
-            error = input_error(label//'low = '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is derived ' &
+            error = input_error('&unknowns: low = '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is derived ' &
                //'from other keys; allowed: above 0')
-         else if (.not. low < high) then
-            error = input_error(label//'low = '//to_text(low)//' and high = '//to_text(high)//' of '//trim(key) &
-               //' are not allowed; allowed: low < high')
          else if (value < low .or. value > high) then
-            error = input_error(label//'the value of the case, '//trim(key)//' = '//to_text(value) &
-               //', is outside low = '//to_text(low)//' and high = '//to_text(high)//'; allowed: a range that holds it')
+            error = input_error('&unknowns: the value of the case, '//trim(key)//' = '//to_text(value)//', is outside ' &
+               //range//'; allowed: a range that holds it')
          end if
       end associate
    end subroutine check_unknown
