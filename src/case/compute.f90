@@ -118,9 +118,7 @@ contains
       type(impact_type), intent(out) :: impact
       type(error_type), allocatable, intent(out) :: error
 
-      associate (model => case%models(get_model_number(case))%model)
-         call solve_drop(model, case%ball, case%drop, case%sampling, impact%history, error)
-      end associate
+      call solve_drop(case%models(get_model_number(case))%model, case%ball, case%drop, case%sampling, impact%history, error)
       if (scope%levels .and. .not. allocated(error)) call assess(case, impact%history, impact%assessment, error)
    end subroutine compute_impact
 
@@ -196,11 +194,10 @@ contains
       type(force_history_type), allocatable, intent(out) :: on_floor
       type(error_type), allocatable, intent(out) :: error
 
-      associate (model => case%models(get_model_number(case))%model)
-         if (is_rigid(state%receiver)) return
-         allocate (on_floor)
-         call solve_drop(model, case%ball, case%drop, case%sampling, on_floor, error, state%receiver)
-      end associate
+      if (is_rigid(state%receiver)) return
+      allocate (on_floor)
+      call solve_drop(case%models(get_model_number(case))%model, case%ball, case%drop, case%sampling, on_floor, error, &
+         state%receiver)
       ! A model that ignores the receiver has computed the drop on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor

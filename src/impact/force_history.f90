@@ -10,7 +10,7 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: add_model_quantity, add_to_means, check_samples, clear_flight, continue_to_zero, force_count, force_history_type
+   public :: add_model_quantity, add_to_means, check_samples, continue_to_zero, force_count, force_history_type
    public :: force_names, get_model_quantity, holds_impulse, max_residual, new_force_history, numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
@@ -130,18 +130,6 @@ contains
       error = input_error('&sampling: sample_rate = '//to_text(history%sample_rate)//' Hz misses the force: its samples ' &
          //'hold an impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
    end subroutine check_samples
-
-   !> Sets the samples of the motion after the last contact to zero.
-   pure subroutine clear_flight(history)
-      !> The history, with its contact time.
-      type(force_history_type), intent(inout) :: history
-      integer :: last
-
-      last = floor(history%contact_time*history%sample_rate) + 1
-      history%deflection(last + 1:) = 0.0_wp
-      history%velocity(last + 1:) = 0.0_wp
-      if (allocated(history%model_history)) history%model_history(last + 1:, :) = 0.0_wp
-   end subroutine clear_flight
 
    !> Adds the integral of a quantity over a part of a sampling interval to the means of the samples before and after it.
    pure subroutine add_to_means(integral, interval, i, fraction, mean)

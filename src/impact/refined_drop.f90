@@ -20,7 +20,7 @@ module thud_refined_drop
    implicit none (type, external)
    private
 
-   public :: finer_prefix, finer_quantities, get_resolution, max_error, resolution_quantities, solve_drop
+   public :: finer_prefix, finer_quantities, get_resolution, max_error, solve_drop
 
    !> Error of an octave level above which a finer resolution is tried, dB.
    real(wp), parameter :: max_error = 0.2_wp

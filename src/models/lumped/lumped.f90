@@ -7,7 +7,7 @@ module thud_lumped
       take_coupled_step
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: add_model_quantity, check_samples, clear_flight, force_history_type, max_residual, &
+   use thud_force_history, only: add_model_quantity, check_samples, force_history_type, max_residual, &
       new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
@@ -476,7 +476,12 @@ contains
       real(wp) :: energy, momentum
       integer :: n
 
-      call clear_flight(history)
+      ! After the last contact the samples show no motion.
+      associate (first => floor(history%contact_time*history%sample_rate) + 2)
+         history%deflection(first:) = 0.0_wp
+         history%velocity(first:) = 0.0_wp
+         if (allocated(history%model_history)) history%model_history(first:, :) = 0.0_wp
+      end associate
       if (impact%is_mobile) then
          history%floor_work = impact%motion%work
          history%peak_force = impact%peak_force
