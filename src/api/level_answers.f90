@@ -19,8 +19,8 @@ contains
 
    !> Answers a question on a record `force`, N, at `sample_rate`, Hz, or on levels in a room.
    subroutine answer_level(question, request, bundle, error)
-      !> `levels`: force exposure levels, dB, in the band set `bands`, by `method`; `peak_count`: number of peaks; `low_pass`:
-      !> the record low-passed at `cutoff`, Hz; `rating`: see `answer_rating`.
+      !> `levels`: force exposure levels, dB, in the band set `bands`, by `method`; `peak_count`: number of peaks;
+      !> `low_pass`: the record low-passed at `cutoff`, Hz; `rating`: see `answer_rating`.
       character(len=*), intent(in) :: question
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle

@@ -112,8 +112,8 @@ contains
          if (.not. (interval%contains(low) .and. interval%contains(high) .and. low < high)) then
             error = input_error('&unknowns: '//range//' of '//trim(key)//' are not allowed; allowed: low < high, '//allowed)
          else if (fields(field)%derived_at_zero .and. .not. low > 0.0_wp) then
-            error = input_error('&unknowns: low = '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is derived ' &
-               //'from other keys; allowed: above 0')
+            error = input_error('&unknowns: low = '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is ' &
+               //'derived from other keys; allowed: above 0')
          else if (value < low .or. value > high) then
             error = input_error('&unknowns: the value of the case, '//trim(key)//' = '//to_text(value)//', is outside ' &
                //range//'; allowed: a range that holds it')

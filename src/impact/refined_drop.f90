@@ -112,8 +112,8 @@ contains
       type(force_history_type), intent(inout) :: history
       type(error_type), allocatable :: error
 
-      call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', history%octave_level, &
-         error)
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', &
+         history%octave_level, error)
       if (allocated(error)) history%octave_level = not_a_number
       if (.not. history%exact_contact_time > 0.0_wp) history%exact_contact_time = history%contact_time
    end subroutine complete

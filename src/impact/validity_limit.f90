@@ -90,7 +90,7 @@ contains
    pure function get_wall_limits(ball, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(force_history_type), intent(in) :: history
-      type(validity_limit_type) :: limits(5)
+      type(validity_limit_type), allocatable :: limits(:)
       !> Ratio of thickness to outer radius from which on the effective modulus of a wall, as that of the standard ball,
       !> includes what linear bending neglects (docs/levels.md).
       real(wp), parameter :: thick_wall = 0.3_wp

@@ -23,7 +23,7 @@ DOUBTFUL = {
     naming("&ball: youngs_modulus", "Pa", 1.6, "10000.0"):
     "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
     " &sampling duration = 10, sample_rate = 2000 / &model name = 'hollow_sphere' /",
-    naming("&drop: force exposure level", "sources have from", 4.0, "check the units"): "&drop height = 1e-7 /"
+    naming("&drop: force exposure level", "sources have", 4.0, "units"): "&drop height = 1e-7 /"
     " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
 }  # fmt: skip
 
