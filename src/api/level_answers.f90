@@ -62,7 +62,7 @@ contains
       logical, allocatable :: is_upper_bound(:)
       real(wp) :: a_weighted
 
-      levels = request%get_array('levels')
+      allocate (levels, source=request%get_array('levels'))
       if (request%has('background')) then
          allocate (is_upper_bound(size(levels)))
          call correct_for_background(request%get_array('levels'), request%get_array('background'), levels, is_upper_bound)

@@ -66,17 +66,18 @@ contains
       type(sampling_type) :: refined_sampling
       type(resolution_type) :: resolution
       real(wp) :: min_error(octave_count)
-      integer :: level
+      integer :: coarser, level
       logical :: is_fine, is_verification
 
       allocate (shared, source=model)
       is_fine = .false.
       do level = 0, max_level
+         coarser = max(level - 1, 0)
          refined_sampling = sampling
-         call shared%refine(ball, level, drops(max(level - 1, 0)), refined_sampling, refined, resolution)
+         call shared%refine(ball, level, drops(coarser), refined_sampling, refined, resolution)
          is_verification = is_fine .or. .not. resolution%lowers_error
          ! The error is not known if the coarsest resolution fails and there is one level.
-         if (is_verification .and. drops(max(level - 1, 0))%numerical_error%known .and. .not. sampling%verify) exit
+         if (is_verification .and. drops(coarser)%numerical_error%known .and. .not. sampling%verify) exit
          call refined%solve(ball, drop, refined_sampling, drops(level), error, receiver)
          if (allocated(error)) then
             if (level == 1 .or. error%code >= signal_base .or. level == 0 .and. error%has_short_record) return
@@ -90,16 +91,16 @@ contains
          if (level == 0) cycle
          resolution%ratio = max(resolution%ratio, drops(level)%error_ratio)
          if (is_verification) then
-            if (.not. drops(level - 1)%numerical_error%known) call estimate_error(drops(level), 1 + resolution%ratio, &
-               min_error, drops(level - 1))
-            if (sampling%verify) call add_verification(drops(level), drops(level - 1))
+            if (.not. drops(coarser)%numerical_error%known) call estimate_error(drops(level), 1 + resolution%ratio, &
+               min_error, drops(coarser))
+            if (sampling%verify) call add_verification(drops(level), drops(coarser))
             exit
          end if
          if (allocated(drops(resolution%reference)%floor_force)) call estimate_error(drops(resolution%reference), &
             resolution%ratio, resolution%min_error, drops(level))
          min_error = resolution%min_error
          if (drops(level)%numerical_error%known) is_fine = maxval(drops(level)%numerical_error%octave) <= max_error
-         if (allocated(drops(level - 1)%motion)) deallocate (drops(level - 1)%motion)
+         if (allocated(drops(coarser)%motion)) deallocate (drops(coarser)%motion)
       end do
       ! A copy of the snapshots would take their memory twice.
       call move_alloc(drops(level - 1)%motion, motion)
