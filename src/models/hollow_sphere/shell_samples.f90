@@ -176,8 +176,18 @@ contains
       impacts%shell%weight = compression_weights(samples(1)%flux)
       impacts%restitution_weight = restitution_weights(samples(1)%flux)
       do i = 1, block_size
-         ! Lanes without a sample repeat the last one.
-         call initialize_ball(impacts, i, samples(min(i, size(samples))), step)
+         ! Lanes without a sample repeat the last one; `thud_shell_series` states the units.
+         associate (sample => samples(min(i, size(samples))), shell => impacts%shell)
+            associate (ball => sample%ball, pressure_unit => 2*pi*sample%ball%outer_radius*step**2/sample%ball%mass)
+               shell%stiffness(i) = get_shell_stiffness(ball)*step**2/ball%mass
+               shell%gas_pressure(i) = pressure_unit*(ball%ambient_pressure + ball%gauge_pressure)
+               shell%air_pressure(i) = pressure_unit*ball%ambient_pressure
+               shell%exponent(i) = -ball%heat_capacity_ratio
+               shell%closing(i) = (ball%outer_radius - ball%wall_thickness)/ball%outer_radius
+               impacts%impact_velocity(i) = get_impact_velocity(sample%drop)*step/(2*ball%outer_radius)
+               shell%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
+            end associate
+         end associate
       end do
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, n_written)
       sampled = sum(force(block_size + 1:, :n_written), dim=2)/sampling%sample_rate
@@ -194,27 +204,5 @@ contains
          end associate
       end do
    end subroutine solve_block
-
-   !> Sets equation and initial values of one ball; see `thud_shell_series` for the units.
-   pure subroutine initialize_ball(impacts, i, sample, step)
-      type(impact_batch_type), intent(inout) :: impacts
-      !> Index of the ball.
-      integer, intent(in) :: i
-      type(sample_type), intent(in) :: sample
-      !> The step, s.
-      real(wp), intent(in) :: step
-      real(wp) :: pressure_unit
-
-      associate (ball => sample%ball, shell => impacts%shell)
-         pressure_unit = 2*pi*ball%outer_radius*step**2/ball%mass
-         shell%stiffness(i) = get_shell_stiffness(ball)*step**2/ball%mass
-         shell%gas_pressure(i) = pressure_unit*(ball%ambient_pressure + ball%gauge_pressure)
-         shell%air_pressure(i) = pressure_unit*ball%ambient_pressure
-         shell%exponent(i) = -ball%heat_capacity_ratio
-         shell%closing(i) = (ball%outer_radius - ball%wall_thickness)/ball%outer_radius
-         impacts%impact_velocity(i) = get_impact_velocity(sample%drop)*step/(2*ball%outer_radius)
-         shell%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
-      end associate
-   end subroutine initialize_ball
 
 end module thud_shell_samples
