@@ -1,7 +1,7 @@
-!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation, steps and checks as
+!> Many drops of `thud_hollow_sphere`, a block of balls at a time: the same equation and steps as
 !> `solve_hollow_sphere`. The values agree to 1e-10; the impulse agrees to the residual of its balance.
 !>
-!> Samples that cannot be computed are NaN and do not affect others.
+!> Samples that cannot be computed, or whose balances must be checked, are NaN and do not affect others.
 module thud_shell_samples
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_sizeof
    use thud_ball, only: ball_type, get_ball_fields
