@@ -14,8 +14,7 @@ module thud_floor_answers
    use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances, get_total_energy
    use thud_kinds, only: wp
-   use thud_measured_mobility_floor, only: measured_mobility_floor_type
-   use thud_mobility_fit, only: fit_mobility
+   use thud_measured_mobility_floor, only: fit_mobility, measured_mobility_floor_type
    use thud_modal_radiation, only: get_modal_radiation, modal_radiation_type
    use thud_modal_room, only: get_modal_room, modal_room_type
    use thud_modes, only: get_mode_values

@@ -311,7 +311,7 @@ def edited(path: Path, line: int, old: str, new: str) -> None:
         (5, "0,0.25,0", "0,0.25,inf", ("line 6", "inf", "column 3", "finite")),
         (5, "0,0.25,0", "0,0.25,", ("line 6", "column 3", "not a number")),
         (5, "0,0.25,0", "0,0.25,0,0", ("line 6", 39, 38)),
-        (5, "0,0.25", "0,0.5", ("rectangular grid", "two are at", 0.5)),
+        (5, "0,0.25", "0,0.5", ("rectangular grid", "one point for each")),
         (5, "0,0.25", "0.1,0.25", ("rectangular grid", "one point for each")),
         (5, "0,0.25,", "# ", ("rectangular grid", 356, 21, 17)),
         (0, "frequency,Hz,", "frequency,Hz,20,", (37, "frequencies", 36)),

@@ -192,24 +192,19 @@ contains
       logical :: is_set(size(x), size(y))
       integer :: i, j, k
 
-      if (size(is_set) /= size(point, 2)) then
-         error = input_error('the points are no rectangular grid: there are '//to_text(size(point, 2))//' with ' &
-            //to_text(size(x))//' values of x and '//to_text(size(y))//' of y; allowed: one point for each pair of x and y')
-         return
-      end if
-      allocate (shape(size(x), size(y), size(point, 1) - 2))
       is_set = .false.
-      do k = 1, size(point, 2)
-         i = minloc(abs(x - point(1, k)), dim=1)
-         j = minloc(abs(y - point(2, k)), dim=1)
-         if (is_set(i, j)) then
-            error = input_error('the points are no rectangular grid: two are at x = '//to_text(point(1, k))//' m, y = ' &
-               //to_text(point(2, k))//' m; allowed: one point for each pair of x and y')
-            return
-         end if
-         is_set(i, j) = .true.
-         shape(i, j, :) = point(3:, k)
-      end do
+      if (size(is_set) == size(point, 2)) then
+         allocate (shape(size(x), size(y), size(point, 1) - 2))
+         do k = 1, size(point, 2)
+            i = minloc(abs(x - point(1, k)), dim=1)
+            j = minloc(abs(y - point(2, k)), dim=1)
+            is_set(i, j) = .true.
+            shape(i, j, :) = point(3:, k)
+         end do
+      end if
+      if (.not. all(is_set)) error = input_error('the points are no rectangular grid: there are ' &
+         //to_text(size(point, 2))//' with '//to_text(size(x))//' values of x and '//to_text(size(y))//' of y; allowed: ' &
+         //'one point for each pair of x and y')
    end subroutine get_shapes
 
    !> Coordinates of a grid, ascending.
