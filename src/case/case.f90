@@ -12,7 +12,8 @@ module thud_case
    use thud_new_field, only: choice_field, in_group, text_field
    use thud_plate, only: plate_type
    use thud_rectangular_floor, only: rectangular_floor_type
-   use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
+   use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, &
+      new_models
    use thud_room, only: check_below_subceiling, check_room, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names

@@ -33,8 +33,10 @@ module thud_floor_model
       character(len=key_length) :: group = ''
       !> Mobility under the source.
       type(receiver_type) :: receiver
-      !> Relative position of the source along length and width, and resistance of the infinite floor there, N s/m.
-      real(wp) :: source(2) = 0.5_wp, resistance = 0.0_wp
+      !> Relative position of the source along length and width.
+      real(wp) :: source(2) = 0.5_wp
+      !> Resistance of the infinite floor there, N s/m.
+      real(wp) :: resistance = 0.0_wp
       !> Air around the floor.
       type(air_type) :: air
       !> The bearing plate with homogeneous stiffness; no thickness: nothing radiates into a room.

@@ -29,9 +29,9 @@ contains
 
    !> Frequencies of the negative minima of the real part, one for each interval in which it is negative.
    !>
-   !> In the state space A, b, c, d, here with the poles on a diagonal A, the squares of the frequencies at which the real part vanishes are eigenvalues of
-   !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009). Between two such
-   !> frequencies the sign of the real part does not change.
+   !> In the state space A, b, c, d, here with the poles on a diagonal A, the squares of the frequencies at which the real
+   !> part vanishes are eigenvalues of A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24,
+   !> 2009). Between two such frequencies the sign of the real part does not change.
    subroutine find_violations(pole, residue, direct, omega, failed)
       !> Poles, 1/s, and residues, doubled for pairs: [n].
       complex(wp), intent(in) :: pole(:), residue(:)

@@ -133,12 +133,11 @@ contains
       if (missing /= '') then
          error = input_error('there is no row of '//missing//'; allowed: a table with rows '//trim(labels(1))//' (Hz) and ' &
             //trim(labels(2))//', and a row of x, y (m) and the shapes of all modes for each point')
-         return
       else if (n_point > max_points) then
          error = input_error('the grid has '//to_text(n_point)//' points; allowed: up to '//to_text(max_points) &
             //', of which eight per wavelength are enough')
-         return
       end if
+      if (allocated(error)) return
       point = point(:, :n_point)
       associate (n => size(point, 1) - 2)
          if (.not. allocated(rows(3)%value)) rows(3)%value = spread(1.0_wp, 1, n)
