@@ -4,8 +4,7 @@ module thud_floor_modes
    use thud_error, only: error_type, input_error, numerical_error
    use thud_function_set, only: get_highest_wavenumber
    use thud_kinds, only: wp
-   use thud_mode_mixing, only: diagonalize
-   use thud_modes, only: get_mode_values, get_some_modes, mode_block_type, modes_type
+   use thud_modes, only: diagonalize, get_mode_values, get_some_modes, mode_block_type, modes_type
    use thud_plate, only: air_type, get_total_loss, plate_type
    use thud_plate_stack, only: get_resolved_frequency, has_shear, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type

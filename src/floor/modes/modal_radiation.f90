@@ -14,9 +14,8 @@ module thud_modal_radiation
    use thud_kinds, only: wp
    use thud_lapack, only: dpstrf
    use thud_matrix_product, only: get_product
-   use thud_mode_mixing, only: are_mixed, get_mixed, get_unmixed
-   use thud_modes, only: get_integrals, get_merged_shape, get_mode_values, mode_block_type, modes_type, overlap_type, &
-      product_type, shape_type
+   use thud_modes, only: are_mixed, get_integrals, get_merged_shape, get_mixed, get_mode_values, mode_block_type, &
+      modes_type, overlap_type, product_type, shape_type
    use thud_plate, only: air_type, get_plate_radiation, get_resistance, get_surface_mass, get_total_loss, plate_type
    use thud_wave_transforms, only: get_powers, get_transforms, new_wave_series, transforms_type, wave_series_type
    implicit none (type, external)
@@ -377,8 +376,10 @@ contains
          return
       end if
       ! With the matrix W: W (product * (W' G W)) W', where ' is the conjugate transpose.
-      product = product*get_unmixed(modes%block, conjg(transpose(get_unmixed(modes%block, cmplx(modes%drive, kind=wp)))))
-      response = real(get_mixed(modes%block, conjg(transpose(get_mixed(modes%block, product)))), wp)
+      product = product*get_mixed(modes%block, conjg(transpose( &
+         get_mixed(modes%block, cmplx(modes%drive, kind=wp), is_transposed=.true.))), is_transposed=.true.)
+      response = real(get_mixed(modes%block, conjg(transpose( &
+         get_mixed(modes%block, product, is_transposed=.false.))), is_transposed=.false.), wp)
    end function get_responses
 
 end module thud_modal_radiation

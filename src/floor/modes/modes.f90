@@ -1,13 +1,24 @@
 !> Modes of plates, block after block, and their shapes: sums of products of functions of x and of y.
+!>
+!> Modes of plates whose parts have different losses are sums of the modes without losses. With real modes of unit mass,
+!> stiffness and losses are the matrix A = Omega**2 + i D, where D has terms off the diagonal: a layer transmits force by its
+!> losses, too. A = W diag(pole) transpose(W) with transpose(W) W = 1, and the response to forces f at an angular frequency
+!> omega is W (pole - omega**2)**(-1) transpose(W) f.
 module thud_modes
    use thud_function_set, only: function_set_type, get_functions
    use thud_kinds, only: wp
+   use thud_lapack, only: zgeev
    use thud_matrix_product, only: get_product, get_transposed_product
    implicit none (type, external)
    private
 
-   public :: get_integrals, get_merged_shape, get_mode_sums, get_mode_values, get_some_modes
+   public :: are_mixed, diagonalize, get_integrals, get_merged_shape, get_mixed, get_mode_sums, get_mode_values
+   public :: get_some_modes
    public :: mode_block_type, modes_type, overlap_type, product_type, shape_type
+
+   !> Relative shift of the squared frequencies that separates equal poles; for two equal poles with one shape W does not
+   !> exist.
+   real(wp), parameter :: separation = 1.0e-9_wp
 
    !> Functions of x and y whose products make up a displacement or a rotation.
    type :: product_type
@@ -32,7 +43,7 @@ module thud_modes
       !> if all parts have one loss factor, and if all belong to the bearing plate.
       real(wp), allocatable :: damping(:, :), bearing(:, :)
       !> Squared angular frequencies with their losses, rad2/s2, of modes with losses as sums of these modes, and the matrix
-      !> of the sums (`thud_mode_mixing`): [n_mode], [n_mode, n_mode]; not allocated if the modes remain as they are.
+      !> W of the sums: [n_mode], [n_mode, n_mode]; not allocated if the modes remain as they are.
       complex(wp), allocatable :: pole(:), mixing(:, :)
       !> Shapes of the displacements; not allocated for static ones: [n_displacement].
       type(shape_type), allocatable :: shape(:)
@@ -197,5 +208,64 @@ contains
       end if
       integral = get_transposed_product(shape%coefficient, weighted)
    end function get_integrals
+
+   !> Diagonalizes a complex symmetric matrix.
+   subroutine diagonalize(matrix, pole, vectors, failed)
+      !> The matrix: [n, n].
+      complex(wp), intent(in) :: matrix(:, :)
+      !> The poles, by their real parts: [n].
+      complex(wp), intent(out) :: pole(:)
+      !> The matrix W: [n, n].
+      complex(wp), intent(out) :: vectors(:, :)
+      !> The iteration did not converge.
+      logical, intent(out) :: failed
+      complex(wp) :: separated(size(pole), size(pole)), none(1, 1), work(33*size(pole))
+      real(wp) :: real_work(2*size(pole))
+      integer :: i, j, n, info
+
+      n = size(pole)
+      separated = matrix
+      do i = 1, n
+         separated(i, i) = matrix(i, i)*(1 + separation*i/n)
+      end do
+      call zgeev('N', 'V', n, separated, n, pole, none, 1, vectors, n, work, size(work), real_work, info)
+      failed = info /= 0
+      if (failed) return
+      ! In the order of the modes, which ascends.
+      do i = 1, n
+         j = i - 1 + minloc(pole(i:)%re, dim=1)
+         pole([i, j]) = pole([j, i])
+         vectors(:, [i, j]) = vectors(:, [j, i])
+         vectors(:, i) = vectors(:, i)/sqrt(sum(vectors(:, i)**2))
+      end do
+   end subroutine diagonalize
+
+   !> Whether losses mix some modes.
+   pure function are_mixed(blocks) result(yes)
+      type(mode_block_type), intent(in) :: blocks(:)
+      logical :: yes
+      integer :: i
+
+      yes = any([(allocated(blocks(i)%mixing), i=1, size(blocks))])
+   end function are_mixed
+
+   !> W or its transpose times a matrix: [n_mode, n].
+   pure function get_mixed(blocks, values, is_transposed) result(mixed)
+      type(mode_block_type), intent(in) :: blocks(:)
+      complex(wp), intent(in) :: values(:, :)
+      logical, intent(in) :: is_transposed
+      complex(wp) :: mixed(size(values, 1), size(values, 2))
+      integer :: i, last, n
+
+      mixed = values
+      last = 0
+      do i = 1, size(blocks)
+         n = last
+         last = n + size(blocks(i)%omega)
+         if (.not. allocated(blocks(i)%mixing)) cycle
+         if (is_transposed) mixed(n + 1:last, :) = matmul(transpose(blocks(i)%mixing), values(n + 1:last, :))
+         if (.not. is_transposed) mixed(n + 1:last, :) = matmul(blocks(i)%mixing, values(n + 1:last, :))
+      end do
+   end function get_mixed
 
 end module thud_modes

@@ -10,8 +10,7 @@ module thud_modal_room
    use thud_injected_energy, only: get_spectrum
    use thud_kinds, only: wp
    use thud_matrix_product, only: get_transposed_product
-   use thud_mode_mixing, only: are_mixed, get_mixed, get_unmixed
-   use thud_modes, only: get_mode_sums, get_mode_values
+   use thud_modes, only: are_mixed, get_mixed, get_mode_sums, get_mode_values
    use thud_room, only: box_type
    use thud_transform, only: get_signal
    implicit none (type, external)
@@ -155,7 +154,7 @@ contains
          box%corner(2) + box%ball(2, :))
       ! Balls on a rigid support move nothing: nobody drops them there.
       moving = pack([(j, j=1, n_ball)], maxval(abs(coupled%gain), dim=1) > 1.0e-6_wp*maxval(abs(coupled%gain)))
-      coupled%gain = get_unmixed(coupled%floor%modes%block, coupled%gain)
+      coupled%gain = get_mixed(coupled%floor%modes%block, coupled%gain, is_transposed=.true.)
       call couple(coupled)
       call get_sound(coupled, frequency, spectrum, with_details, sound, room)
       call get_levels(box%bands(:room%n_band), frequency, sound*room%sample_rate, room%sample_rate, n_sample, room%level)
@@ -194,8 +193,8 @@ contains
          associate (lx => coupled%lx, ly => coupled%ly, set => modes%displacement(plate))
             associate (along => get_line_coupling(set%x, box%corner(1), box%sides(1), maxval(lx)), &
                across => get_line_coupling(set%y, box%corner(2), box%sides(2), maxval(ly)))
-               coupling = get_unmixed(modes%block, cmplx(get_mode_sums(modes, plate, along(lx + 1, :), across(ly + 1, :)), &
-                  kind=wp))
+               coupling = get_mixed(modes%block, cmplx(get_mode_sums(modes, plate, along(lx + 1, :), across(ly + 1, :)), &
+                  kind=wp), is_transposed=.true.)
             end associate
             do i = 1, 4
                associate (group => coupled%group(i))
@@ -325,12 +324,13 @@ contains
 
       associate (gain => coupled%gain, blocks => coupled%floor%modes%block)
          energy(:, 1) = real(matmul(matmul(response, conjg(force)), gain**2), wp)
-         ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_mode_mixing`.
+         ! Velocities u have the losses Im(u* A u)/w with the stiffness A of `thud_modes`.
          energy(:, 2) = 0.0_wp
          do i = 1, size(frequency)
             velocity = gain*spread(response(:, i), 2, size(gain, 2))
-            stressed = get_mixed(blocks, spread(get_stiffness(coupled, 2*pi*frequency(i)), 2, size(gain, 2))*velocity)
-            velocity = get_mixed(blocks, velocity)
+            stressed = get_mixed(blocks, spread(get_stiffness(coupled, 2*pi*frequency(i)), 2, size(gain, 2))*velocity, &
+               is_transposed=.false.)
+            velocity = get_mixed(blocks, velocity, is_transposed=.false.)
             do j = 1, size(gain, 2)
                energy(j, 2) = energy(j, 2) + aimag(dot_product(velocity(:, j), stressed(:, j)))/(2*pi*frequency(i))
             end do
