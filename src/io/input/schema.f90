@@ -8,7 +8,7 @@ module thud_schema
    use thud_field, only: field_type, name_length
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
-   use thud_quantities, only: history_quantity_count, quantities, quantity_type, sample_quantity_count
+   use thud_quantities, only: history_quantity_count, quantities, sample_quantity_count
    use thud_rating, only: class_limits, get_rated_bands, rated_set_names, rating_names, rating_titles
    use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, source_names, verdict_names
@@ -27,8 +27,10 @@ contains
       type(case_type), target :: case
       type(field_type), allocatable :: fields(:)
       type(band_type), allocatable :: bands(:)
+      type(criterion_type) :: criteria(criterion_count)
+      type(error_type), allocatable :: error
       character(len=:), allocatable :: entry
-      integer :: i
+      integer :: i, j
 
       call new_case(case)
       allocate (fields, source=get_fields(case))
@@ -49,8 +51,14 @@ contains
       end do
       text = text//'},'//newline//'"limits": {'
       do i = 1, size(source_names)
-         call describe_limits(source_names(i), entry)
-         text = text//newline//entry//trim(merge(',', ' ', i < size(source_names)))
+         call get_criteria(source_names(i), criteria, error)
+         text = text//newline//text_value(source_names(i))//': ['
+         do j = 1, criterion_count
+            text = text//'{"name": '//text_value(criteria(j)%name)//', "unit": '//text_value(criteria(j)%unit) &
+               //', "lower": '//to_text(criteria(j)%lower)//', "upper": '//to_text(criteria(j)%upper)//'}' &
+               //trim(merge(',', ' ', j < criterion_count))
+         end do
+         text = text//']'//trim(merge(',', ' ', i < size(source_names)))
       end do
       text = text//'},'//newline//'"class_limits": ['//join(class_limits)//'],'//newline//'"ratings": {'
       do i = 1, size(rating_names)
@@ -59,8 +67,13 @@ contains
       end do
       text = text//'},'//newline//'"quantities": ['
       do i = 1, size(quantities)
-         call describe_quantity(quantities(i), entry)
-         text = text//newline//entry//trim(merge(',', ' ', i < size(quantities)))
+         associate (quantity => quantities(i))
+            text = text//newline//'{"name": '//text_value(quantity%name)//', "title": '//text_value(quantity%title) &
+               //', "symbol": '//text_value(quantity%symbol)//', "unit": '//text_value(quantity%unit) &
+               //', "display_unit": '//text_value(quantity%display_unit)//', "display_scale": ' &
+               //to_text(quantity%display_scale)//', "decimals": '//to_text(quantity%decimals)//', "meaning": ' &
+               //text_value(quantity%meaning)//'}'//trim(merge(',', ' ', i < size(quantities)))
+         end associate
       end do
       text = text//'],'//newline//'"sample_quantities": '//to_text(sample_quantity_count)//','//newline &
          //'"history_quantities": '//to_text(history_quantity_count)//','//newline//'"keys": ['
@@ -98,37 +111,6 @@ contains
          end do
       end do
    end subroutine describe_standard_ball
-
-   !> Describes the criteria of a source.
-   subroutine describe_limits(source, text)
-      character(len=*), intent(in) :: source
-      !> A JSON member.
-      character(len=:), allocatable, intent(out) :: text
-      type(criterion_type) :: criteria(criterion_count)
-      type(error_type), allocatable :: error
-      integer :: i
-
-      call get_criteria(source, criteria, error)
-      text = text_value(source)//': ['
-      do i = 1, criterion_count
-         text = text//'{"name": '//text_value(criteria(i)%name)//', "unit": '//text_value(criteria(i)%unit)//', "lower": ' &
-            //to_text(criteria(i)%lower)//', "upper": '//to_text(criteria(i)%upper)//'}' &
-            //trim(merge(',', ' ', i < criterion_count))
-      end do
-      text = text//']'
-   end subroutine describe_limits
-
-   !> Describes a quantity.
-   subroutine describe_quantity(quantity, text)
-      type(quantity_type), intent(in) :: quantity
-      !> A JSON object.
-      character(len=:), allocatable, intent(out) :: text
-
-      text = '{"name": '//text_value(quantity%name)//', "title": '//text_value(quantity%title)//', "symbol": ' &
-         //text_value(quantity%symbol)//', "unit": '//text_value(quantity%unit)//', "display_unit": ' &
-         //text_value(quantity%display_unit)//', "display_scale": '//to_text(quantity%display_scale)//', "decimals": ' &
-         //to_text(quantity%decimals)//', "meaning": '//text_value(quantity%meaning)//'}'
-   end subroutine describe_quantity
 
    !> Describes a key.
    subroutine describe(field, text)

@@ -32,9 +32,26 @@ contains
       logical, intent(in) :: coupled
       character(len=:), allocatable :: text
       real(wp) :: resistance
-      integer :: i
+      integer :: i, class
 
-      text = get_headline(case, prediction)//'  '//padded('room below', column)//padded('level', column) &
+      i = get_rating_index(case%room)
+      text = '  '//trim(get_rating_title(case, i))//': '//to_text(get_rounded(prediction%rating(i))) &
+         //' dB, standard uncertainty '//fixed(prediction%rating_uncertainty, 1)//' dB'
+      associate (required => case%room%required)
+         ! Without a decimal if it is whole.
+         if (required > 0.0_wp) text = text//'; meets '//fixed(required, merge(0, 1, abs(required - nint(required)) &
+            < tiny(required)))//' dB with '//fixed(100*prediction%probability, 0)//' %: ' &
+            //trim(judge_requirement(prediction))
+         if (required > 0.0_wp .and. .not. prediction%source_conforms) text = text//', the source does not conform'
+      end associate
+      text = text//newline//'  Standard uncertainties:'
+      do i = 1, size(contribution_names)
+         if (prediction%contribution(i) < 0.05_wp) cycle
+         text = text//' '//replaced(trim(contribution_names(i)), '_', ' ')//' ' &
+            //fixed(prediction%contribution(i), 1)//' dB,'
+      end do
+      text = text(:len(text) - 1)//'. Rigid boxes, no measurement behind it.'//newline//newline &
+         //'  '//padded('room below', column)//padded('level', column) &
          //'standard uncertainty'//newline
       do i = 1, size(prediction%bands)
          text = text//'  '//padded(get_band_name(prediction%bands(i))//' Hz', column) &
@@ -47,7 +64,18 @@ contains
       text = text//newline
       do i = 1, size(rating_names)
          text = text//'  '//get_rating_title(case, i)//to_text(get_rounded(prediction%rating(i)))//' dB'//newline
-         if (rating_names(i) == 'octaves') text = text//get_class_line(case, prediction, prediction%rating(i))
+         if (rating_names(i) /= 'octaves') cycle
+         class = get_class(prediction%rating(i))
+         if (.not. prediction%source_conforms) then
+            text = text//'    class not stated: the source does not conform'//newline
+         else if (.not. has_class(case, prediction)) then
+            cycle
+         else if (class > 0) then
+            text = text//'    class '//to_text(class)//' (at most '//fixed(class_limits(class), 0)//' dB)'//newline
+         else
+            text = text//'    no class (class '//to_text(size(class_limits))//': at most ' &
+               //fixed(class_limits(size(class_limits)), 0)//' dB)'//newline
+         end if
       end do
       resistance = 1/maxval(prediction%conductance)
       text = text//'  Energy means over positions, by the '//trim(merge('contact force', 'blocked force', coupled))//'; '
@@ -67,52 +95,5 @@ contains
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline
    end function get_room_table
-
-   !> The rating that is asked for, whether it meets the requirement, and what its uncertainty follows from.
-   function get_headline(case, prediction) result(text)
-      type(case_type), intent(in) :: case
-      type(room_level_type), intent(in) :: prediction
-      character(len=:), allocatable :: text
-      integer :: i, shown
-
-      shown = get_rating_index(case%room)
-      text = '  '//trim(get_rating_title(case, shown))//': '//to_text(get_rounded(prediction%rating(shown))) &
-         //' dB, standard uncertainty '//fixed(prediction%rating_uncertainty, 1)//' dB'
-      associate (required => case%room%required)
-         ! Without a decimal if it is whole.
-         if (required > 0.0_wp) text = text//'; meets '//fixed(required, merge(0, 1, abs(required - nint(required)) &
-            < tiny(required)))//' dB with '//fixed(100*prediction%probability, 0)//' %: ' &
-            //trim(judge_requirement(prediction))
-         if (required > 0.0_wp .and. .not. prediction%source_conforms) text = text//', the source does not conform'
-      end associate
-      text = text//newline//'  Standard uncertainties:'
-      do i = 1, size(contribution_names)
-         if (prediction%contribution(i) < 0.05_wp) cycle
-         text = text//' '//replaced(trim(contribution_names(i)), '_', ' ')//' ' &
-            //fixed(prediction%contribution(i), 1)//' dB,'
-      end do
-      text = text(:len(text) - 1)//'. Rigid boxes, no measurement behind it.'//newline//newline
-   end function get_headline
-
-   !> The class of a rating with its limit, as a line; empty for another source than the ball.
-   function get_class_line(case, prediction, rating) result(text)
-      type(case_type), intent(in) :: case
-      type(room_level_type), intent(in) :: prediction
-      !> Rating of octaves, dB.
-      real(wp), intent(in) :: rating
-      character(len=:), allocatable :: text
-      integer :: number
-
-      number = get_class(rating)
-      text = ''
-      if (.not. has_class(case, prediction)) then
-         if (.not. prediction%source_conforms) text = '    class not stated: the source does not conform'//newline
-      else if (number > 0) then
-         text = '    class '//to_text(number)//' (at most '//fixed(class_limits(number), 0)//' dB)'//newline
-      else
-         text = '    no class (class '//to_text(size(class_limits))//': at most ' &
-            //fixed(class_limits(size(class_limits)), 0)//' dB)'//newline
-      end if
-   end function get_class_line
 
 end module thud_room_table

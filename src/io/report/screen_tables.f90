@@ -2,12 +2,10 @@
 module thud_screen_tables
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type, get_model_number, get_unstated_fields
-   use thud_compression, only: compression_type
    use thud_compute, only: get_assessed_force, impact_type, results_type
    use thud_constants, only: version
    use thud_field, only: field_type
    use thud_force_history, only: force_count, force_history_type, force_names
-   use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
       sample_quantity_count, show
@@ -37,17 +35,33 @@ contains
       !> Also show the quantities of the model.
       logical, intent(in) :: verbose
       character(len=:), allocatable, intent(out) :: text
+      integer :: i
 
       text = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) text = text//'   model '//trim(case%model)
       text = text//newline
-      if (case%has_modes) text = text//newline//get_modes_table(results%modes)
+      if (case%has_modes) text = text//newline//'  free modes     frequency   harmonic   participation'//newline &
+         //'                       Hz                of the pole'//newline
+      do i = 1, merge(size(results%modes%frequency), 0, case%has_modes)
+         text = text//flush_right(to_text(i), 6)//flush_right(fixed(results%modes%frequency(i), 2), 19) &
+            //flush_right(to_text(results%modes%harmonic(i)), 11) &
+            //flush_right(fixed(results%modes%participation(i), 3), 16)//newline
+      end do
       if (case%has_impact) text = text//newline//get_impact_table(case, results%impact, verbose)
       if (allocated(results%on_floor)) text = text//newline//get_floor_table(case, results)
       if (allocated(results%room%bands)) text = text//newline//get_room_table(case, results%room, &
          results%impact%history%contact_time, allocated(results%on_floor))
       text = text//get_defaults_lines(case)
-      if (case%has_compression) text = text//newline//get_compression_table(results%compression)
+      if (.not. case%has_compression) return
+      ! The last point, and secant stiffnesses there and at the first deflection above 0.
+      associate (deflection => results%compression%deflection, force => results%compression%force)
+         i = size(force)
+         text = text//newline//'  quasi-static compression between plates'//newline &
+            //row('peak deflection', fixed(1.0e3_wp*deflection(i), 2), 'mm') &
+            //row('force there', significant(force(i), 4), 'N') &
+            //row('secant stiffness', significant(force(i)/deflection(i)/1.0e3_wp, 4), 'kN/m') &
+            //row('at the first point', significant(force(2)/deflection(2)/1.0e3_wp, 4), 'kN/m')
+      end associate
    end subroutine get_screen_tables
 
    !> Levels of the assessed force and quantities of the drop on a rigid floor, with limits and verdicts.
@@ -227,35 +241,6 @@ contains
       title = merge('force on the floor', 'elastic force     ', force == 'floor')
    end function get_force_title
 
-   !> Table of the free modes for the screen.
-   function get_modes_table(modes) result(text)
-      type(free_modes_type), intent(in) :: modes
-      character(len=:), allocatable :: text
-      integer :: i
-
-      text = '  free modes     frequency   harmonic   participation'//newline &
-         //'                       Hz                of the pole'//newline
-      do i = 1, size(modes%frequency)
-         text = text//flush_right(to_text(i), 6)//flush_right(fixed(modes%frequency(i), 2), 19) &
-            //flush_right(to_text(modes%harmonic(i)), 11)//flush_right(fixed(modes%participation(i), 3), 16)//newline
-      end do
-   end function get_modes_table
-
-   !> Table of the quasi-static compression for the screen: last point, secant stiffness there and at the first deflection
-   !> above 0.
-   function get_compression_table(compression) result(text)
-      type(compression_type), intent(in) :: compression
-      character(len=:), allocatable :: text
-
-      associate (deflection => compression%deflection, force => compression%force, n => size(compression%force))
-         text = '  quasi-static compression between plates'//newline &
-            //row('peak deflection', fixed(1.0e3_wp*deflection(n), 2), 'mm') &
-            //row('force there', significant(force(n), 4), 'N') &
-            //row('secant stiffness', significant(force(n)/deflection(n)/1.0e3_wp, 4), 'kN/m') &
-            //row('at the first point', significant(force(2)/deflection(2)/1.0e3_wp, 4), 'kN/m')
-      end associate
-   end function get_compression_table
-
    !> Row for a quantity, with its limits if there are any.
    function quantity_row(quantity, value, criterion) result(text)
       type(quantity_type), intent(in) :: quantity
@@ -281,24 +266,17 @@ contains
       !> Factor from the SI unit to the shown unit.
       real(wp), intent(in), optional :: scale
       character(len=:), allocatable :: text
+      character(len=:), allocatable :: limits
 
       text = '  '//padded(name, name_width)//flush_right(value, 10)//' '//padded(unit, 5)
-      if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale) &
-         //get_verdict_word(criterion)
+      if (present(criterion) .and. present(scale)) then
+         limits = flush_right(short(criterion%lower*scale), 7)
+         ! A single number if both are equal.
+         if (criterion%upper > criterion%lower) limits = limits//' to '//short(criterion%upper*scale)
+         text = text//padded(limits, 18)//get_verdict_word(criterion)
+      end if
       text = trim(text)//newline
    end function row
-
-   !> Minimum and maximum conforming value in the shown unit; a single number if they are equal.
-   pure function get_limits(criterion, scale) result(text)
-      type(criterion_type), intent(in) :: criterion
-      !> Factor from the SI unit to the shown unit.
-      real(wp), intent(in) :: scale
-      character(len=:), allocatable :: text
-
-      text = flush_right(short(criterion%lower*scale), 7)
-      if (criterion%upper > criterion%lower) text = text//' to '//short(criterion%upper*scale)
-      text = padded(text, 18)
-   end function get_limits
 
    !> Rows with the quantities of the model.
    function model_quantity_rows(history, prefix) result(rows)
