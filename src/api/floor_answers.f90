@@ -22,7 +22,7 @@ module thud_floor_answers
    use thud_receiver, only: get_mobility, receiver_type
    use thud_records, only: add_history, add_room_level
    use thud_request, only: request_type
-   use thud_room, only: box_type, check_below, get_area, get_rating_index, new_box, place, room_level_type
+   use thud_room, only: box_type, check_below, get_rating_index, new_box, place, room_level_type
    use thud_room_prediction, only: predict_room
    implicit none (type, external)
    private
@@ -194,7 +194,8 @@ contains
          [size(request%get_array('x')), 2]))
       box = new_box(case%room, state%plate)
       allocate (radiation(size(box%bands)))
-      call get_modal_radiation(state%modes, state%plate, box%air, box%bands, get_area(box), radiation, strike)
+      call get_modal_radiation(state%modes, state%plate, box%air, box%bands, &
+         reshape([box%corner, box%corner + box%sides(:2)], [2, 2]), radiation, strike)
       call bundle%add_array('radiation_factor', shape(radiation), radiation%radiation_factor)
       call bundle%add_array('radiated', shape(radiation), radiation%radiated)
    end subroutine answer_radiation

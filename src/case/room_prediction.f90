@@ -14,7 +14,7 @@ module thud_room_prediction
    use thud_modal_room, only: get_highest_frequency, get_modal_room, modal_room_type
    use thud_plate, only: get_plate_radiation
    use thud_plate_stack, only: get_simplified, with_clamped_edges
-   use thud_room, only: add_ratings, box_type, check_below, get_area, get_rating_index, modal_radiation, new_box, &
+   use thud_room, only: add_ratings, box_type, check_below, get_rating_index, modal_radiation, new_box, &
       of_thirds, place, positions_of_rating, room_level_type, room_type
    use thud_room_uncertainty, only: add_uncertainty, get_probability
    use thud_statistical_level, only: get_statistical_level
@@ -113,14 +113,13 @@ contains
          used%upper_factor = used%radiation_factor
       end if
       if (.not. state%has_modal_conductance) used%conductance = get_plate_conductance(state, box%bands%center)
-      call get_statistical_level(state%plate, used, room, excitation%level - state%improvement, prediction)
-      prediction%crossover = box%crossover
+      call get_statistical_level(state%plate, used, room, box, excitation%level - state%improvement, prediction)
       ! A floor whose mobility is measured has the modes of its plate alone.
       if (state%is_measured) used%conductance = radiation%conductance
       bare_room = room
       bare_room%ceiling%mass = 0.0_wp
       bare_room%walls%lengths%count = 0
-      call get_statistical_level(state%plate, used, bare_room, excitation%level, bare)
+      call get_statistical_level(state%plate, used, bare_room, box, excitation%level, bare)
       do i = 1, size(prediction%rated_level, 2)
          if (i == 1 .or. room%positions == positions_of_rating) then
             call place(room, i, box)
@@ -155,7 +154,7 @@ contains
 
       associate (bands => box%bands, plate => state%plate)
          allocate (radiation(size(bands)))
-         area = get_area(box)
+         area = reshape([box%corner, box%corner + box%sides(:2)], [2, 2])
          n = count(bands%upper <= modes%limit/(2*pi))
          call get_modal_radiation(modes, plate, box%air, bands(:n), area, radiation(:n))
          if (n == size(bands)) return

@@ -10,7 +10,7 @@ module thud_warnings
    use thud_power, only: not_a_number
    use thud_refined_drop, only: finer_quantities, get_resolution, max_error
    use thud_registry, only: floor_names
-   use thud_room, only: get_completed_room, room_level_type, room_type
+   use thud_room, only: box_type, new_box, room_level_type
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
    use thud_validity_limit, only: get_limit_message, validity_limit_type, warning_length
@@ -140,17 +140,17 @@ contains
       type(floor_state_type), intent(in) :: state
       !> Messages: [n].
       character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      type(room_type) :: room
+      type(box_type) :: room
 
       if (state%lowest_frequency > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below ' &
          //fixed(state%lowest_frequency, 0)//' Hz '//trim(state%validity_reason))
       if (state%highest_frequency < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above ' &
          //fixed(state%highest_frequency, 0)//' Hz '//trim(state%validity_reason))
       if (.not. case%has_room) return
-      room = get_completed_room(case%room, state%plate)
-      call add_limit_warnings([validity_limit_type('room', 'height in m', room%height, 2.0_wp, 6.0_wp, &
+      room = new_box(case%room, state%plate)
+      call add_limit_warnings([validity_limit_type('room', 'height in m', room%sides(3), 2.0_wp, 6.0_wp, &
          'check volume, length and width', 'most rooms have')], warnings)
-      associate (room_area => room%length*room%width, area => state%plate%length*state%plate%width)
+      associate (room_area => product(room%sides(:2)), area => state%plate%length*state%plate%width)
          if (abs(room_area/area - 1) > same_area) call add(warnings, '&room: a room of '//fixed(room_area, 1) &
             //' m2 below a floor of '//fixed(area, 1)//' m2: only the part of the floor above the room radiates into it')
       end associate

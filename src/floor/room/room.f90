@@ -15,9 +15,8 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: add_ratings, box_type, check_below, check_below_subceiling, check_room, finished_room
-   public :: get_area, get_completed_room, get_rating_index, get_reverberation_times, get_room_fields
-   public :: modal_radiation, new_box, of_thirds, place, positions_of_rating, room_level_type, room_type
+   public :: add_ratings, box_type, check_below, check_below_subceiling, check_room, finished_room, get_rating_index
+   public :: get_room_fields, modal_radiation, new_box, of_thirds, place, positions_of_rating, room_level_type, room_type
 
    !> A room whose reverberation time contains all its losses, as measured ones do.
    character(len=*), parameter :: finished_room = 'finished'
@@ -96,6 +95,8 @@ module thud_room
    type :: box_type
       !> Length, width and height, m.
       real(wp) :: sides(3) = 0.0_wp
+      !> Volume, m3, as stated: within 1 % of their product.
+      real(wp) :: volume = 0.0_wp
       !> Position of its corner below the floor, m.
       real(wp) :: corner(2) = 0.0_wp
       type(air_type) :: air
@@ -208,49 +209,33 @@ contains
          //'630 Hz')
    end subroutine check_room
 
-   !> The room with the dimensions that are not stated.
-   elemental function get_completed_room(room, plate) result(completed)
-      type(room_type), intent(in) :: room
-      !> The plate that radiates.
-      type(plate_type), intent(in) :: plate
-      type(room_type) :: completed
-
-      completed = room
-      if (.not. room%length > 0.0_wp) completed%length = plate%length
-      if (.not. room%width > 0.0_wp) completed%width = plate%width
-      associate (area => completed%length*completed%width)
-         if (.not. room%height > 0.0_wp) then
-            completed%height = default_height
-            if (room%volume > 0.0_wp) completed%height = room%volume/area
-         end if
-         if (.not. room%volume > 0.0_wp) completed%volume = area*completed%height
-      end associate
-   end function get_completed_room
-
-   !> The room below a floor as a box, without positions.
-   function new_box(room, plate) result(box)
+   !> The room below a floor as a box, without positions; sides that are not stated are those of the floor.
+   pure function new_box(room, plate) result(box)
       type(room_type), intent(in) :: room
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       type(box_type) :: box
+      integer :: i
 
-      associate (completed => get_completed_room(room, plate))
-         box = box_type(sides=[completed%length, completed%width, completed%height], corner=[room%corner_x, room%corner_y], &
-            air=room%air, bands=get_rated_bands('third'))
+      box%sides = [room%length, room%width, room%height]
+      if (.not. room%length > 0.0_wp) box%sides(1) = plate%length
+      if (.not. room%width > 0.0_wp) box%sides(2) = plate%width
+      if (.not. room%height > 0.0_wp) then
+         box%sides(3) = default_height
+         if (room%volume > 0.0_wp) box%sides(3) = room%volume/product(box%sides(:2))
+      end if
+      box%volume = room%volume
+      if (.not. room%volume > 0.0_wp) box%volume = product(box%sides)
+      box%corner = [room%corner_x, room%corner_y]
+      box%air = room%air
+      box%bands = get_rated_bands('third')
+      associate (times => room%reverberation_time, n_band => size(box%bands))
+         box%reverberation_time = [(times%values(1 + (i - 1)*times%count/n_band), i=1, n_band)]
       end associate
-      box%reverberation_time = get_reverberation_times(room, size(box%bands))
       ! The overlap is the mode density 4 pi V f**2/c**3 times the bandwidth 2.2/T.
       box%crossover = sqrt(overlap_limit*box%air%sound_speed**3*minval(box%reverberation_time) &
          /(2.2_wp*4*pi*product(box%sides)))
    end function new_box
-
-   !> Opposite corners of the room below the floor, along length and width, m: [2, 2].
-   pure function get_area(box) result(area)
-      type(box_type), intent(in) :: box
-      real(wp) :: area(2, 2)
-
-      area = reshape([box%corner, box%corner + box%sides(:2)], [2, 2])
-   end function get_area
 
    !> Places ball and microphone: at the center and four points near the corners (KS F 2810-2), as for the rating of octaves
    !> unless stated otherwise, or at points that fill floor and room evenly (the R2 sequence of Roberts).
@@ -291,30 +276,27 @@ contains
       type(room_type), intent(in) :: room
       !> Set if the dimensions contradict each other, the walls are too long, or the cavity above the ceiling is too deep.
       type(error_type), allocatable, intent(out) :: error
-      type(room_type) :: completed
-      real(wp) :: walls, product
+      type(box_type) :: box
+      real(wp) :: walls
 
       walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
-      completed = get_completed_room(room, plate)
-      product = completed%length*completed%width*completed%height
-      if (abs(product - completed%volume) > volume_tolerance*completed%volume) then
-         error = input_error('&room: length, width and height, '//to_text(completed%length)//' x ' &
-            //to_text(completed%width)//' x '//to_text(completed%height)//' m (not stated: those of the floor), ' &
-            //'contradict the volume, '//to_text(completed%volume)//' m3; allowed: a volume of ' &
-            //to_text(product)//' m3, or without volume or height')
-      end if
-      call check_side('length', 'long', 'corner_x', room%corner_x, completed%length, plate%length)
-      call check_side('width', 'wide', 'corner_y', room%corner_y, completed%width, plate%width)
+      box = new_box(room, plate)
+      if (abs(product(box%sides) - box%volume) > volume_tolerance*box%volume) error = input_error( &
+         '&room: length, width and height, '//to_text(box%sides(1))//' x '//to_text(box%sides(2))//' x ' &
+         //to_text(box%sides(3))//' m (not stated: those of the floor), contradict the volume, '//to_text(box%volume) &
+         //' m3; allowed: a volume of '//to_text(product(box%sides))//' m3, or without volume or height')
+      call check_side('length', 'long', 'corner_x', room%corner_x, box%sides(1), plate%length)
+      call check_side('width', 'wide', 'corner_y', room%corner_y, box%sides(2), plate%width)
       if (allocated(error)) return
-      if (completed%volume < min_volume) then
-         error = input_error('&room: the volume is '//to_text(completed%volume)//' m3; allowed: at least ' &
+      if (box%volume < min_volume) then
+         error = input_error('&room: the volume is '//to_text(box%volume)//' m3; allowed: at least ' &
             //to_text(min_volume)//' m3')
       else if (walls > 2*(plate%length + plate%width)*(1 + rounding)) then
          error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
             //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
-      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > completed%height) then
+      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > box%sides(3)) then
          error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the height of the ' &
-            //'room; allowed: up to '//to_text(completed%height)//' m')
+            //'room; allowed: up to '//to_text(box%sides(3))//' m')
       end if
    contains
 
@@ -392,17 +374,5 @@ contains
 
       number = findloc(rating_names == room%rating, .true., dim=1)
    end function get_rating_index
-
-   !> Reverberation times of the bands, s: [n_band].
-   pure function get_reverberation_times(room, n_band) result(times)
-      type(room_type), intent(in) :: room
-      integer, intent(in) :: n_band
-      real(wp) :: times(n_band)
-      integer :: i
-
-      associate (stated => room%reverberation_time)
-         times = [(stated%values(1 + (i - 1)*stated%count/n_band), i=1, n_band)]
-      end associate
-   end function get_reverberation_times
 
 end module thud_room

@@ -8,8 +8,7 @@ module thud_statistical_level
    use thud_kinds, only: wp
    use thud_modal_radiation, only: modal_radiation_type
    use thud_plate, only: get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
-   use thud_rating, only: get_rated_bands
-   use thud_room, only: finished_room, get_completed_room, get_reverberation_times, room_level_type, room_type
+   use thud_room, only: box_type, finished_room, room_level_type, room_type
    implicit none (type, external)
    private
 
@@ -24,30 +23,31 @@ contains
    !>
    !> The floor takes the energy E = integral 2 |F|**2 Re Y df in each band, with Re Y averaged over positions. The energy
    !> is injected instantaneously: a contact of 20 ms is short compared with the detector's time constant.
-   subroutine get_statistical_level(plate, radiation, stated_room, force_level, prediction)
+   subroutine get_statistical_level(plate, radiation, room, box, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate
       !> Its conductance, radiation factors and energy beyond the room, in the bands of a rating: [n_band].
       type(modal_radiation_type), intent(in) :: radiation(:)
-      type(room_type), intent(in) :: stated_room
+      !> The room, and the same as a box.
+      type(room_type), intent(in) :: room
+      type(box_type), intent(in) :: box
       !> Force exposure levels of the force on the floor, dB: [n_band].
       real(wp), intent(in) :: force_level(:)
       !> All but what follows from modes.
       type(room_level_type), intent(out) :: prediction
-      type(room_type) :: room
       integer :: i, n_path
 
-      room = get_completed_room(stated_room, plate)
-      prediction%bands = get_rated_bands('third')
+      prediction%bands = box%bands
       prediction%conductance = radiation%conductance
       prediction%surface_mass = get_surface_mass(plate)
-      prediction%volume = room%volume
-      prediction%sides = [room%length, room%width, room%height]
+      prediction%volume = box%volume
+      prediction%sides = box%sides
       prediction%energy = 10**(force_level/10)*radiation%conductance
       prediction%radiation_factor = radiation%radiation_factor
       prediction%loss_factor = get_total_loss(plate, room%air, prediction%bands%center, &
          (radiation%radiation_factor + radiation%upper_factor)/2)
-      prediction%reverberation_time = get_reverberation_times(room, size(radiation))
+      prediction%reverberation_time = box%reverberation_time
+      prediction%crossover = box%crossover
       n_path = 1 + room%walls%lengths%count
       allocate (prediction%flow(size(radiation)), prediction%path_share(size(radiation), n_path))
       do i = 1, size(radiation)
@@ -83,7 +83,7 @@ contains
       !> Its radiation in the band.
       type(modal_radiation_type), intent(in) :: radiation
       type(room_type), intent(in) :: room
-      !> Prediction with energies, loss factors and reverberation times.
+      !> Prediction with dimensions, energies, loss factors and reverberation times.
       type(room_level_type), intent(in) :: prediction
       !> Index of the band.
       integer, intent(in) :: band
@@ -96,8 +96,8 @@ contains
 
       ! The part above the room.
       plate = floor
-      plate%length = min(room%length, floor%length)
-      plate%width = min(room%width, floor%width)
+      plate%length = min(prediction%sides(1), floor%length)
+      plate%width = min(prediction%sides(2), floor%width)
       plates = [plate, get_walls(room%walls)]
       at_room = size(plates) + 1
       has_ceiling = room%ceiling%mass > 0.0_wp
@@ -110,8 +110,8 @@ contains
             *[radiation%radiation_factor, get_plate_radiation(plates(2:), air, f)]
          decay = decay_of_60_db/prediction%reverberation_time(band)
          flow%energy(1) = prediction%energy(band)
-         flow%weight(at_room) = air%density*air%sound_speed**2/room%volume
-         flow%mode_density(:at_room) = [get_mode_density(plates), 4*pi*room%volume*f**2/air%sound_speed**3]
+         flow%weight(at_room) = air%density*air%sound_speed**2/prediction%volume
+         flow%mode_density(:at_room) = [get_mode_density(plates), 4*pi*prediction%volume*f**2/air%sound_speed**3]
          flow%total(:at_room) = [2*pi*f*[prediction%loss_factor(band), get_total_loss(plates(2:), air, f)], decay]
          flow%internal_loss(:at_room) = [2*pi*f*plates%loss_factor &
             + radiated*[radiation%upper_factor/radiation%radiation_factor, spread(1.0_wp, 1, size(plates) - 1)], &
@@ -125,7 +125,7 @@ contains
                flow%internal_loss(at_cavity) = 2*pi*f*ceiling%loss_factor
                call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))
                call connect(flow, at_room, at_cavity, &
-                  air%sound_speed*area*transmission*(1 - transmission)/(4*room%volume))
+                  air%sound_speed*area*transmission*(1 - transmission)/(4*prediction%volume))
             end associate
             call connect(flow, 1, at_room, radiated(1)*(forced + free*transmission**2))
          else
