@@ -79,12 +79,6 @@ module thud_modal_radiation
       logical :: is_orthogonal = .false.
    end type coupled_modes_type
 
-   !> Integrals over angular frequencies: radiated power over rho0 c0, squared velocity times area of the bearing plate and
-   !> of its part above the room, m4/s2 rad/s, and 1, rad/s.
-   type :: sums_type
-      real(wp) :: power = 0.0_wp, velocity = 0.0_wp, above = 0.0_wp, width = 0.0_wp
-   end type sums_type
-
 contains
 
    !> Radiation of a floor in bands, averaged over the strike points above the room and over the frequencies of each band. In
@@ -105,7 +99,6 @@ contains
       type(floor_modes_type) :: selected
       type(wave_series_type) :: along, across
       type(part_type) :: part
-      type(sums_type) :: sums
       real(wp) :: highest
       integer :: i, max_count
 
@@ -120,18 +113,12 @@ contains
       end associate
       do i = 1, size(bands)
          selected = get_selected_modes(modes, take_part(modes, bands(i), max_count))
-         sums = get_sums(get_coupled_modes(selected, part, stated_strike), air, bands(i), along, across)
-         if (.not. sums%above > 0.0_wp .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) then
-            ! A plate without modes there, or without resolved or known ones.
+         radiation(i) = get_mean_radiation(get_coupled_modes(selected, part, stated_strike), plate, air, bands(i), along, &
+            across)
+         ! A plate without modes there, or without resolved or known ones.
+         if (.not. radiation(i)%radiation_factor > 0.0_wp .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) &
             radiation(i) = modal_radiation_type(radiation_factor=get_plate_radiation(plate, air, bands(i)%center), &
-               conductance=1/get_resistance(plate), energy_beyond=modes%stack%length*modes%stack%width/part%area - 1)
-            cycle
-         end if
-         ! The modes have the losses of the plate.
-         radiation(i) = modal_radiation_type(radiation_factor=sums%power/sums%above, &
-            radiated=air%density*air%sound_speed*sums%power/sums%width, energy_beyond=sums%velocity/sums%above - 1, &
-            conductance=sums%velocity/sums%width*get_surface_mass(plate)*2*pi*bands(i)%center &
-            *get_total_loss(plate, air, bands(i)%center))
+            conductance=1/get_resistance(plate), energy_beyond=modes%stack%length*modes%stack%width/part%area - 1)
       end do
       radiation%upper_factor = radiation%radiation_factor
       ! The upper side of a floor with a subceiling is that of the bearing plate.
@@ -280,37 +267,50 @@ contains
       set = -set
    end function get_sets
 
-   !> Integrals over the frequencies of a band, averaged over the strike points.
-   function get_sums(coupled, air, band, along, across) result(sums)
+   !> Radiation averaged over the frequencies of a band and over the strike points; nothing without modes.
+   function get_mean_radiation(coupled, plate, air, band, along, across) result(radiation)
       type(coupled_modes_type), intent(in) :: coupled(:)
+      !> The bearing plate, whose losses the modes have.
+      type(plate_type), intent(in) :: plate
       type(air_type), intent(in) :: air
       type(band_type), intent(in) :: band
       !> Transforms of the functions of x and of y of the radiating plate.
       type(wave_series_type), intent(in) :: along, across
-      type(sums_type) :: sums
+      type(modal_radiation_type) :: radiation
       type(transforms_type) :: transforms
       type(shape_type) :: motion
       real(wp), allocatable :: response(:, :)
+      ! Integrals over angular frequencies: radiated power over rho0 c0, squared velocity times area of the bearing plate and
+      ! of its part above the room, m4/s2 rad/s.
+      real(wp) :: power, velocity, above
       real(wp) :: edge(2)
       integer :: i, j, n_x, n_y
 
+      if (size(coupled) == 0) return
+      power = 0.0_wp
+      velocity = 0.0_wp
+      above = 0.0_wp
       n_x = maxval([(maxval(coupled(i)%radiator%x), i=1, size(coupled))])
       n_y = maxval([(maxval(coupled(i)%radiator%y), i=1, size(coupled))])
       do j = 1, n_wavenumber
          edge = band%lower*(band%upper/band%lower)**([j - 1, j]/real(n_wavenumber, wp))
-         sums%width = sums%width + 2*pi*(edge(2) - edge(1))
-         if (size(coupled) == 0) cycle
          transforms = get_transforms(along, across, n_x, n_y, 2*pi*sqrt(product(edge))/air%sound_speed)
          do i = 1, size(coupled)
             response = get_responses(coupled(i), 2*pi*edge)
-            sums%velocity = sums%velocity + sum(response*coupled(i)%velocity)
-            sums%above = sums%above + sum(response*coupled(i)%above)
+            velocity = velocity + sum(response*coupled(i)%velocity)
+            above = above + sum(response*coupled(i)%above)
             motion = coupled(i)%radiator
             motion%coefficient = get_product(motion%coefficient, get_factor(response, coupled(i)%is_orthogonal))
-            sums%power = sums%power + sum(get_powers(transforms, motion))
+            power = power + sum(get_powers(transforms, motion))
          end do
       end do
-   end function get_sums
+      if (.not. above > 0.0_wp) return
+      associate (width => 2*pi*(band%upper - band%lower))
+         radiation = modal_radiation_type(radiation_factor=power/above, radiated=air%density*air%sound_speed*power/width, &
+            energy_beyond=velocity/above - 1, conductance=velocity/width*get_surface_mass(plate)*2*pi*band%center &
+            *get_total_loss(plate, air, band%center))
+      end associate
+   end function get_mean_radiation
 
    !> Columns whose products with themselves add up to a matrix, [n, at most n]: motions that radiate apart.
    pure function get_factor(matrix, is_diagonal) result(factor)
