@@ -116,9 +116,11 @@ contains
          radiation(i) = get_mean_radiation(get_coupled_modes(selected, part, stated_strike), plate, air, bands(i), along, &
             across)
          ! A plate without modes there, or without resolved or known ones.
-         if (.not. radiation(i)%radiation_factor > 0.0_wp .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) &
+         if (.not. radiation(i)%radiation_factor > 0.0_wp &
+            .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) then
             radiation(i) = modal_radiation_type(radiation_factor=get_plate_radiation(plate, air, bands(i)%center), &
-            conductance=1/get_resistance(plate), energy_beyond=modes%stack%length*modes%stack%width/part%area - 1)
+               conductance=1/get_resistance(plate), energy_beyond=modes%stack%length*modes%stack%width/part%area - 1)
+         end if
       end do
       radiation%upper_factor = radiation%radiation_factor
       ! The upper side of a floor with a subceiling is that of the bearing plate.

@@ -72,9 +72,9 @@ contains
       type(walls_type), intent(in) :: walls
       !> Set if a list has neither one value nor one for each wall.
       type(error_type), allocatable, intent(out) :: error
-      type(list_type) :: lists(5)
       character(len=16), parameter :: keys(*) = [character(len=16) :: 'wall_thickness', 'wall_density', 'wall_wave_speed', &
          'wall_loss_factor', 'junction_index']
+      type(list_type) :: lists(size(keys))
       integer :: i
 
       if (walls%lengths%count == 0) return

@@ -56,7 +56,7 @@ module thud_modal_room
    type :: group_type
       !> Indices of the pairs and of the modes: [n_pair], [n_mode].
       integer, allocatable :: pair(:), mode(:)
-      !> Real and imaginary parts of their coupling, m2/sqrt(kg); without the latter if they are zero: [n_mode, n_pair].
+      !> Real and imaginary parts of their coupling, m2/sqrt(kg); only mixed modes have imaginary ones: [n_mode, n_pair].
       real(wp), allocatable :: real_part(:, :), imaginary_part(:, :)
    end type group_type
 
@@ -202,8 +202,7 @@ contains
                   group%mode = pack([(k, k=1, size(coupling, 1))], &
                      maxval(abs(coupling(:, group%pair)), dim=2) > 1.0e-12_wp*maxval(abs(coupling)))
                   group%real_part = real(coupling(group%mode, group%pair), wp)
-                  if (any(abs(aimag(coupling(group%mode, group%pair))) > 0.0_wp)) &
-                     group%imaginary_part = aimag(coupling(group%mode, group%pair))
+                  group%imaginary_part = aimag(coupling(group%mode, group%pair))
                end associate
             end do
          end associate
@@ -288,8 +287,10 @@ contains
       complex(wp), intent(in) :: response(:, :)
       complex(wp), allocatable :: flow(:, :)
       complex(wp), allocatable :: velocity(:, :)
+      logical :: is_mixed
       integer :: i, j, k, n_ball
 
+      is_mixed = are_mixed(coupled%floor%modes%block)
       n_ball = size(coupled%gain, 2)
       allocate (flow(size(coupled%lx), n_ball*size(response, 2)))
       do k = 1, size(coupled%group)
@@ -302,7 +303,7 @@ contains
             end do
             flow(group%pair, :) = cmplx(get_transposed_product(group%real_part, velocity%re), &
                get_transposed_product(group%real_part, velocity%im), wp)
-            if (allocated(group%imaginary_part)) flow(group%pair, :) = flow(group%pair, :) + cmplx( &
+            if (is_mixed) flow(group%pair, :) = flow(group%pair, :) + cmplx( &
                -get_transposed_product(group%imaginary_part, velocity%im), &
                get_transposed_product(group%imaginary_part, velocity%re), wp)
             deallocate (velocity)

@@ -88,7 +88,8 @@ contains
       !> Index of the band.
       integer, intent(in) :: band
       type(energy_flow_type) :: flow
-      type(plate_type) :: plate, plates(1 + room%walls%lengths%count)
+      type(plate_type) :: plate
+      type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp) :: radiated(size(plates))
       real(wp) :: decay, transmission, forced, free, beyond
       logical :: has_ceiling, lies_beyond, is_finished
