@@ -86,10 +86,12 @@ contains
       associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
          arm => (self%joist_height + self%sheathing_thickness)/2)
          joists%position = get_spaced_positions(self%width, self%spacing, b)
-         associate (y => joists%position, n => size(joists%position), source_y => self%source_y*self%width)
-            if (self%source_on == 'joist') state%source(2) = get_nearest(y, source_y)/self%width
-            if (self%source_on == 'sheathing' .and. n > 1) state%source(2) = get_nearest((y(:n - 1) + y(2:))/2, source_y) &
-               /self%width
+         associate (middle => (joists%position(:size(joists%position) - 1) + joists%position(2:))/2, &
+            y => self%source_y*self%width)
+            if (self%source_on == 'joist') state%source(2) = &
+               joists%position(minloc(abs(joists%position - y), dim=1))/self%width
+            if (self%source_on == 'sheathing' .and. size(middle) > 0) state%source(2) = &
+               middle(minloc(abs(middle - y), dim=1))/self%width
          end associate
          joists%bending = e*b*h**3/12
          call get_composite(self, joists%composite, joists%slip)
@@ -107,15 +109,6 @@ contains
       joists%loss_factor = self%loss_factor
       allocate (bearing%ribs, source=joists)
    end subroutine get_bearing
-
-   !> The value next to a given one.
-   pure function get_nearest(values, value) result(nearest)
-      real(wp), intent(in) :: values(:)
-      real(wp), intent(in) :: value
-      real(wp) :: nearest
-
-      nearest = values(minloc(abs(values - value), dim=1))
-   end function get_nearest
 
    !> Bending stiffness that the sheathing adds to a joist, without that of its own bending, and its slip
    !> (EN 1995-1-1 annex B: a deflection with the wavenumber k has gamma = 1/(1 + E A k**2/K) with the sheathing's axial

@@ -1,9 +1,10 @@
 !> A floor of rectangular plates with the source on the upper plate: supports, floating plate, covering, modes and mobility.
 module thud_rectangular_floor
+   use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
    use thud_floor_model, only: floor_model_type, floor_state_type, third_bands
-   use thud_floor_modes, only: get_floor_modes, get_mode_limit, new_floor_receiver
+   use thud_floor_modes, only: get_floor_modes, mode_limit, new_floor_receiver
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: get_resistance, get_thin_limit
@@ -11,7 +12,7 @@ module thud_rectangular_floor
       plate_stack_type, rigid_support
    use thud_receiver, only: receiver_type
    use thud_screed, only: get_screed_fields, get_screed_plate, screed_type
-   use thud_subceiling, only: get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, subceiling_type
+   use thud_subceiling, only: get_subceiling_fields, get_subceiling_plate, subceiling_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -218,9 +219,10 @@ contains
          if (stated%count > 0) state%improvement = &
             [(stated%values(1 + (i - 1)*stated%count/third_bands), i=1, third_bands)]
       end associate
-      call add_validity(self, stack, state)
       call get_floor_modes(trim(state%group), stack, state%plate, self%air, state%modes, error)
-      if (.not. allocated(error)) call new_floor_receiver(trim(state%group), state%modes, state%resistance, state%source, &
+      if (allocated(error)) return
+      call add_validity(self, state)
+      call new_floor_receiver(trim(state%group), state%modes, state%resistance, state%source, &
          state%source, state%receiver, error)
       if (.not. allocated(error) .and. self%covering_stiffness > 0.0_wp) call add_covering(self, state%receiver)
    end subroutine prepare
@@ -246,13 +248,13 @@ contains
       type(orthotropic_type), intent(in) :: bearing
       type(plate_stack_type) :: stack
       type(orthotropic_type) :: lower
-      real(wp), allocatable :: channels(:)
+      type(layer_type) :: cavity
 
       lower = bearing
       lower%edge = get_edges(self)
       lower%line_x = self%line_x%values(:self%line_x%count)
       lower%line_y = self%line_y%values(:self%line_y%count)
-      associate (plate => state%plate, screed => self%screed)
+      associate (plate => state%plate, screed => self%screed, subceiling => self%subceiling, air => self%air)
          stack%length = plate%length
          stack%width = plate%width
          if (screed%thickness > 0.0_wp) then
@@ -263,12 +265,17 @@ contains
             allocate (stack%layer(0))
          end if
          stack%bearing = size(stack%plate)
-         if (self%subceiling%thickness > 0.0_wp) then
-            ! Joists hold it, or lines as stated.
-            channels = get_spaced_positions(plate%width, self%subceiling%channel_spacing, 0.0_wp)
-            if (allocated(bearing%ribs)) channels = bearing%ribs%position
-            stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(self%subceiling, plate))]
-            stack%layer = [stack%layer, get_subceiling_layer(self%subceiling, self%air, channels)]
+         if (subceiling%thickness > 0.0_wp) then
+            stack%plate = [stack%plate, new_orthotropic(get_subceiling_plate(subceiling, plate))]
+            ! The stiffness of the air, which does not move sideways, and of the joists or lines that hold the subceiling.
+            cavity = layer_type(air%density*air%sound_speed**2/subceiling%cavity_depth, subceiling%cavity_loss_factor)
+            if (subceiling%channel_stiffness > 0.0_wp) then
+               cavity%line_y = get_spaced_positions(plate%width, subceiling%channel_spacing, 0.0_wp)
+               if (allocated(bearing%ribs)) cavity%line_y = bearing%ribs%position
+               cavity%line_stiffness = subceiling%channel_stiffness
+               cavity%line_loss_factor = subceiling%channel_loss_factor
+            end if
+            stack%layer = [stack%layer, cavity]
          end if
          stack%radiator = size(stack%plate)
       end associate
@@ -297,14 +304,13 @@ contains
    end function get_edges
 
    !> Adds the frequency up to which the model is valid: that of the plate, the modes, the subceiling or its cavity.
-   subroutine add_validity(self, stack, state)
+   subroutine add_validity(self, state)
       class(rectangular_floor_type), intent(in) :: self
-      !> The plates above each other.
-      type(plate_stack_type), intent(in) :: stack
+      !> The state with its modes.
       type(floor_state_type), intent(inout) :: state
 
-      call limit(get_mode_limit(stack), 'the modes of the floor are not resolved, and the mean mobility of the ' &
-         //'construction takes their place')
+      if (state%modes%limit < 0.99_wp*2*pi*mode_limit) call limit(state%modes%limit/(2*pi), 'the modes of the floor are ' &
+         //'not resolved, and the mean mobility of the construction takes their place')
       if (.not. self%subceiling%thickness > 0.0_wp) return
       call limit(self%air%sound_speed/(4*self%subceiling%cavity_depth), 'the cavity above the subceiling is deeper than a ' &
          //'quarter of a wavelength, and no mere stiffness')

@@ -1,15 +1,13 @@
-!> A subceiling below any plate, on channels, battens or hangers, with the air between: its keys, and what it adds to a stack
-!> of plates.
+!> A subceiling below any plate, on channels, battens or hangers, with the air between: its keys, and its plate.
 module thud_subceiling
    use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_new_field, only: real_field
-   use thud_plate, only: air_type, plate_type
-   use thud_plate_stack, only: layer_type
+   use thud_plate, only: plate_type
    implicit none (type, external)
    private
 
-   public :: get_subceiling_fields, get_subceiling_layer, get_subceiling_plate, subceiling_type
+   public :: get_subceiling_fields, get_subceiling_plate, subceiling_type
 
    !> The subceiling; no thickness means none. The other defaults are those of a gypsum board on resilient channels.
    type :: subceiling_type
@@ -61,22 +59,5 @@ contains
          density=subceiling%density, wave_speed=sqrt(subceiling%modulus/subceiling%density), &
          loss_factor=subceiling%loss_factor)
    end function get_subceiling_plate
-
-   !> The connection of the subceiling with the plate above it: lines of springs, and the stiffness rho0 c0**2/depth of the
-   !> air, which does not move sideways.
-   pure function get_subceiling_layer(subceiling, air, lines) result(layer)
-      type(subceiling_type), intent(in) :: subceiling
-      type(air_type), intent(in) :: air
-      !> Positions of the lines along the width, m: [n_line].
-      real(wp), intent(in) :: lines(:)
-      type(layer_type) :: layer
-
-      layer%stiffness = air%density*air%sound_speed**2/subceiling%cavity_depth
-      layer%loss_factor = subceiling%cavity_loss_factor
-      if (.not. subceiling%channel_stiffness > 0.0_wp) return
-      layer%line_y = lines
-      layer%line_stiffness = subceiling%channel_stiffness
-      layer%line_loss_factor = subceiling%channel_loss_factor
-   end function get_subceiling_layer
 
 end module thud_subceiling

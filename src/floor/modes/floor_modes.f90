@@ -6,7 +6,7 @@ module thud_floor_modes
    use thud_kinds, only: wp
    use thud_modes, only: diagonalize, get_mode_values, get_some_modes, mode_block_type, modes_type
    use thud_plate, only: air_type, get_total_loss, plate_type
-   use thud_plate_stack, only: get_resolved_frequency, has_shear, is_uncoupled, plate_stack_type, with_rigid_edges
+   use thud_plate_stack, only: has_shear, is_uncoupled, plate_stack_type, with_rigid_edges
    use thud_receiver, only: receiver_type
    use thud_stack_modes, only: get_stack_modes
    use thud_text, only: fixed, to_text
@@ -14,7 +14,7 @@ module thud_floor_modes
    implicit none (type, external)
    private
 
-   public :: floor_modes_type, get_floor_modes, get_mode_limit, get_poles, get_selected_modes
+   public :: floor_modes_type, get_floor_modes, get_poles, get_selected_modes
    public :: new_floor_receiver, new_modal_receiver
 
    !> Modes up to this frequency are treated individually, Hz; higher modes add their static compliance. On average, this
@@ -98,15 +98,6 @@ contains
          //' m need too many functions to resolve the lowest mode; allowed: a smaller part of the floor, joists farther ' &
          //'apart (spacing), stiffer plates, or support = simple')
    end function get_unresolved
-
-   !> Frequency up to which the modes of a stack are treated individually because higher ones are not resolved, Hz.
-   pure function get_mode_limit(stack) result(limit)
-      type(plate_stack_type), intent(in) :: stack
-      real(wp) :: limit
-
-      limit = get_resolved_frequency(with_rigid_edges(stack), mode_limit*resolution)/resolution
-      if (limit > 0.99_wp*mode_limit) limit = huge(limit)
-   end function get_mode_limit
 
    !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
    subroutine add_bearing_losses(block, bearing, air, limit, failed)
