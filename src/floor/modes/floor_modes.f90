@@ -56,18 +56,16 @@ contains
       type(error_type), allocatable, intent(out) :: error
       !> Frequency up to which modes are wanted, Hz (default: `mode_limit`, and beyond for the static compliance).
       real(wp), intent(in), optional :: max_frequency
-      type(plate_stack_type) :: held
       real(wp) :: wanted, resolved
       integer :: i
       logical :: failed
 
-      held = with_rigid_edges(stack)
+      modes%stack = with_rigid_edges(stack)
       wanted = mode_limit*resolution
       ! In shear, waves are short, and many functions gain little.
-      if (all(is_uncoupled(held)) .and. .not. any(has_shear(held%plate))) wanted = mode_limit*sum_limit_factor
+      if (all(is_uncoupled(modes%stack)) .and. .not. any(has_shear(stack%plate))) wanted = mode_limit*sum_limit_factor
       if (present(max_frequency)) wanted = min(wanted, max_frequency*resolution)
-      modes%stack = held
-      call get_stack_modes(held, wanted, modes%modes, resolved, failed, mode_limit)
+      call get_stack_modes(modes%stack, wanted, modes%modes, resolved, failed, mode_limit)
       if (.not. resolved > 0.0_wp) then
          error = get_unresolved(group, stack)
       else if (failed) then

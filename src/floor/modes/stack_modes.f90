@@ -28,9 +28,8 @@ contains
       real(wp), intent(out) :: resolved
       !> The system has no solution.
       logical, intent(out) :: failed
-      !> Frequency of the highest modes whose losses may couple them, Hz (default: none).
-      real(wp), intent(in), optional :: lower_limit
-      real(wp) :: limit
+      !> Frequency of the highest modes whose losses may couple them, Hz.
+      real(wp), intent(in) :: lower_limit
       type(ritz_system_type) :: system
       type(product_type) :: products(3, size(stack%plate))
       integer :: index(3)
@@ -61,9 +60,7 @@ contains
                layer%line_loss_factor, 2, layer%line_y)
          end associate
       end do
-      limit = 0.0_wp
-      if (present(lower_limit)) limit = 2*pi*lower_limit
-      call solve_ritz_system(system, modes, failed, limit)
+      call solve_ritz_system(system, modes, failed, 2*pi*lower_limit)
    contains
 
       !> Energies of springs between a plate and the next one.
