@@ -13,9 +13,9 @@ module thud_screen
    integer, parameter :: green = 32
 
    !> Words of verdicts, and their colors.
-   character(len=*), parameter :: words(*) = [character(len=16) :: 'conforms', ': met', 'does not conform', 'too low', &
-      'too high', ': not met', 'undecided']
-   integer, parameter :: colors(size(words)) = [green, green, red, red, red, red, yellow]
+   character(len=*), parameter :: words(*) = [character(len=16) :: 'conforms', 'does not conform', 'too low', 'too high', &
+      'undecided']
+   integer, parameter :: colors(size(words)) = [green, red, red, red, yellow]
 
 contains
 

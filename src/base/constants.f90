@@ -1,21 +1,14 @@
-!> Mathematical constants, reference values of levels, the program's version and compiler.
+!> Mathematical constants, the band of records, the program's version and compiler.
 module thud_constants
    use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: decay_of_60_db, fast_time, get_compiler, pi, recorded_band, reference_force, reference_pressure, reference_time
-   public :: version
+   public :: decay_of_60_db, fast_time, get_compiler, pi, recorded_band, reference_pressure, version
 
    !> Ratio of a circle's circumference to its diameter.
    real(wp), parameter :: pi = acos(-1.0_wp)
-
-   !> Reference force of the force exposure level, N (JIS A 1418-2).
-   real(wp), parameter :: reference_force = 1.0_wp
-
-   !> Reference time of the force exposure level, s (JIS A 1418-2).
-   real(wp), parameter :: reference_time = 1.0_wp
 
    !> Reference sound pressure, Pa.
    real(wp), parameter :: reference_pressure = 2.0e-5_wp

@@ -125,25 +125,21 @@ contains
       type(field_type), intent(in) :: fields(:)
       type(error_type), allocatable, intent(out) :: error
       type(interval_type) :: interval
-      character(len=:), allocatable :: text, suggestion
+      character(len=:), allocatable :: text
       logical :: inside
       integer :: i
 
       do i = 1, size(fields)
          associate (field => fields(i))
-            inside = .true.
-            suggestion = ''
+            inside = field%kind /= 'choice' .or. field%get_number() > 0.0_wp
             interval = get_interval(fields, i)
-            call field%get_text(text)
-            if (field%kind == 'choice') then
-               inside = field%get_number() > 0.0_wp
-               if (.not. inside) call get_suggestion(text(2:len(text) - 1), field%choices(:field%n_choice), suggestion)
-            else if (field%range /= '') then
+            if (field%range /= '') then
                inside = all(interval%contains(field%get_entries()))
                if (field%whole_entries) inside = inside .and. all(is_whole(field%get_entries()))
             end if
             if (inside) cycle
-            error = field%get_error(text, interval, suggestion)
+            call field%get_text(text)
+            error = field%get_error(text, interval)
             return
          end associate
       end do
@@ -350,22 +346,20 @@ contains
    end function is_whole
 
    !> Error that names group, key, value and allowed range.
-   function get_error(self, value, interval, suggestion) result(error)
+   function get_error(self, value, interval) result(error)
       class(field_type), intent(in) :: self
       !> The value as text.
       character(len=*), intent(in) :: value
       !> The range with resolved ends (default: unresolved).
       type(interval_type), intent(in), optional :: interval
-      !> A word that may be meant, from `get_suggestion`.
-      character(len=*), intent(in), optional :: suggestion
       type(error_type) :: error
-      character(len=:), allocatable :: allowed, problem
+      character(len=:), allocatable :: allowed, suggestion
 
-      problem = ' is not allowed'
-      if (present(suggestion)) problem = problem//suggestion
+      ! Without the quotes.
+      call get_suggestion(value(2:len(value) - 1), self%choices(:self%n_choice), suggestion)
       call self%get_allowed(allowed, interval)
-      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//problem &
-         //'; allowed: '//allowed)
+      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' is not allowed' &
+         //suggestion//'; allowed: '//allowed)
    end function get_error
 
    !> The value in namelist syntax.

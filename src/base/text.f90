@@ -177,28 +177,24 @@ contains
       character(len=*), intent(in) :: text
       !> False also for characters encoded in more bytes than needed.
       logical :: valid
-      integer :: i, code, next_code
-      ! Number of bytes that the current character still needs.
-      integer :: n_left
+      integer :: code(len(text) + 3)
+      ! Number of bytes that continue the current character.
+      integer :: n
+      integer :: i
 
+      code = [(iachar(text(i:i)), i=1, len(text)), 0, 0, 0]
       valid = .true.
-      n_left = 0
-      do i = 1, len(text)
-         code = iachar(text(i:i))
-         if (n_left > 0) then
-            valid = valid .and. iand(code, 192) == 128
-            n_left = n_left - 1
-            cycle
-         end if
-         n_left = count(code >= [194, 224, 240])
-         valid = valid .and. (code < 128 .or. n_left > 0) .and. code < 245
-         if (n_left == 0 .or. i == len(text)) cycle
-         ! Invalid: longer forms than needed, surrogates, and code points beyond the last character.
-         next_code = iachar(text(i + 1:i + 1))
-         valid = valid .and. .not. any([code == 224 .and. next_code < 160, code == 237 .and. next_code > 159, &
-            code == 240 .and. next_code < 144, code == 244 .and. next_code > 143])
+      i = 1
+      do while (valid .and. i <= len(text))
+         associate (first => code(i), next => code(i + 1))
+            n = count(first >= [194, 224, 240])
+            ! Invalid: longer forms than needed, surrogates, and code points beyond the last character.
+            valid = (first < 128 .or. n > 0) .and. first < 245 .and. all(iand(code(i + 1:i + n), 192) == 128) &
+               .and. .not. any([first == 224 .and. next < 160, first == 237 .and. next > 159, &
+               first == 240 .and. next < 144, first == 244 .and. next > 143])
+         end associate
+         i = i + n + 1
       end do
-      valid = valid .and. n_left == 0
    end function is_utf8
 
    !> Whether a text is one number. List-directed `read` alone would also accept repeat counts, names, exponents without a

@@ -9,7 +9,7 @@
 module thud_force_exposure
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_band, only: band_type
-   use thud_constants, only: pi, reference_force, reference_time
+   use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
@@ -77,7 +77,7 @@ contains
       if (allocated(error)) return
       ! The rounding errors of a band are about this fraction of the total energy and limit the resolution.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
-      levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
+      levels = 10*log10(max(energy, resolution))
    end subroutine get_force_exposure_levels
 
    !> Checks that a record has levels.

@@ -9,7 +9,6 @@ module thud_ensemble
       new_band_projection
    use thud_case, only: case_type, get_active_fields, get_model_number
    use thud_column, only: column_type
-   use thud_constants, only: reference_force, reference_time
    use thud_error, only: error_type
    use thud_field, only: field_type
    use thud_force_history, only: force_count
@@ -215,8 +214,7 @@ contains
          if (.not. chosen(i)) cycle
          do j = 1, force_count
             row = i + (j - 1)*block_size
-            block%level(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/projections%sample_rate) &
-               /(reference_force**2*reference_time))
+            block%level(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/projections%sample_rate))
          end do
       end do
    end subroutine set_levels

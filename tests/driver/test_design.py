@@ -272,7 +272,7 @@ def test_map_of_a_room_answers_which_floors_meet_its_requirement(tmp_path: Path)
     assert two.plot().legends[0].get_texts()[0].get_text() == "required, 40 dB"
 
 
-@pytest.mark.parametrize(("lowest", "verdict"), [(49.4, "met"), (49.5, "not met")])
+@pytest.mark.parametrize(("lowest", "verdict"), [(49.4, "conforms"), (49.5, "does not conform")])
 def test_map_rounds_the_rating_as_the_verdict_does(
     room_design: thud.Design, lowest: float, verdict: str
 ) -> None:
@@ -282,7 +282,7 @@ def test_map_rounds_the_rating_as_the_verdict_does(
     rating = found + lowest - float(found.min()) + 1e-9
     dataset = room_design.dataset.assign(room_rating=rating)
     shifted = replace(room_design, dataset=dataset, required=49.0)
-    met = f"{int(verdict == 'met')} of {found.size}"
+    met = f"{int(verdict == 'conforms')} of {found.size}"
     assert dict(shifted.rows())["rating at most 49 dB"] == met
     assert Requirement(49.0, PredictedRating("octaves", lowest, 0.1, {})).verdict == verdict
 

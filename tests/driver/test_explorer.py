@@ -955,7 +955,7 @@ def test_layers_that_meet_the_requirement_of_a_room_are_found(client: TestClient
         required = thud.predict_level(floor=floor, room=below).requirement
         assert required is not None
         assert str(required) in change["text"]
-        assert required.verdict == "met"
+        assert required.verdict == "conforms"
     met = values | {"room": room | {"required": 80.0}}
     answer = last_report(client, "/improve", json=met)["answer"]
     assert answer["none"] == "The requirement is met already."

@@ -761,7 +761,7 @@ def test_source_and_requirement_have_columns_of_their_own(browser: Browser, serv
     # The same source has the same verdict, and the requirement its own.
     assert rows[0] == ["conforms", "–"]
     assert rows[1][0] == "conforms"
-    assert rows[1][1].startswith("not met: ")
+    assert rows[1][1].startswith("does not conform: ")
     assert rows[1][1].endswith(" meets 49 dB with 0 %")
 
 

@@ -439,7 +439,7 @@ def test_floor_with_stated_edges_has_no_contribution_of_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("limit", "verdict"), [(40.0, "not met"), (57.0, "undecided"), (70.0, "met")]
+    ("limit", "verdict"), [(40.0, "does not conform"), (57.0, "undecided"), (70.0, "conforms")]
 )
 def test_undecided_requirement_names_what_would_decide_it(limit: float, verdict: str) -> None:
     prediction = predicted("concrete 180", required=limit).prediction

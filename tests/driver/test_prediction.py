@@ -565,8 +565,8 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
     assert found.ratings["standardized"].rounded < found.ratings["thirds"].rounded
     reach = math.ceil(rating.uncertainty)
     for limit, verdict in (
-        (rating.rounded + reach + 1, "met"), (rating.rounded, "undecided"),
-        (rating.rounded - 1, "undecided"), (rating.rounded - reach - 1, "not met"),
+        (rating.rounded + reach + 1, "conforms"), (rating.rounded, "undecided"),
+        (rating.rounded - 1, "undecided"), (rating.rounded - reach - 1, "does not conform"),
     ):  # fmt: skip
         strict = replace(room, required=limit, rating=name)
         prediction = thud.predict_level(source, floor, strict)

@@ -18,10 +18,10 @@ RED, GREEN, YELLOW = 31, 32, 33
 # Words of verdicts in sentences, and alone in a line of a cell.
 _VERDICTS = {
     RED: (
-        r"\bdo(?:es)? not(?: conform)?\b|\btoo (?:low|high)\b|(?<=\d )(?:low|high)\b|\bnot met\b"
+        r"\bdo(?:es)? not(?: conform)?\b|\btoo (?:low|high)\b|(?<=\d )(?:low|high)\b"
         r"|(?<=  )(?:does|not|conform|low|high)(?=  |$)"
     ),
-    GREEN: r"(?<!that )\bconforms\b|(?<=criteria )conform\b|(?<=: )met\b",
+    GREEN: r"(?<!that )\bconforms\b|(?<=criteria )conform\b",
     YELLOW: r"\bundecided\b",
 }
 _COLORED = re.compile(

@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
     from thud.level.assessment import Criterion, Verdict
 
-# Code of the result of a verdict or of a requirement; the page reads no words.
+# Code of a verdict; the page reads no words.
 RESULTS = {verdict: verdict.replace(" ", "_") for verdict in VERDICTS}
-RESULTS |= {"met": RESULTS[VERDICTS[0]], "not met": RESULTS[VERDICTS[1]]}
 # Maximum number of criteria with values in a headline.
 MAX_NAMED = 2
 TRANSCRIBED = "Nominal value and tolerance of these tables, from a published transcription."

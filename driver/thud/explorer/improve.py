@@ -131,7 +131,7 @@ def _improve_floor(case: Case) -> Work:
     required = prediction.requirement
     if required is None:
         refuse("&room: required = 0: the room has no requirement", "the required level, dB")
-    if required.verdict == "met":
+    if required.verdict == VERDICTS[0]:
         return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
     if not required.conforms:
         reason = " ".join(prediction.source_warnings)
@@ -192,7 +192,7 @@ def _floor_changes(
         if required is None:
             break
         levels[value] = required
-        if required.verdict == "met":
+        if required.verdict == VERDICTS[0]:
             change = _change(case, name, start, value)
             change["text"] += f": {required}"
             changes.append(change)
@@ -232,7 +232,7 @@ def _constructions_that_meet(
     for i, entry in enumerate(entries):
         yield begin + length * i / len(entries), begin + length * (i + 1) / len(entries)
         required = _requirement(entry.case(case))
-        if required and required.verdict == "met":
+        if required and required.verdict == VERDICTS[0]:
             result[f"{entry.name}: {required}"] = required.rating.level
     return sorted(result, key=lambda text: result[text])[:MAX_NAMED]
 

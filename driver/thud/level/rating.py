@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import CLASS_LIMITS, RATED_BANDS
+from thud.base._schema import CLASS_LIMITS, RATED_BANDS, VERDICTS
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
@@ -141,14 +141,15 @@ class Requirement:
         return self.rating.probability(self.limit)
 
     @property
-    def verdict(self) -> Literal["met", "not met", "undecided"]:
-        """``"met"`` from 84 % on, ``"not met"`` up to 16 %, else ``"undecided"``.
+    def verdict(self) -> str:
+        """``"conforms"`` from 84 % on, ``"does not conform"`` up to 16 %, else ``"undecided"``.
 
         That of a source that does not conform is undecided, too.
         """
-        if self.conforms and self.probability >= MET:
-            return "met"
-        return "not met" if self.conforms and self.probability <= 1 - MET else "undecided"
+        conforms, fails, undecided = VERDICTS
+        if not self.conforms or 1 - MET < self.probability < MET:
+            return undecided
+        return conforms if self.probability >= MET else fails
 
     @property
     def chance(self) -> str:

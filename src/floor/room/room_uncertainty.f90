@@ -9,6 +9,7 @@ module thud_room_uncertainty
    use thud_plate_stack, only: plate_stack_type
    use thud_rating, only: get_rounded
    use thud_room, only: get_rating_index, room_level_type, room_type
+   use thud_source_limits, only: verdict_conforms, verdict_fails, verdict_undecided
    implicit none (type, external)
    private
 
@@ -89,12 +90,13 @@ contains
    pure function judge_requirement(prediction) result(verdict)
       !> Prediction with its probability.
       type(room_level_type), intent(in) :: prediction
-      character(len=9) :: verdict
+      !> Undecided if the source does not conform.
+      integer :: verdict
 
-      verdict = 'undecided'
+      verdict = verdict_undecided
       if (.not. prediction%source_conforms) return
-      if (prediction%probability >= met_from) verdict = 'met'
-      if (prediction%probability <= missed_up_to) verdict = 'not met'
+      if (prediction%probability >= met_from) verdict = verdict_conforms
+      if (prediction%probability <= missed_up_to) verdict = verdict_fails
    end function judge_requirement
 
 end module thud_room_uncertainty

@@ -312,7 +312,7 @@ contains
          call bundle%add_number('required', case%room%required, 'dB')
          call bundle%add_text('required_rating', trim(case%room%rating))
          call bundle%add_number('probability', room%probability, 'that it is met')
-         call bundle%add_text('verdict', trim(judge_requirement(room)))
+         call bundle%add_text('verdict', trim(verdict_names(judge_requirement(room))))
       end if
       allocate (warnings(0))
       call add_floor_warnings(case, state, warnings)
