@@ -6,8 +6,7 @@ module thud_new_field
    implicit none (type, external)
    private
 
-   public :: choice_field, in_group, integer_field, list_field, logical_field, only_with, real_field, text_field, &
-      text_list_field
+   public :: choice_field, in_group, integer_field, list_field, only_with, plain_field, real_field
 
 contains
 
@@ -40,17 +39,6 @@ contains
       field%value => variable
    end function integer_field
 
-   !> Describes a key that is true or false.
-   function logical_field(key, variable, meaning) result(field)
-      character(len=*), intent(in) :: key
-      logical, intent(in), target :: variable
-      character(len=*), intent(in) :: meaning
-      type(field_type) :: field
-
-      field = field_type(kind='flag', key=key, meaning=meaning)
-      field%value => variable
-   end function logical_field
-
    !> Describes a key with a list of numbers that share one range.
    function list_field(key, variable, unit, meaning, range, whole) result(field)
       character(len=*), intent(in) :: key
@@ -66,10 +54,11 @@ contains
       field%value => variable
    end function list_field
 
-   !> Describes a key with free text.
-   function text_field(key, variable, meaning, is_path) result(field)
+   !> Describes a key that takes any value of its kind.
+   function plain_field(key, variable, meaning, is_path) result(field)
       character(len=*), intent(in) :: key
-      character(len=name_length), intent(in), target :: variable
+      !> Logical, text of `name_length` or `text_list_type`.
+      class(*), intent(in), target :: variable
       character(len=*), intent(in) :: meaning
       !> See `field_type` (default: false).
       logical, intent(in), optional :: is_path
@@ -78,18 +67,13 @@ contains
       field = field_type(kind='text', key=key, meaning=meaning)
       if (present(is_path)) field%is_path = is_path
       field%value => variable
-   end function text_field
-
-   !> Describes a key with a list of free texts.
-   function text_list_field(key, variable, meaning) result(field)
-      character(len=*), intent(in) :: key
-      type(text_list_type), intent(in), target :: variable
-      character(len=*), intent(in) :: meaning
-      type(field_type) :: field
-
-      field = field_type(kind='texts', key=key, meaning=meaning)
-      field%value => variable
-   end function text_list_field
+      select type (variable)
+      type is (logical)
+         field%kind = 'flag'
+      type is (text_list_type)
+         field%kind = 'texts'
+      end select
+   end function plain_field
 
    !> Describes a key that takes one of several words.
    function choice_field(key, variable, meaning, choices) result(field)
@@ -100,7 +84,7 @@ contains
       character(len=*), intent(in) :: choices(:)
       type(field_type) :: field
 
-      field = text_field(key, variable, meaning)
+      field = plain_field(key, variable, meaning)
       field%kind = 'choice'
       field%n_choice = size(choices)
       field%choices(:size(choices)) = choices

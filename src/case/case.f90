@@ -9,7 +9,7 @@ module thud_case
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, in_group, text_field
+   use thud_new_field, only: choice_field, in_group, plain_field
    use thud_plate, only: plate_type
    use thud_rectangular_floor, only: rectangular_floor_type
    use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, &
@@ -186,7 +186,7 @@ contains
       integer :: i
 
       fields = [ &
-         in_group('case', [text_field('name', case%name, 'name of the case and of its output directory')]), &
+         in_group('case', [plain_field('name', case%name, 'name of the case and of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
          in_group('modes', get_modes_fields(case%modes), owner='modes'), &
          in_group('compression', get_compression_fields(case%compression), owner='compression'), &

@@ -4,7 +4,7 @@ module thud_unknowns
    use thud_field, only: field_type, get_interval, key_length, list_type, text_list_type
    use thud_interval, only: interval_type
    use thud_kinds, only: wp
-   use thud_new_field, only: list_field, text_list_field
+   use thud_new_field, only: list_field, plain_field
    use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
@@ -34,12 +34,12 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         text_list_field('key', unknowns%key, 'keys of ball, drop and model whose values are not known'), &
+         plain_field('key', unknowns%key, 'keys of ball, drop and model whose values are not known'), &
          list_field('low', unknowns%low, '', 'their minima, in the units of the keys', '[-1e30, 1e30]'), &
          list_field('high', unknowns%high, '', 'their maxima', '[-1e30, 1e30]'), &
          list_field('standard_deviation', unknowns%standard_deviation, '', &
          'standard deviations around the values of the case, truncated by low and high; 0: uniform', '[0, 1e30]'), &
-         text_list_field('reason', unknowns%reason, 'reasons of the ranges, with their sources')]
+         plain_field('reason', unknowns%reason, 'reasons of the ranges, with their sources')]
    end function get_unknowns_fields
 
    !> Returns an error if lists differ in length, a key is not known, or a range is empty or not allowed.

@@ -7,7 +7,7 @@ module thud_modal_floor
    use thud_floor_model, only: floor_model_type, floor_state_type
    use thud_floor_modes, only: floor_modes_type, new_floor_receiver
    use thud_kinds, only: wp
-   use thud_new_field, only: real_field, text_field
+   use thud_new_field, only: plain_field, real_field
    use thud_plate, only: get_mode_density, get_plate_fields, get_resistance, get_surface_mass, plate_type
    use thud_sampled_modes, only: read_sampled_modes
    use thud_text, only: fixed, to_text
@@ -43,7 +43,7 @@ contains
 
       fields = get_plate_fields(self%plate, .true.)
       fields = [ &
-         text_field('file', self%file, 'file of the modes: frequencies, loss factors, shapes on a grid', &
+         plain_field('file', self%file, 'file of the modes: frequencies, loss factors, shapes on a grid', &
          is_path=.true.), &
          self%get_source_fields(), &
          real_field('residual_compliance', self%residual_compliance, 'm/N', &

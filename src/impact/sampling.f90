@@ -3,7 +3,7 @@ module thud_sampling
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_kinds, only: wp
-   use thud_new_field, only: integer_field, logical_field, real_field
+   use thud_new_field, only: integer_field, plain_field, real_field
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -50,7 +50,7 @@ contains
          real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
          '[0.001, 10]'), &
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]'), &
-         logical_field('verify', sampling%verify, 'compute again at a finer resolution, and state the changes')]
+         plain_field('verify', sampling%verify, 'compute again at a finer resolution, and state the changes')]
    end function get_sampling_fields
 
    !> Checks the numbers of samples and steps of a record.

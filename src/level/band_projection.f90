@@ -82,7 +82,7 @@ contains
       type(band_type), intent(in) :: bands(:)
       !> The matrices; n_sample = 0 if they would take too long, or LAPACK does not find the sequences.
       type(band_projection_type), intent(out) :: projection
-      real(wp), allocatable :: node(:), weight(:), angle(:, :)
+      real(wp), allocatable :: node(:), weight(:), angle(:, :), waves(:, :)
       integer :: count(size(bands))
       integer :: i
       logical :: failed(2)
@@ -107,27 +107,26 @@ contains
       do i = 1, n_sample/2
          angle(i, :) = 2*pi/sample_rate*(i - (n_sample + 1)/2.0_wp)*node
       end do
-      call find_space(cos(angle)*spread(weight, 1, n_sample/2), projection%even, failed(1))
-      call find_space(sin(angle)*spread(weight, 1, n_sample/2), projection%odd, failed(2))
+      waves = cos(angle)*spread(weight, 1, n_sample/2)
+      call find_space(waves, projection%even, failed(1))
+      waves = sin(angle)*spread(weight, 1, n_sample/2)
+      call find_space(waves, projection%odd, failed(2))
       if (.not. any(failed)) projection%n_sample = n_sample
    end subroutine new_band_projection
 
    !> The sequences that span weighted waves, by decreasing energy.
    subroutine find_space(waves, space, failed)
-      !> First halves of cosines or sines at the nodes: [n_half, n_node].
-      real(wp), intent(in) :: waves(:, :)
+      !> First halves of cosines or sines at the nodes, destroyed: [n_half, n_node].
+      real(wp), intent(inout) :: waves(:, :)
       type(space_type), intent(out) :: space
       !> LAPACK does not find them.
       logical, intent(out) :: failed
-      real(wp) :: work(5*sum(shape(waves)))
-      real(wp) :: values(minval(shape(waves)))
-      real(wp), allocatable :: scratch(:, :)
+      real(wp) :: values(minval(shape(waves))), work(5*sum(shape(waves)))
       integer :: i, info, n
 
       n = size(values)
-      scratch = waves
       allocate (space%sequences(size(waves, 1), n), space%spectra(n, size(waves, 2)))
-      call dgesvd('S', 'S', size(waves, 1), size(waves, 2), scratch, size(waves, 1), values, space%sequences, size(waves, 1), &
+      call dgesvd('S', 'S', size(waves, 1), size(waves, 2), waves, size(waves, 1), values, space%sequences, size(waves, 1), &
          space%spectra, n, work, size(work), info)
       failed = info /= 0
       if (failed) return
@@ -149,40 +148,37 @@ contains
       real(wp), intent(out) :: energy(:, :)
       !> Sums of the squared samples, N^2: [n_record].
       real(wp), intent(out) :: square_sum(:)
-      real(wp), allocatable :: folded(:, :)
       integer :: i
 
-      allocate (folded(size(record, 1), projection%n_sample/2))
       energy = 0.0_wp
+      call add_energies(1.0_wp, projection%even)
+      call add_energies(-1.0_wp, projection%odd)
       square_sum = 0.0_wp
-      do i = 1, size(folded, 2)
-         associate (front => record(:, i), back => record(:, projection%n_sample + 1 - i))
-            folded(:, i) = front + back
-            square_sum = square_sum + front**2 + back**2
-         end associate
+      do i = 1, projection%n_sample
+         square_sum = square_sum + record(:, i)**2
       end do
-      call add_energies(projection%even)
-      do i = 1, size(folded, 2)
-         folded(:, i) = record(:, i) - record(:, projection%n_sample + 1 - i)
-      end do
-      call add_energies(projection%odd)
 
    contains
 
-      !> Adds the energies of the folded records.
-      subroutine add_energies(space)
-         !> Symmetric or antisymmetric sequences.
+      !> Adds the energies of the symmetric or antisymmetric parts of the records.
+      subroutine add_energies(sign, space)
+         !> 1 for symmetric sequences, -1 for antisymmetric ones.
+         real(wp), intent(in) :: sign
          type(space_type), intent(in) :: space
-         real(wp), allocatable :: spectrum(:, :)
-         integer :: band, j
+         real(wp), allocatable :: folded(:, :), spectrum(:, :)
+         integer :: band, first, j
 
+         allocate (folded(size(record, 1), projection%n_sample/2))
+         do j = 1, size(folded, 2)
+            folded(:, j) = record(:, j) + sign*record(:, projection%n_sample + 1 - j)
+         end do
          spectrum = get_product(get_product(folded, space%sequences), space%spectra)
-         j = 0
+         first = 1
          do band = 1, size(energy, 2)
-            do j = j + 1, projection%last_node(band)
+            do j = first, projection%last_node(band)
                energy(:, band) = energy(:, band) + spectrum(:, j)**2
             end do
-            j = projection%last_node(band)
+            first = projection%last_node(band) + 1
          end do
       end subroutine add_energies
 

@@ -154,28 +154,11 @@ contains
       with_sine = 0.0_wp
       with_cosine = 0.0_wp
       do start = 0, size(x) - 1, block
-         angle = get_angle(a, start)
+         angle = a*start
          with_sine = with_sine + sin(angle)*x(start + 1:start + block)
          with_cosine = with_cosine + cos(angle)*x(start + 1:start + block)
       end do
       total = sum([(with_sine(i)*cos(a*i) + with_cosine(i)*sin(a*i), i=1, block)])
    end function get_sine_sum
-
-   !> Angle from -pi to pi after a number of samples. Whole turns are removed first; otherwise the rounding error would grow
-   !> with the length of the record.
-   elemental function get_angle(per_sample, count) result(angle)
-      !> Angle per sample.
-      real(wp), intent(in) :: per_sample
-      !> Number of samples, up to `max_samples`.
-      integer, intent(in) :: count
-      real(wp) :: angle
-      real(wp), parameter :: scale = 2.0_wp**24
-      real(wp) :: revolutions, high
-
-      revolutions = per_sample/(2*pi)
-      ! Rounded to so few digits that the product is exact.
-      high = anint(revolutions*scale)/scale
-      angle = 2*pi*((high*count - anint(high*count)) + (revolutions - high)*count)
-   end function get_angle
 
 end module thud_force_exposure

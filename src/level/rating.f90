@@ -36,10 +36,6 @@ module thud_rating
    !> 6 ln 10 rounded to 13.82 as in ISO 16283-2.
    real(wp), parameter :: fast_reverberation = 1.7275_wp
 
-   !> C is the reverberation time divided by `fast_reverberation`. If C differs from 1 by less than this, a series gives
-   !> ln C/(C - 1), to 1e-16.
-   real(wp), parameter :: near_one = 1.0e-5_wp
-
    !> Upper limits of the A-weighted level for the classes 1 to 4, dB (KS F 2863-2).
    real(wp), parameter :: class_limits(*) = [37.0_wp, 41.0_wp, 45.0_wp, 49.0_wp]
 
@@ -137,19 +133,17 @@ contains
          - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_reverberation))
    end function get_standardization
 
-   !> ln g = -ln C/(C - 1).
+   !> ln g = -ln C/(C - 1), which tends to -1 at C = 1.
    elemental function get_log_gain(reverberation_time) result(log_gain)
       !> Reverberation time, s.
       real(wp), intent(in) :: reverberation_time
       real(wp) :: log_gain
-      real(wp) :: excess
 
-      excess = reverberation_time/fast_reverberation - 1
-      if (abs(excess) < near_one) then
-         log_gain = -1 + excess*(0.5_wp - excess*(1/3.0_wp - excess/4))
-      else
-         log_gain = -log(1 + excess)/excess
-      end if
+      log_gain = -1.0_wp
+      associate (c => reverberation_time/fast_reverberation)
+         ! Near 1 the difference is exact.
+         if (abs(c - 1) > 0.0_wp) log_gain = -log(c)/(c - 1)
+      end associate
    end function get_log_gain
 
    !> Level without the background (ISO 16283-2). From 6 to 15 dB above the background, its energy is subtracted from the

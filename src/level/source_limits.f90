@@ -124,31 +124,23 @@ contains
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
       integer :: peak_count
-      real(wp) :: extreme, threshold
       real(wp) :: force(size(whole_force))
-      logical :: rising
+      real(wp) :: extreme, threshold
+      ! Whether the force rises (1) or falls (-1) towards the next extreme.
+      integer :: direction
       integer :: i
 
       peak_count = 0
       call get_low_pass(whole_force, sample_rate, recorded_band, force)
       threshold = peak_prominence*maxval(force)
       extreme = 0.0_wp
-      rising = .true.
+      direction = 1
       do i = 1, size(force)
-         if (rising) then
-            extreme = max(extreme, force(i))
-            if (extreme - force(i) > threshold) then
-               peak_count = peak_count + 1
-               extreme = force(i)
-               rising = .false.
-            end if
-         else
-            extreme = min(extreme, force(i))
-            if (force(i) - extreme > threshold) then
-               extreme = force(i)
-               rising = .true.
-            end if
-         end if
+         extreme = max(extreme, direction*force(i))
+         if (.not. extreme - direction*force(i) > threshold) cycle
+         if (direction == 1) peak_count = peak_count + 1
+         direction = -direction
+         extreme = direction*force(i)
       end do
    end function get_peak_count
 

@@ -15,7 +15,7 @@ module thud_modal_ball
    use thud_modal_compression, only: compress_modal_ball, get_flexibilities
    use thud_modal_run, only: march, modal_run_type, start_run
    use thud_mode_step, only: damping_type, index_amplitude, new_damping, new_modes, new_static_step, set_factors
-   use thud_new_field, only: choice_field, integer_field, list_field, logical_field, only_with, real_field
+   use thud_new_field, only: choice_field, integer_field, list_field, only_with, plain_field, real_field
    use thud_prony, only: check_fractional_loss
    use thud_receiver, only: new_receiver_step, receiver_type
    use thud_ring_contact, only: new_ring_contact
@@ -125,8 +125,8 @@ contains
          is_calibrated=.true.)]), &
          only_with('damping_law', ['fractional'], [real_field('fractional_order', self%fractional_order, '', &
          'order of the derivative, for fractional; 1: as rising', '(0, 1]')]), &
-         logical_field('cavity_gas', self%cavity_gas, 'the gas in the cavity resists volume changes'), &
-         logical_field('contact_gravity', self%contact_gravity, 'gravity acts also during the contact'), &
+         plain_field('cavity_gas', self%cavity_gas, 'the gas in the cavity resists volume changes'), &
+         plain_field('contact_gravity', self%contact_gravity, 'gravity acts also during the contact'), &
          choice_field('floor_friction', self%floor_friction, 'friction of the floor: none or infinite (sticking)', &
          [character(len=5) :: 'none', 'stick']), &
          list_field('static_families', self%static_families, '', 'harmonics treated as quasi-static', &
