@@ -5,7 +5,7 @@ module thud_progress
    implicit none (type, external)
    private
 
-   public :: latest_progress, report_progress, set_progress_handler
+   public :: latest_progress, report_progress, show_progress
 
    abstract interface
       !> Shows the progress.
@@ -24,18 +24,9 @@ module thud_progress
    real(wp), volatile, protected :: latest_progress = 0.0_wp
 
    !> Procedure that shows the progress; null unless the executable or the driver sets it.
-   procedure(handler), pointer :: show => null()
+   procedure(handler), pointer :: show_progress => null()
 
 contains
-
-   !> Sets the procedure that shows the progress.
-   subroutine set_progress_handler(new_handler)
-      !> The procedure; without it progress is not shown.
-      procedure(handler), optional :: new_handler
-
-      show => null()
-      if (present(new_handler)) show => new_handler
-   end subroutine set_progress_handler
 
    !> Reports the progress.
    subroutine report_progress(done, whole, unit)
@@ -50,8 +41,8 @@ contains
       !$ if (omp_get_thread_num() > 0) return
       latest_progress = 0.0_wp
       if (whole > 0.0_wp) latest_progress = min(1.0_wp, done/whole)
-      ! Another thread may change `show` meanwhile.
-      current => show
+      ! Another thread may change it meanwhile.
+      current => show_progress
       if (associated(current)) call current(done, whole, unit)
    end subroutine report_progress
 

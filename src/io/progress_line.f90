@@ -2,7 +2,7 @@
 module thud_progress_line
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
-   use thud_progress, only: set_progress_handler
+   use thud_progress, only: show_progress
    use thud_system, only: is_terminal, standard_error, write_text
    use thud_text, only: fixed, screen_width
    implicit none (type, external)
@@ -34,14 +34,14 @@ contains
       first = latest
       latest_done = 0.0_wp
       shown = .false.
-      call set_progress_handler(print_line)
+      show_progress => print_line
    end subroutine begin_progress
 
    !> Stops showing progress, and clears the line.
    subroutine end_progress()
       integer :: status
 
-      call set_progress_handler()
+      show_progress => null()
       if (shown) call write_text(standard_error, achar(13)//repeat(' ', line_length)//achar(13), status)
       shown = .false.
    end subroutine end_progress

@@ -116,7 +116,7 @@ contains
       !> Energy of each band, N^2 s: [n_band].
       real(wp) :: energy(size(lower))
       real(wp), allocatable :: correlation(:)
-      real(wp) :: step, edge(2)
+      real(wp) :: step, edge, below, above
       integer :: i, lag
 
       ! Padded with zeros to whole blocks.
@@ -131,34 +131,39 @@ contains
          end if
       end do
       energy = 0.0_wp
+      edge = 0.0_wp
+      below = 0.0_wp
       do i = 1, size(lower)
          if (is_interrupted()) exit
-         edge = 2*pi*[lower(i), upper(i)]/sample_rate
-         energy(i) = ((edge(2) - edge(1))*correlation(0) + 2*(get_sine_sum(correlation(1:), edge(2)) &
-            - get_sine_sum(correlation(1:), edge(1))))/(pi*sample_rate)
+         ! Adjacent bands share an edge.
+         if (abs(lower(i) - edge) > 0.0_wp) below = get_energy_below(correlation, 2*pi*lower(i)/sample_rate)
+         edge = upper(i)
+         above = get_energy_below(correlation, 2*pi*edge/sample_rate)
+         energy(i) = (above - below)/(pi*sample_rate)
+         below = above
       end do
    end function get_energy
 
-   !> Sum of x(k) sin(a k) over all samples, whose number is a multiple of `block`.
+   !> Energy below a frequency times pi f_s, N^2: a r(0) + 2 sum of r(k) g(k) sin(a k).
    !>
    !> Sines and cosines are computed only for the starts of blocks and within one block; sums of angles give all others.
-   pure function get_sine_sum(x, a) result(total)
-      !> Samples: [n].
-      real(wp), intent(in), contiguous :: x(:)
-      !> Angle per sample.
+   pure function get_energy_below(x, a) result(energy)
+      !> r(0), then r(k) g(k) for a number of lags that is a multiple of `block`: [0:n].
+      real(wp), intent(in), contiguous :: x(0:)
+      !> Angle by which the frequency advances per sample.
       real(wp), intent(in) :: a
-      real(wp) :: total
+      real(wp) :: energy
       real(wp) :: with_sine(block), with_cosine(block), angle
       integer :: start, i
 
       with_sine = 0.0_wp
       with_cosine = 0.0_wp
-      do start = 0, size(x) - 1, block
+      do start = 0, ubound(x, 1) - 1, block
          angle = a*start
          with_sine = with_sine + sin(angle)*x(start + 1:start + block)
          with_cosine = with_cosine + cos(angle)*x(start + 1:start + block)
       end do
-      total = sum([(with_sine(i)*cos(a*i) + with_cosine(i)*sin(a*i), i=1, block)])
-   end function get_sine_sum
+      energy = a*x(0) + 2*sum([(with_sine(i)*cos(a*i) + with_cosine(i)*sin(a*i), i=1, block)])
+   end function get_energy_below
 
 end module thud_force_exposure
