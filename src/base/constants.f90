@@ -1,4 +1,4 @@
-!> Mathematical constants, the band of records, the program's version and compiler.
+!> Constants of mathematics and acoustics, the band of records, the version and compiler of the program.
 module thud_constants
    use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
    use thud_kinds, only: wp
