@@ -138,7 +138,8 @@ contains
       if (ieee_is_nan(value)) then
          buffer = 'NaN'
          return
-      else if (.not. ieee_is_finite(value)) then
+      end if
+      if (.not. ieee_is_finite(value)) then
          buffer = merge('-Infinity', 'Infinity ', value < 0.0_wp)
          return
       end if

@@ -1,10 +1,10 @@
 !> Band energies of many records at once, by matrix products.
 !>
-!> The energy of a record in a band is an integral of its squared spectrum, here a sum over Gauss-Legendre nodes. The spectra of
-!> records of length T at the nodes of all bands lie in a space of few dimensions: some 20 more than 2 W T with the highest
-!> frequency W (Slepian 1978). The singular value decomposition of the waves at the nodes finds the sequences that span it, and
-!> a record is projected on them once for all bands. Symmetric and antisymmetric sequences halve the work, because records are
-!> folded first.
+!> The energy of a record in a band is an integral of its squared spectrum, here a sum over Gauss-Legendre nodes. The spectra
+!> of records of length T at the nodes of all bands lie in a space of few dimensions: some 20 more than 2 W T with the
+!> highest frequency W (Slepian 1978). The singular value decomposition of the waves at the nodes finds sequences that span
+!> it; a record is projected on them once for all bands. Symmetric and antisymmetric sequences halve the work, because
+!> records are folded first.
 !>
 !> The omitted sequences change the square root of a band's energy by at most `max_omitted` times the norm of the record.
 module thud_band_projection
@@ -87,8 +87,8 @@ contains
       integer :: i
       logical :: failed(2)
 
-      ! |F|**2 is a sum of cos(a x + b) over [-1, 1] with a up to pi times width times duration; with so many nodes the error of
-      ! each is below 2e-14.
+      ! |F|**2 is a sum of cos(a x + b) over [-1, 1] with a up to pi times width times duration; with so many nodes the error
+      ! of each is below 2e-14.
       count = ceiling(10 + 0.7_wp*pi*(bands%upper - bands%lower)*n_sample/sample_rate)
       if (n_sample*real(sum(count), wp)**2 > max_work) return
       projection%last_node = [(sum(count(:i)), i=1, size(bands))]

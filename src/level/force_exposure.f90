@@ -3,9 +3,10 @@
 !>
 !> The energy below a frequency, 2 * integral of |F(f)|**2 df from 0, is computed from the autocorrelation r of the record,
 !> without padding or window. Let a be the angle by which the frequency advances per sample. Then this energy is 1/(pi f_s) *
-!> (a r(0) + 2 sum over the lags k of r(k) g(k) sin(a k)) with g(k) = 1/k. For the sum over the bins of a zero-padded transform
-!> of N samples instead of the integral, g(k) = d/sin(d k) with d = pi/N, and the band extends from half a bin below its first
-!> bin to half a bin above its last bin. The energy of a band is the difference between those below its edges.
+!> (a r(0) + 2 sum over the lags k of r(k) g(k) sin(a k)) with g(k) = 1/k. For the sum over the bins of a zero-padded
+!> transform of N samples instead of the integral, g(k) = d/sin(d k) with d = pi/N, and the band extends from half a bin
+!> below its first bin to half a bin above its last bin. The energy of a band is the difference between those below its
+!> edges.
 module thud_force_exposure
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_band, only: band_type
@@ -153,7 +154,8 @@ contains
       !> Angle by which the frequency advances per sample.
       real(wp), intent(in) :: a
       real(wp) :: energy
-      real(wp) :: with_sine(block), with_cosine(block), angle
+      real(wp) :: with_sine(block), with_cosine(block)
+      real(wp) :: angle
       integer :: start, i
 
       with_sine = 0.0_wp

@@ -9,14 +9,14 @@ module thud_rating
    public :: class_limits, correct_for_background, fast_reverberation, get_a_weighted_level, get_class, get_inverse_a_rating
    public :: get_rated_bands, get_rounded, get_standardization, rated_set_names, rating_names, rating_titles
 
-   !> Sets of bands that have a rating: [n_set]. One-third-octave bands are not summed into octaves first: the maximum of a sum
-   !> is not the sum of the maxima.
+   !> Sets of bands that have a rating: [n_set]. One-third-octave bands are not summed into octaves first: the maximum of a
+   !> sum is not the sum of the maxima.
    character(len=24), parameter :: rated_set_names(*) = [character(len=24) :: 'octave', 'third']
 
    !> Nominal mid frequency of the lowest one-third-octave band that is rated, Hz.
    real(wp), parameter :: lowest_rated = 50.0_wp
 
-   !> A-weighting of the one-third-octave bands 50 to 630 Hz as ISO 717-2 annex D rounds it, dB; those of octaves are the same.
+   !> A-weighting of the one-third-octave bands 50 to 630 Hz as ISO 717-2 annex D rounds it, dB; that of octaves is the same.
    real(wp), parameter :: a_weighting(*) = [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, -8.7_wp, &
       -6.6_wp, -4.8_wp, -3.2_wp, -1.9_wp]
 

@@ -103,9 +103,11 @@ contains
       type(criterion_type), intent(in) :: criterion
       integer :: verdict
 
-      verdict = merge(verdict_conforms, verdict_fails, conforms(criterion))
-      if (.not. criterion%error <= min(abs(criterion%value - criterion%lower), abs(criterion%value - criterion%upper))) &
-         verdict = verdict_undecided
+      verdict = verdict_undecided
+      associate (value => criterion%value, lower => criterion%lower, upper => criterion%upper)
+         if (criterion%error <= min(abs(value - lower), abs(value - upper))) verdict = merge(verdict_conforms, &
+            verdict_fails, conforms(criterion))
+      end associate
    end function get_verdict
 
    !> Verdict on all of several: it fails if one fails, and is undecided if one is undecided and none fails.

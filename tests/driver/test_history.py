@@ -15,8 +15,9 @@ from conftest import naming
 from scipy.stats import binom
 
 import thud
+from thud.base._schema import VERDICTS
 from thud.cli.recording_commands import run_history
-from thud.level.assessment import VERDICTS, assess_levels
+from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import get_bands
 from thud.report.ball_history import (

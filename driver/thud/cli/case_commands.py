@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from thud.base._schema import VERDICTS
 from thud.base.bridge import ask, text, texts
 from thud.base.checks import refuse
 from thud.base.display import draw_all, warn_if_not_drawn
@@ -34,7 +35,6 @@ from thud.cli.screen import print_error, print_notes, print_path, print_results,
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
-from thud.level.assessment import VERDICTS
 
 if TYPE_CHECKING:
     import argparse

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
@@ -22,7 +23,6 @@ from thud.cli.command import (
     results_of,
 )
 from thud.cli.screen import print_notes, print_path, print_results, shows_progress
-from thud.level.assessment import VERDICTS
 from thud.level.levels import SOURCES
 from thud.recordings.channel import channel_of
 

@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from tqdm import tqdm
 
-from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES
+from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES, VERDICTS
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Page
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
-from thud.level.assessment import VERDICTS
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source

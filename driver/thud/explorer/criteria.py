@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from thud.level.assessment import VERDICTS
+from thud.base._schema import VERDICTS
 from thud.report.page import STANDARDS
 from thud.report.predicted_floor import CAVEAT, verdict_text
 

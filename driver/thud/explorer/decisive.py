@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from thud.level.assessment import VERDICTS
+from thud.base._schema import VERDICTS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

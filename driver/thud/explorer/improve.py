@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import FiniteElement
+from thud.base._schema import VERDICTS, FiniteElement
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import scaled
@@ -24,7 +24,7 @@ from thud.explorer.recording import read_copies
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
-from thud.level.assessment import VERDICTS, get_criteria
+from thud.level.assessment import get_criteria
 from thud.level.rating import MET
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget

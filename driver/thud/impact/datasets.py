@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from thud.base import _schema as schema
+from thud.base._schema import VERDICTS
 from thud.base.bridge import compiler, version
 from thud.case.keys import find_key, key_owners
 from thud.impact.quantities import (
@@ -22,7 +23,6 @@ from thud.impact.quantities import (
     SAMPLE_RESULTS,
     sample_results,
 )
-from thud.level.assessment import VERDICTS
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import stdtrit
 
+from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
-from thud.level.assessment import VERDICTS
 from thud.recordings.dates import read_date
 from thud.report.contents import FORMAT
 from thud.report.rows import NOT_KNOWN, Style, criterion_style, limits_of, number, value_text

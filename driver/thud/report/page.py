@@ -7,8 +7,7 @@ import math
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import QUANTITIES
-from thud.level.assessment import VERDICTS
+from thud.base._schema import QUANTITIES, VERDICTS
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.fonts import FAMILY

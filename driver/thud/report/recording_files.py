@@ -6,12 +6,12 @@ import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
+from thud.base._schema import VERDICTS
 from thud.base.bridge import version
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
 from thud.base.tables import csv_text
-from thud.level.assessment import VERDICTS
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
 from thud.report import write
