@@ -35,9 +35,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       logical, allocatable :: possible(:)
-      character(len=:), allocatable :: group, key, suggestion
+      character(len=:), allocatable :: group, key, suggestion, word
       logical :: known
-      integer :: count, i, j
+      integer :: count, dot, i, j
 
       allocate (fields, source=get_active_fields(case))
       ! All samples must have levels in the same bands.
@@ -45,19 +45,21 @@ contains
          .and. fields(i)%key /= 'bands', i=1, size(fields))]
       allocate (columns(size(names)))
       do i = 1, size(names)
-         call split_name(names(i), group, key, columns(i)%entry, known)
+         dot = index(names(i), '.')
+         group = names(i)(:max(dot - 1, 0))
+         word = trim(names(i)(dot + 1:))
+         key = word(:index(word//'(', '(') - 1)
          ! Without a group, the name means the first of the keys with this name, which belongs to the source.
          columns(i)%field = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
             .true., dim=1)
          count = 0
-         known = known .and. columns(i)%field > 0
-         if (columns(i)%field > 0) then
-            if (fields(columns(i)%field)%kind == 'list') then
-               count = size(fields(columns(i)%field)%get_entries())
-               known = known .and. columns(i)%entry >= 1 .and. columns(i)%entry <= count
-            else
-               known = known .and. index(names(i), '(') == 0
-            end if
+         known = columns(i)%field > 0 .and. dot /= 1
+         if (known) then
+            if (fields(columns(i)%field)%kind == 'list') count = size(fields(columns(i)%field)%get_entries())
+            do j = 1, count
+               if (word == key//'('//to_text(j)//')') columns(i)%entry = j
+            end do
+            known = word == key .and. count == 0 .or. columns(i)%entry > 0
          end if
          if (.not. known) then
             call get_suggestion(trim(names(i)), pack(fields%key, possible), suggestion)
@@ -71,30 +73,5 @@ contains
          if (allocated(error)) return
       end do
    end subroutine find_columns
-
-   !> Group, key and entry of a name such as `frequency(2)` or `plate.thickness`.
-   pure subroutine split_name(name, group, key, entry, valid)
-      character(len=*), intent(in) :: name
-      !> The group, empty if the name has none; the key.
-      character(len=:), allocatable, intent(out) :: group, key
-      !> Index of the entry; 0 if the name has none.
-      integer, intent(out) :: entry
-      !> The name is a key, perhaps with a number in brackets.
-      logical, intent(out) :: valid
-      integer :: bracket, dot, last
-
-      dot = index(name, '.')
-      group = name(:max(dot - 1, 0))
-      key = name(dot + 1:)
-      entry = 0
-      valid = dot /= 1
-      bracket = index(name, '(')
-      if (bracket == 0) return
-      key = name(dot + 1:bracket - 1)
-      last = len_trim(name)
-      valid = valid .and. last > bracket + 1 .and. last < bracket + 6 .and. name(last:last) == ')' &
-         .and. verify(name(bracket + 1:last - 1), '0123456789') == 0
-      if (valid) read (name(bracket + 1:last - 1), *) entry
-   end subroutine split_name
 
 end module thud_column
