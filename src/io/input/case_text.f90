@@ -37,30 +37,30 @@ contains
       !> Allow a room without a floor (default: false).
       logical, intent(in), optional :: room_alone
       logical :: needs_floor
-      type(assignment_type), allocatable :: given(:)
+      type(assignment_type), allocatable :: assignments(:)
       type(field_type), allocatable :: fields(:)
       logical, allocatable :: stated(:)
       integer :: i
 
       call new_case(case)
       if (len(default_name) <= name_length) case%name = default_name
-      call parse_namelist(text, given, error)
-      if (size(given) == 0 .and. .not. allocated(error)) error = input_error('there is no namelist group; allowed: files ' &
-         //'with groups such as '//join_quoted(main_groups))
+      call parse_namelist(text, assignments, error)
+      if (size(assignments) == 0 .and. .not. allocated(error)) error = input_error('there is no namelist group; allowed: ' &
+         //'files with groups such as '//join_quoted(main_groups))
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
       allocate (stated(size(fields)), source=.false.)
-      case%has_modes = any(given%group == 'modes')
-      case%has_floor = any(given%group == 'floor')
-      case%has_room = any(given%group == 'room')
-      case%has_compression = any(given%group == 'compression')
-      case%has_unknowns = any(given%group == 'unknowns')
-      case%has_impact = any(given%group == 'model') .or. .not. case%has_modes
+      case%has_modes = any(assignments%group == 'modes')
+      case%has_floor = any(assignments%group == 'floor')
+      case%has_room = any(assignments%group == 'room')
+      case%has_compression = any(assignments%group == 'compression')
+      case%has_unknowns = any(assignments%group == 'unknowns')
+      case%has_impact = any(assignments%group == 'model') .or. .not. case%has_modes
       do i = 1, merge(size(main_groups), 1, case%has_impact)
-         if (all(given%group /= main_groups(i))) case%left_out = trim(case%left_out)//' &'//main_groups(i)
+         if (all(assignments%group /= main_groups(i))) case%left_out = trim(case%left_out)//' &'//main_groups(i)
       end do
-      do i = 1, size(given)
-         if (.not. allocated(error)) call assign(given, i, fields, stated, error)
+      do i = 1, size(assignments)
+         if (.not. allocated(error)) call assign(assignments, i, fields, stated, error)
       end do
       needs_floor = case%has_room
       if (present(room_alone)) needs_floor = needs_floor .and. .not. room_alone
@@ -74,7 +74,7 @@ contains
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
-      if (.not. allocated(error)) call check_use(given, case, error)
+      if (.not. allocated(error)) call check_use(assignments, case, error)
       if (present(unchecked)) then
          if (unchecked) return
       end if
@@ -105,9 +105,9 @@ contains
    end subroutine resolve_paths
 
    !> Returns an error if the case does not use a group.
-   subroutine check_use(given, case, error)
+   subroutine check_use(assignments, case, error)
       !> Assignments of the file: [n_assignment].
-      type(assignment_type), intent(in) :: given(:)
+      type(assignment_type), intent(in) :: assignments(:)
       type(case_type), intent(in), target :: case
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
@@ -116,24 +116,24 @@ contains
 
       allocate (fields, source=get_fields(case))
       fields = pack(fields, is_used(case, fields))
-      do i = 1, size(given)
-         if (any(fields%group == given(i)%group)) cycle
+      do i = 1, size(assignments)
+         if (any(fields%group == assignments(i)%group)) cycle
          where = 'with &modes alone'
          if (case%has_impact) where = 'with &model: name = '//quoted(case%model)
-         if (case%has_impact .and. any(floor_names == given(i)%group)) then
+         if (case%has_impact .and. any(floor_names == assignments(i)%group)) then
             where = 'without &floor'
             if (case%has_floor) where = 'with &floor: name = '//quoted(case%floor)
          end if
-         error = input_error('&'//trim(given(i)%group)//' in line '//to_text(given(i)%line)//' does nothing '//where &
-            //'; allowed: '//join_quoted(distinct(fields%group)))
+         error = input_error('&'//trim(assignments(i)%group)//' in line '//to_text(assignments(i)%line)//' does nothing ' &
+            //where//'; allowed: '//join_quoted(distinct(fields%group)))
          return
       end do
    end subroutine check_use
 
    !> Sets the variable of an assignment.
-   subroutine assign(given, i, fields, stated, error)
+   subroutine assign(assignments, i, fields, stated, error)
       !> Assignments of the file: [n_assignment].
-      type(assignment_type), intent(in) :: given(:)
+      type(assignment_type), intent(in) :: assignments(:)
       !> Index of the assignment.
       integer, intent(in) :: i
       !> Known keys: [n_field].
@@ -145,17 +145,18 @@ contains
       character(len=:), allocatable :: allowed, suggestion, label
       integer :: earlier, field
 
-      associate (group => given(i)%group, key => given(i)%key, keys => pack(fields%key, fields%group == given(i)%group))
-         earlier = findloc(given(:i - 1)%group == group .and. given(:i - 1)%key == key, .true., dim=1)
+      associate (group => assignments(i)%group, key => assignments(i)%key, &
+         keys => pack(fields%key, fields%group == assignments(i)%group))
+         earlier = findloc(assignments(:i - 1)%group == group .and. assignments(:i - 1)%key == key, .true., dim=1)
          field = findloc(fields%group == group .and. fields%key == key, .true., dim=1)
-         label = '&'//shortened(trim(group))//': '//shortened(trim(key))//' in line '//to_text(given(i)%line)
-         if (key == '') label = '&'//shortened(trim(group))//' in line '//to_text(given(i)%line)
+         label = '&'//shortened(trim(group))//': '//shortened(trim(key))//' in line '//to_text(assignments(i)%line)
+         if (key == '') label = '&'//shortened(trim(group))//' in line '//to_text(assignments(i)%line)
          if (size(keys) == 0) then
             call get_suggestion(trim(group), fields%group, suggestion)
             error = input_error(label//' is not a known group'//suggestion//'; allowed: ' &
                //join_quoted(distinct(fields%group)))
          else if (earlier > 0) then
-            error = input_error(label//' is given a second time, after line '//to_text(given(earlier)%line) &
+            error = input_error(label//' is given a second time, after line '//to_text(assignments(earlier)%line) &
                //'; allowed: once')
          else if (key == '') then
             continue
@@ -164,12 +165,12 @@ contains
             allowed = join_quoted(distinct(keys))
             if (len(allowed) > longest_list) allowed = 'the keys that thud --keys lists'
             error = input_error(label//' is not a known key'//suggestion//'; allowed: '//allowed)
-         else if (given(i)%value == '') then
+         else if (assignments(i)%value == '') then
             call fields(field)%get_allowed(allowed)
             error = input_error(label//' has no value; allowed: '//allowed)
          else
             stated = stated .or. fields%group == group .and. fields%key == key
-            call fields(field)%set_from_text(given(i)%value, error)
+            call fields(field)%set_from_text(assignments(i)%value, error)
          end if
       end associate
    end subroutine assign

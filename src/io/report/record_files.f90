@@ -29,19 +29,19 @@ contains
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: cells, row
       real(wp), allocatable :: columns(:, :)
-      integer, allocatable :: found(:)
+      integer, allocatable :: members(:)
       logical :: at_rest
       integer :: i, at
 
-      call find_group(bundle, group, found, text)
+      call find_group(bundle, group, members, text)
       if (text == '') return
       at = len(text)
-      allocate (columns(size(bundle%records(found(1))%values), size(found)))
-      do i = 1, size(found)
-         columns(:, i) = bundle%records(found(i))%values(:, 1, 1)
+      allocate (columns(size(bundle%records(members(1))%values), size(members)))
+      do i = 1, size(members)
+         columns(:, i) = bundle%records(members(i))%values(:, 1, 1)
       end do
-      allocate (character(len=width*(size(found) - 1)) :: cells)
-      allocate (character(len=width*size(found)) :: row)
+      allocate (character(len=width*(size(members) - 1)) :: cells)
+      allocate (character(len=width*size(members)) :: row)
       text = text//repeat(' ', size(columns, 1)*len(row))
       at_rest = .false.
       do i = 1, size(columns, 1)
@@ -64,20 +64,20 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(text_buffer_type) :: buffer
       character(len=cell_length), allocatable :: column(:), cells(:, :)
-      integer, allocatable :: found(:)
+      integer, allocatable :: members(:)
       integer :: i, j
 
-      call find_group(bundle, group, found, text)
+      call find_group(bundle, group, members, text)
       if (text == '') return
       call buffer%append(text)
-      do j = 1, size(found)
-         call get_cells(bundle%records(found(j)), column)
-         if (j == 1) allocate (cells(size(column), size(found)))
+      do j = 1, size(members)
+         call get_cells(bundle%records(members(j)), column)
+         if (j == 1) allocate (cells(size(column), size(members)))
          cells(:, j) = column
       end do
       do i = 1, size(cells, 1)
-         do j = 1, size(found)
-            call buffer%append(trim(cells(i, j))//merge(newline, ',', j == size(found)))
+         do j = 1, size(members)
+            call buffer%append(trim(cells(i, j))//merge(newline, ',', j == size(members)))
          end do
       end do
       text = buffer%get_text()
@@ -90,13 +90,13 @@ contains
       !> The group; empty if the results have no such group.
       character(len=:), allocatable, intent(out) :: text
       character(len=cell_length), allocatable :: cells(:)
-      integer, allocatable :: found(:)
+      integer, allocatable :: members(:)
       integer :: i
 
-      call find_group(bundle, group, found, text)
+      call find_group(bundle, group, members, text)
       if (text /= '') text = newline//'&'//trim(group)//newline
-      do i = 1, size(found)
-         associate (record => bundle%records(found(i)))
+      do i = 1, size(members)
+         associate (record => bundle%records(members(i)))
             call get_cells(record, cells)
             if (record%kind /= 'text' .and. all(cells == '')) cycle
             text = text//'   '//trim(record%name)//' = '
@@ -110,21 +110,21 @@ contains
    end subroutine get_namelist
 
    !> Indices of the records of a group, and their names as the header of a table.
-   pure subroutine find_group(bundle, group, found, header)
+   pure subroutine find_group(bundle, group, members, header)
       type(bundle_type), intent(in) :: bundle
       character(len=*), intent(in) :: group
       !> The indices: [n].
-      integer, allocatable, intent(out) :: found(:)
+      integer, allocatable, intent(out) :: members(:)
       !> The names with commas between them; empty if the results have no such group.
       character(len=:), allocatable, intent(out) :: header
       integer :: i
 
       header = ''
-      allocate (found(0))
+      allocate (members(0))
       do i = 1, bundle%n_record
          if (bundle%records(i)%group /= group) cycle
-         found = [found, i]
-         header = header//trim(merge(',', ' ', size(found) > 1))//trim(bundle%records(i)%name)
+         members = [members, i]
+         header = header//trim(merge(',', ' ', size(members) > 1))//trim(bundle%records(i)%name)
       end do
       if (header /= '') header = header//newline
    end subroutine find_group

@@ -345,8 +345,8 @@ contains
             error_quantity = get_quantity(trim(name)//'_error')
             if (i <= octave_count) then
                quantity = error_quantity
-               quantity%title = get_level_title(octaves(i))
-               value = history%octave_level(i)
+               quantity%title = get_level_title(octaves(min(i, octave_count)))
+               value = history%octave_level(min(i, octave_count))
             else
                quantity = get_quantity(name)
                value = values(findloc(quantities%name, name, dim=1))
