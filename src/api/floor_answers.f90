@@ -4,8 +4,8 @@ module thud_floor_answers
    use thud_ascending, only: get_ascending_order
    use thud_band, only: band_type, get_bands
    use thud_bundle, only: bundle_type
-   use thud_case, only: case_type
-   use thud_compute, only: drop_on_floor, prepare_floor
+   use thud_case, only: case_type, get_floor_number
+   use thud_compute, only: drop_on_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_floor_model, only: floor_state_type, get_transfer, has_own_modes
@@ -41,7 +41,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
 
-      call prepare_floor(case, state, error)
+      call case%floors(get_floor_number(case))%model%prepare(state, error)
       if (allocated(error)) return
       select case (question)
       case ('mobility')

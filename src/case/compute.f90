@@ -27,7 +27,7 @@ module thud_compute
    private
 
    public :: assess_floor, assessment_type, compute, compute_impact, drop_on_floor, get_assessed_force
-   public :: impact_type, is_conforming, prepare_floor, results_type, scope_type
+   public :: impact_type, is_conforming, results_type, scope_type
 
    !> Memory per sample of a record, including transforms and text, bytes; measured.
    real(wp), parameter :: sample_memory = 600.0_wp
@@ -143,7 +143,7 @@ contains
          if (i == 1) then
             call compute_impact(case, scope, impact, error)
          else if (n_thread == 2 .or. .not. allocated(error)) then
-            call prepare_floor(case, state, floor_error)
+            call case%floors(get_floor_number(case))%model%prepare(state, floor_error)
             if (.not. allocated(floor_error)) call drop_on_floor(case, state, on_floor, floor_error)
          end if
       end do
@@ -174,16 +174,6 @@ contains
          call predict_room(case, state, impact%history%floor_force, impact%history%sample_rate, room, error)
       end if
    end subroutine assess_floor
-
-   !> Computes once what is handed on of the floor of a case.
-   subroutine prepare_floor(case, state, error)
-      type(case_type), intent(in) :: case
-      !> The floor, prepared if the case has one.
-      type(floor_state_type), intent(out) :: state
-      type(error_type), allocatable, intent(out) :: error
-
-      if (case%has_floor) call case%floors(get_floor_number(case))%model%prepare(state, error)
-   end subroutine prepare_floor
 
    !> The drop of a case on its floor.
    subroutine drop_on_floor(case, state, on_floor, error)

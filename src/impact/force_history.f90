@@ -11,11 +11,15 @@ module thud_force_history
    private
 
    public :: add_model_quantity, add_to_means, check_samples, continue_to_zero, force_count, force_history_type
-   public :: force_names, get_model_quantity, holds_impulse, max_residual, new_force_history, numerical_error_type
+   public :: force_names, get_model_quantity, holds_impulse, max_residual, min_contact_samples, new_force_history
+   public :: numerical_error_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
    !> is below 1e-9 at the default step.
    real(wp), parameter :: max_residual = 1.0e-6_wp
+
+   !> Minimum number of samples of a contact: fewer show only a few spikes.
+   real(wp), parameter :: min_contact_samples = 8.0_wp
 
    !> Fraction of the impulse that samples may miss; with eight samples in a contact they miss up to 0.006.
    real(wp), parameter :: max_missing = 0.02_wp
@@ -117,18 +121,24 @@ contains
       yes = abs(sampled - impulse) <= max_missing*impulse
    end function holds_impulse
 
-   !> Checks that samples do not miss part of the force, such as a spike between two of them.
+   !> Checks that a contact has enough samples, which do not miss part of the force, such as a spike between two of them.
    subroutine check_samples(history, error)
       !> The history, complete.
       type(force_history_type), intent(in) :: history
-      !> Set if the impulses differ; the message states both.
+      !> Set if they are too few, or the impulses differ; the message states the required rate, or both impulses.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: sampled
 
       sampled = sum(history%floor_force)/history%sample_rate
-      if (holds_impulse(sampled, history%impulse)) return
-      error = input_error('&sampling: sample_rate = '//to_text(history%sample_rate)//' Hz misses the force: its samples ' &
-         //'hold an impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
+      associate (rate => history%sample_rate, contact_time => history%contact_time)
+         if (.not. contact_time*rate >= min_contact_samples) then
+            error = input_error('&sampling: sample_rate = '//to_text(rate)//' Hz gives the contact of '//to_text( &
+               contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
+         else if (.not. holds_impulse(sampled, history%impulse)) then
+            error = input_error('&sampling: sample_rate = '//to_text(rate)//' Hz misses the force: its samples hold an ' &
+               //'impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
+         end if
+      end associate
    end subroutine check_samples
 
    !> Adds the integral of a quantity over a part of a sampling interval to the means of the samples before and after it.

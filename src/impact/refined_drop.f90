@@ -9,7 +9,8 @@ module thud_refined_drop
    use thud_drop, only: drop_type
    use thud_error, only: error_type, signal_base
    use thud_force_exposure, only: get_force_exposure_levels
-   use thud_force_history, only: add_model_quantity, force_history_type, get_model_quantity, numerical_error_type
+   use thud_force_history, only: add_model_quantity, check_samples, force_history_type, get_model_quantity, &
+      numerical_error_type
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
    use thud_power, only: not_a_number
@@ -79,6 +80,7 @@ contains
          ! The error is not known if the coarsest resolution fails and there is one level.
          if (is_verification .and. drops(coarser)%numerical_error%known .and. .not. sampling%verify) exit
          call refined%solve(ball, drop, refined_sampling, drops(level), error, receiver)
+         if (.not. allocated(error)) call check_samples(drops(level), error)
          if (allocated(error)) then
             if (level == 1 .or. error%code >= signal_base .or. level == 0 .and. error%has_short_record) return
             ! The result stands without the finer one; `get_warnings` reports a missing verification.

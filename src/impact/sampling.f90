@@ -8,8 +8,7 @@ module thud_sampling
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, &
-      min_contact_samples, sampling_type
+   public :: check_sampling, get_sample_count, get_sampling_fields, sampling_type
 
    !> Maximum number of samples of a record; more would fill the memory, and no drop needs them.
    integer, parameter :: max_samples = 5000000
@@ -19,9 +18,6 @@ module thud_sampling
 
    !> Relative rounding error of a number of samples: of the decimal numbers duration and rate, and of their product.
    real(wp), parameter :: rounding = 4*epsilon(1.0_wp)
-
-   !> Minimum number of samples of a contact: fewer show only a few spikes.
-   real(wp), parameter :: min_contact_samples = 8.0_wp
 
    !> The sampled record; the default rate is the paper's.
    type :: sampling_type
@@ -72,19 +68,6 @@ contains
             //to_text(max_steps))
       end if
    end subroutine check_sampling
-
-   !> Checks the number of samples of a contact.
-   subroutine check_contact_samples(sampling, contact_time, error)
-      type(sampling_type), intent(in) :: sampling
-      !> Contact time, s.
-      real(wp), intent(in) :: contact_time
-      !> Set if there are too few; the message names the required rate.
-      type(error_type), allocatable, intent(out) :: error
-
-      if (contact_time*sampling%sample_rate >= min_contact_samples) return
-      error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the contact of ' &
-         //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
-   end subroutine check_contact_samples
 
    !> Number of samples of the record: one at the beginning of each whole sampling interval.
    pure function get_sample_count(sampling) result(n_sample)

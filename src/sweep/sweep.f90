@@ -6,9 +6,9 @@ module thud_sweep
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_band_projection, only: get_window_length
    use thud_cache_line, only: get_aligned_start, line_length
-   use thud_case, only: case_type, check_case, get_active_fields, keep_impact_only, set_floor_air
+   use thud_case, only: case_type, check_case, get_active_fields, get_floor_number, keep_impact_only, set_floor_air
    use thud_column, only: column_type
-   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, impact_type, prepare_floor, scope_type
+   use thud_compute, only: assess_floor, compute_impact, drop_on_floor, impact_type, scope_type
    use thud_ensemble, only: block_result_type, fill_samples, get_record, projections_type, set_projections, solve_drops, &
       suits_batch
    use thud_error, only: error_type, input_error
@@ -299,7 +299,7 @@ contains
       end if
       if (allocated(shared%error)) error = shared%error
       if (allocated(error) .or. shared%has_floor) return
-      call prepare_floor(case, shared%floor, error)
+      call case%floors(get_floor_number(case))%model%prepare(shared%floor, error)
       shared%has_floor = .not. allocated(error)
    end subroutine compute_shared
 

@@ -7,13 +7,12 @@ module thud_lumped
       take_coupled_step
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: add_model_quantity, check_samples, force_history_type, max_residual, &
-      new_force_history
+   use thud_force_history, only: add_model_quantity, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_receiver, only: can_strike, get_receiver_velocity, is_rigid, new_receiver_motion, receiver_type
    use thud_rk4, only: rk4_step
-   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_sampling, only: get_sample_count, sampling_type
    use thud_text, only: fixed, to_text
    use thud_zero_search, only: advance_search, is_converged, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
@@ -97,8 +96,6 @@ contains
       end do
       if (halving > 0) call add_model_quantity(history, 'shortened_time_step', 's', &
          1/(sampling%sample_rate*finer%substeps))
-      call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve_lumped
 
    !> An impact before its first contact.

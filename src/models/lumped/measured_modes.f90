@@ -7,12 +7,12 @@ module thud_measured_modes
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
-   use thud_force_history, only: check_samples, force_history_type, new_force_history
+   use thud_force_history, only: force_history_type, new_force_history
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, plain_field
    use thud_receiver, only: receiver_type
-   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_sampling, only: get_sample_count, sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: fixed, to_text
    use thud_zero_search, only: bisection_type
@@ -146,13 +146,8 @@ contains
       end do
       call finish(modes, bracket%get_middle(), history, error)
       if (allocated(error)) return
-      if (history%restitution < 0.0_wp) then
-         error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
-            //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
-      else
-         call check_contact_samples(sampling, history%contact_time, error)
-      end if
-      if (.not. allocated(error)) call check_samples(history, error)
+      if (history%restitution < 0.0_wp) error = input_error('&measured_modes: frequency and effective_mass let the force ' &
+         //'end after '//to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
    end subroutine solve
 
    !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t), F = sum M_n (w^2 d_n + 2 zeta w d_n').

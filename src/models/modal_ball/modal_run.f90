@@ -12,7 +12,7 @@ module thud_modal_run
    use thud_receiver, only: advance_receiver, can_strike, is_rigid, new_receiver_motion, receiver_motion_type, &
       receiver_step_type, receiver_type
    use thud_ring_contact, only: ring_contact_type, solve_contact, update_sticking
-   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_sampling, only: get_sample_count, sampling_type
    use thud_surface_rings, only: surface_rings_type
    use thud_text, only: fixed, significant, to_text
    implicit none (type, external)
@@ -166,8 +166,7 @@ contains
       call check_end(run, sampling, settling_time, has_separated, error)
       if (allocated(error)) return
       history%contact_time = last_contact*run%interval
-      call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(run, n_step*run%interval, history, error)
+      call finish(run, n_step*run%interval, history, error)
    end subroutine march
 
    !> Whether the ball cannot touch a rigid floor again: it rises without gravity, and the energy of its modes, which
