@@ -39,6 +39,7 @@ contains
       type(case_type), target :: case
       type(results_type) :: results
       type(compression_type) :: compression
+      real(wp), allocatable :: loss_factors(:)
       character(len=:), allocatable :: text
 
       if (request%has('case')) then
@@ -74,7 +75,15 @@ contains
          call compute_compression(case%compression, case%ball, case%models(get_model_number(case))%model, compression, error)
          if (.not. allocated(error)) call add_compression(bundle, compression)
       case ('loss_factors')
-         call answer_loss_factors(case, request, bundle, error)
+         ! Of the material, at the frequencies `frequency`, Hz.
+         select type (model => case%models(get_model_number(case))%model)
+         type is (finite_element_type)
+            allocate (loss_factors(size(request%get_array('frequency'))))
+            call model%get_loss_factors(case%ball, request%get_array('frequency'), loss_factors, error)
+            if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(loss_factors), loss_factors)
+         class default
+            error = input_error('&model: name: this model has no material with a loss factor; allowed: finite_element')
+         end select
       case ('samples')
          call answer_samples(case, request, bundle, error)
       case ('mobility', 'floor_energy', 'floor_impact', 'room_level', 'modal_room', 'floor_modes', 'radiation')
@@ -128,27 +137,6 @@ contains
       call bundle%add_text('table', outcome%table)
       call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
    end subroutine answer_run
-
-   !> The loss factor of a case's material at the frequencies `frequency`, Hz.
-   subroutine answer_loss_factors(case, request, bundle, error)
-      type(case_type), intent(in) :: case
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      !> Set if the model has no loss factor.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: loss_factor(:)
-
-      associate (frequency => request%get_array('frequency'))
-         allocate (loss_factor(size(frequency)))
-         select type (model => case%models(get_model_number(case))%model)
-         type is (finite_element_type)
-            call model%get_loss_factors(case%ball, frequency, loss_factor, error)
-         class default
-            error = input_error('&model: name: this model has no material with a loss factor; allowed: finite_element')
-         end select
-      end associate
-      if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(loss_factor), loss_factor)
-   end subroutine answer_loss_factors
 
    !> Computes samples of a case that differ in the `key_count` comma-separated `keys`, with `threads` threads. `values`
    !> holds the values of the keys, for a choice its index from 1: [n_key, n_sample]. Numbers `levels` and `forces` other
