@@ -37,7 +37,7 @@ contains
       type(case_type), intent(in) :: case
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> Set if the floor cannot be prepared or does not have what the question asks for.
+      !> Set if the floor cannot be prepared or does not have what the question asks for, or by a computation.
       type(error_type), allocatable, intent(out) :: error
       type(floor_state_type) :: state
 
@@ -45,197 +45,170 @@ contains
       if (allocated(error)) return
       select case (question)
       case ('mobility')
-         call answer_mobility(state, request, bundle, error)
+         call answer_mobility()
       case ('floor_energy')
-         call answer_floor_energy(state, request, bundle, error)
+         call answer_floor_energy()
       case ('floor_impact', 'room_level')
-         call answer_room_level(case, state, request, bundle, error)
+         call answer_room_level()
       case default
          if (.not. has_own_modes(state)) then
             error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
          else if (question == 'floor_modes') then
-            call answer_floor_modes(state, request, bundle)
+            call answer_floor_modes()
          else
             call check_below(state%plate, case%room, error)
             if (allocated(error)) return
-            if (question == 'modal_room') call answer_modal_room(case, state, request, bundle, error)
-            if (question == 'radiation') call answer_radiation(case, state, request, bundle)
+            if (question == 'modal_room') call answer_modal_room()
+            if (question == 'radiation') call answer_radiation()
          end if
       end select
-   end subroutine answer_floor
+   contains
 
-   !> Mobility of a floor, m/(N s), at the frequencies `frequency`, Hz, and its velocity, m/s, under the record `force`, N,
-   !> at `sample_rate`, Hz: under the source or, with `point`, m, from the source to this point.
-   subroutine answer_mobility(state, request, bundle, error)
-      !> The floor, prepared; as in all further answers.
-      type(floor_state_type), intent(in) :: state
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      !> Set if the floor has no such point.
-      type(error_type), allocatable, intent(out) :: error
-      type(receiver_type) :: receiver
-      complex(wp), allocatable :: mobility(:)
+      !> Mobility of the floor, m/(N s), at the frequencies `frequency`, Hz, and its velocity, m/s, under the record `force`,
+      !> N, at `sample_rate`, Hz: under the source or, with `point`, m, from the source to this point.
+      subroutine answer_mobility()
+         type(receiver_type) :: receiver
+         complex(wp), allocatable :: mobility(:)
 
-      receiver = state%receiver
-      associate (point => request%get_array('point'))
-         if (size(point) == 2) call get_transfer(state, point(1), point(2), receiver, error)
-      end associate
-      if (allocated(error)) return
-      mobility = get_mobility(receiver, request%get_array('frequency'))
-      call bundle%add_array('real', shape(mobility), real(mobility, wp))
-      call bundle%add_array('imaginary', shape(mobility), aimag(mobility))
-      if (.not. request%has('force')) return
-      associate (velocity => get_velocities(receiver, request%get_array('force'), request%get_number('sample_rate')))
-         call bundle%add_array('velocity', shape(velocity), velocity)
-      end associate
-   end subroutine answer_mobility
-
-   !> Energy that the record `force`, N, at `sample_rate`, Hz, injects into a floor in the band set `bands`.
-   subroutine answer_floor_energy(state, request, bundle, error)
-      type(floor_state_type), intent(in) :: state
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      !> Set by an interrupt.
-      type(error_type), allocatable, intent(out) :: error
-      type(band_type), allocatable :: bands(:)
-      character(len=:), allocatable :: set
-      real(wp), allocatable :: energy(:)
-
-      call request%get_text('bands', set)
-      bands = get_bands(set)
-      allocate (energy(size(bands)))
-      associate (force => request%get_array('force'), sample_rate => request%get_number('sample_rate'))
-         call get_injected_energies(state%receiver, force, sample_rate, bands, energy, error)
+         receiver = state%receiver
+         associate (point => request%get_array('point'))
+            if (size(point) == 2) call get_transfer(state, point(1), point(2), receiver, error)
+         end associate
          if (allocated(error)) return
-         call bundle%add_array('frequency', shape(bands), bands%nominal)
-         call bundle%add_array('energy', shape(bands), energy)
-         call bundle%add_array('conductance', shape(bands), get_mean_conductances(state%receiver, bands))
-         call bundle%add_number('total', get_total_energy(state%receiver, force, sample_rate))
-      end associate
-   end subroutine answer_floor_energy
+         mobility = get_mobility(receiver, request%get_array('frequency'))
+         call bundle%add_array('real', shape(mobility), real(mobility, wp))
+         call bundle%add_array('imaginary', shape(mobility), aimag(mobility))
+         if (.not. request%has('force')) return
+         associate (velocity => get_velocities(receiver, request%get_array('force'), request%get_number('sample_rate')))
+            call bundle%add_array('velocity', shape(velocity), velocity)
+         end associate
+      end subroutine answer_mobility
 
-   !> Level in the room below, if the case has one, from the record `force`, N, at `sample_rate`, Hz. Without a record, from
-   !> the impact on the floor, which is answered, too; empty if the floor is rigid or the model does not couple with it.
-   subroutine answer_room_level(case, state, request, bundle, error)
-      type(case_type), intent(in) :: case
-      type(floor_state_type), intent(in) :: state
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      !> Set if the impact cannot be computed, or the floor cannot radiate into the room.
-      type(error_type), allocatable, intent(out) :: error
-      type(force_history_type), allocatable :: on_floor
-      type(room_level_type) :: prediction
+      !> Energy that the record `force`, N, at `sample_rate`, Hz, injects into the floor in the band set `bands`.
+      subroutine answer_floor_energy()
+         type(band_type), allocatable :: bands(:)
+         character(len=:), allocatable :: set
+         real(wp), allocatable :: energy(:)
 
-      if (request%has('force')) then
-         call predict_room(case, state, request%get_array('force'), request%get_number('sample_rate'), prediction, error)
-      else
-         call drop_on_floor(case, state, on_floor, error)
-         if (allocated(error) .or. .not. allocated(on_floor)) return
-         call add_history(bundle, 'floor_', on_floor)
-         if (.not. case%has_room) return
-         call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, prediction, error)
-      end if
-      if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
-   end subroutine answer_room_level
+         call request%get_text('bands', set)
+         bands = get_bands(set)
+         allocate (energy(size(bands)))
+         associate (force => request%get_array('force'), sample_rate => request%get_number('sample_rate'))
+            call get_injected_energies(state%receiver, force, sample_rate, bands, energy, error)
+            if (allocated(error)) return
+            call bundle%add_array('frequency', shape(bands), bands%nominal)
+            call bundle%add_array('energy', shape(bands), energy)
+            call bundle%add_array('conductance', shape(bands), get_mean_conductances(state%receiver, bands))
+            call bundle%add_number('total', get_total_energy(state%receiver, force, sample_rate))
+         end associate
+      end subroutine answer_floor_energy
 
-   !> Sound in the modal room below for each of the positions `ball` and `microphone`, m from the corner of the room, from
-   !> the record `force`, N, at `sample_rate`, Hz, in bands up to `highest`, Hz, by default the crossover.
-   subroutine answer_modal_room(case, state, request, bundle, error)
-      type(case_type), intent(in) :: case
-      type(floor_state_type), intent(in) :: state
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      !> Set if the ball moves nothing at any position.
-      type(error_type), allocatable, intent(out) :: error
-      type(modal_room_type) :: room
-      type(box_type) :: box
+      !> Level in the room below, if the case has one, from the record `force`, N, at `sample_rate`, Hz. Without a record,
+      !> from the impact on the floor, which is answered, too; empty if the floor is rigid or the model does not couple with
+      !> it.
+      subroutine answer_room_level()
+         type(force_history_type), allocatable :: on_floor
+         type(room_level_type) :: prediction
 
-      box = new_box(case%room, state%plate)
-      call bundle%add_number('crossover', box%crossover)
-      box%crossover = request%get_number('highest', box%crossover)
-      call place(case%room, get_rating_index(case%room), box)
-      associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
-         if (size(stated_ball) > 0) box%ball = reshape(stated_ball, [2, size(stated_ball)/2])
-         if (size(stated_microphone) > 0) box%microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
-      end associate
-      call get_modal_room(state%modes, box, request%get_array('force'), request%get_number('sample_rate'), .true., room)
-      if (.not. all(ieee_is_finite(room%mean))) then
-         error = input_error('balls: all positions lie on rigid supports, which do not move; allowed: at least one ' &
-            //'elsewhere')
-         return
-      end if
-      call bundle%add_array('ball', shape(box%ball), box%ball)
-      call bundle%add_array('microphone', shape(box%microphone), box%microphone)
-      call bundle%add_array('frequency', [room%n_band], box%bands(:room%n_band)%nominal)
-      call bundle%add_array('level', shape(room%level), room%level)
-      call bundle%add_array('mean', shape(room%mean), room%mean)
-      call bundle%add_array('spread', shape(room%spread), room%spread)
-      call bundle%add_array('floor_energy', shape(room%floor_energy), room%floor_energy)
-      call bundle%add_array('room_energy', shape(room%room_energy), room%room_energy)
-      call bundle%add_number('floor_modes', real(room%floor_modes, wp))
-      call bundle%add_number('room_modes', real(room%room_modes, wp))
-      call bundle%add_number('sample_rate', room%sample_rate)
-      if (allocated(room%pressure)) call bundle%add_array('pressure', shape(room%pressure), room%pressure)
-   end subroutine answer_modal_room
+         if (request%has('force')) then
+            call predict_room(case, state, request%get_array('force'), request%get_number('sample_rate'), prediction, error)
+         else
+            call drop_on_floor(case, state, on_floor, error)
+            if (allocated(error) .or. .not. allocated(on_floor)) return
+            call add_history(bundle, 'floor_', on_floor)
+            if (.not. case%has_room) return
+            call predict_room(case, state, on_floor%floor_force, on_floor%sample_rate, prediction, error)
+         end if
+         if (.not. allocated(error)) call add_room_level(bundle, case, state, prediction)
+      end subroutine answer_room_level
 
-   !> Radiation of a floor into the room below in the rated one-third-octave bands, by its modes: averaged over the floor, or
-   !> over the strike points `x`, `y`, relative to its sides.
-   subroutine answer_radiation(case, state, request, bundle)
-      type(case_type), intent(in) :: case
-      type(floor_state_type), intent(in) :: state
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      type(box_type) :: box
-      type(modal_radiation_type), allocatable :: radiation(:)
-      real(wp), allocatable :: strike(:, :)
+      !> Sound in the modal room below for each of the positions `ball` and `microphone`, m from the corner of the room, from
+      !> the record `force`, N, at `sample_rate`, Hz, in bands up to `highest`, Hz, by default the crossover.
+      subroutine answer_modal_room()
+         type(modal_room_type) :: room
+         type(box_type) :: box
 
-      ! Strike points that are not allocated are an absent argument.
-      if (request%has('x')) strike = transpose(reshape([request%get_array('x'), request%get_array('y')], &
-         [size(request%get_array('x')), 2]))
-      box = new_box(case%room, state%plate)
-      allocate (radiation(size(box%bands)))
-      call get_modal_radiation(state%modes, state%plate, box%air, box%bands, &
-         reshape([box%corner, box%corner + box%sides(:2)], [2, 2]), radiation, strike)
-      call bundle%add_array('radiation_factor', shape(radiation), radiation%radiation_factor)
-      call bundle%add_array('radiated', shape(radiation), radiation%radiated)
-   end subroutine answer_radiation
+         box = new_box(case%room, state%plate)
+         call bundle%add_number('crossover', box%crossover)
+         box%crossover = request%get_number('highest', box%crossover)
+         call place(case%room, get_rating_index(case%room), box)
+         associate (stated_ball => request%get_array('ball'), stated_microphone => request%get_array('microphone'))
+            if (size(stated_ball) > 0) box%ball = reshape(stated_ball, [2, size(stated_ball)/2])
+            if (size(stated_microphone) > 0) box%microphone = reshape(stated_microphone, [3, size(stated_microphone)/3])
+         end associate
+         call get_modal_room(state%modes, box, request%get_array('force'), request%get_number('sample_rate'), .true., room)
+         if (.not. all(ieee_is_finite(room%mean))) then
+            error = input_error('balls: all positions lie on rigid supports, which do not move; allowed: at least one ' &
+               //'elsewhere')
+            return
+         end if
+         call bundle%add_array('ball', shape(box%ball), box%ball)
+         call bundle%add_array('microphone', shape(box%microphone), box%microphone)
+         call bundle%add_array('frequency', [room%n_band], box%bands(:room%n_band)%nominal)
+         call bundle%add_array('level', shape(room%level), room%level)
+         call bundle%add_array('mean', shape(room%mean), room%mean)
+         call bundle%add_array('spread', shape(room%spread), room%spread)
+         call bundle%add_array('floor_energy', shape(room%floor_energy), room%floor_energy)
+         call bundle%add_array('room_energy', shape(room%room_energy), room%room_energy)
+         call bundle%add_number('floor_modes', real(room%floor_modes, wp))
+         call bundle%add_number('room_modes', real(room%room_modes, wp))
+         call bundle%add_number('sample_rate', room%sample_rate)
+         if (allocated(room%pressure)) call bundle%add_array('pressure', shape(room%pressure), room%pressure)
+      end subroutine answer_modal_room
 
-   !> Natural frequencies, Hz, and loss factors of the modes of a floor up to `highest`, Hz, at most `count` of them, the
-   !> shapes of its radiating plate at the points `x`, `y`, relative to its sides, 1/sqrt(kg), and its plate: mass per area,
-   !> and loss and radiation factors at the frequencies `frequency`, Hz.
-   subroutine answer_floor_modes(state, request, bundle)
-      type(floor_state_type), intent(in) :: state
-      type(request_type), intent(in) :: request
-      type(bundle_type), intent(inout) :: bundle
-      type(floor_modes_type) :: selected
-      integer, allocatable :: order(:)
-      integer :: i
-      logical, allocatable :: is_wanted(:)
-      real(wp), allocatable :: shapes(:, :)
+      !> Radiation of the floor into the room below in the rated one-third-octave bands, by its modes: averaged over the
+      !> floor, or over the strike points `x`, `y`, relative to its sides.
+      subroutine answer_radiation()
+         type(box_type) :: box
+         type(modal_radiation_type), allocatable :: radiation(:)
+         real(wp), allocatable :: strike(:, :)
 
-      associate (modes => state%modes, stack => state%modes%stack, plate => state%plate, &
-         x => request%get_array('x'), y => request%get_array('y'), frequency => request%get_array('frequency'))
-         is_wanted = modes%omega < min(2*pi*request%get_number('highest'), modes%limit)
-         order = pack([(i, i=1, size(is_wanted))], is_wanted)
-         order = order(get_ascending_order(modes%omega(order)))
-         order = order(:min(size(order), nint(request%get_number('count', real(size(order), wp)))))
-         call bundle%add_array('frequency', [size(order)], modes%omega(order)/(2*pi))
-         call bundle%add_array('loss_factor', [size(order)], modes%loss_factor(order))
-         call bundle%add_number('limit', modes%limit/(2*pi))
-         call bundle%add_number('length', stack%length)
-         call bundle%add_number('width', stack%width)
-         call bundle%add_number('plate.surface_mass', get_surface_mass(plate))
-         call bundle%add_array('plate.loss_factor', shape(frequency), get_total_loss(plate, state%air, frequency))
-         call bundle%add_array('plate.radiation_factor', shape(frequency), get_plate_radiation(plate, state%air, frequency))
-         if (size(x) == 0) return
-         is_wanted = .false.
-         is_wanted(order) = .true.
-         selected = get_selected_modes(modes, is_wanted)
-         shapes = get_mode_values(selected%modes, stack%radiator, stack%length*x, stack%width*y)
-         shapes = shapes(get_ascending_order(selected%omega), :)
-         call bundle%add_array('shape', shape(shapes), shapes)
-      end associate
-   end subroutine answer_floor_modes
+         ! Strike points that are not allocated are an absent argument.
+         if (request%has('x')) strike = transpose(reshape([request%get_array('x'), request%get_array('y')], &
+            [size(request%get_array('x')), 2]))
+         box = new_box(case%room, state%plate)
+         allocate (radiation(size(box%bands)))
+         call get_modal_radiation(state%modes, state%plate, box%air, box%bands, &
+            reshape([box%corner, box%corner + box%sides(:2)], [2, 2]), radiation, strike)
+         call bundle%add_array('radiation_factor', shape(radiation), radiation%radiation_factor)
+         call bundle%add_array('radiated', shape(radiation), radiation%radiated)
+      end subroutine answer_radiation
+
+      !> Natural frequencies, Hz, and loss factors of modes of the floor up to `highest`, Hz, at most `count` of them, the
+      !> shapes of its radiating plate at the points `x`, `y`, relative to its sides, 1/sqrt(kg), and its plate: mass per
+      !> area, and loss and radiation factors at the frequencies `frequency`, Hz.
+      subroutine answer_floor_modes()
+         type(floor_modes_type) :: selected
+         integer, allocatable :: order(:)
+         logical, allocatable :: is_wanted(:)
+         real(wp), allocatable :: shapes(:, :)
+         integer :: i
+
+         associate (modes => state%modes, stack => state%modes%stack, plate => state%plate, &
+            x => request%get_array('x'), y => request%get_array('y'), frequency => request%get_array('frequency'))
+            is_wanted = modes%omega < min(2*pi*request%get_number('highest'), modes%limit)
+            order = pack([(i, i=1, size(is_wanted))], is_wanted)
+            order = order(get_ascending_order(modes%omega(order)))
+            order = order(:min(size(order), nint(request%get_number('count', real(size(order), wp)))))
+            call bundle%add_array('frequency', [size(order)], modes%omega(order)/(2*pi))
+            call bundle%add_array('loss_factor', [size(order)], modes%loss_factor(order))
+            call bundle%add_number('limit', modes%limit/(2*pi))
+            call bundle%add_number('length', stack%length)
+            call bundle%add_number('width', stack%width)
+            call bundle%add_number('plate.surface_mass', get_surface_mass(plate))
+            call bundle%add_array('plate.loss_factor', shape(frequency), get_total_loss(plate, state%air, frequency))
+            call bundle%add_array('plate.radiation_factor', shape(frequency), get_plate_radiation(plate, state%air, &
+               frequency))
+            if (size(x) == 0) return
+            is_wanted = .false.
+            is_wanted(order) = .true.
+            selected = get_selected_modes(modes, is_wanted)
+            shapes = get_mode_values(selected%modes, stack%radiator, stack%length*x, stack%width*y)
+            shapes = shapes(get_ascending_order(selected%omega), :)
+            call bundle%add_array('shape', shape(shapes), shapes)
+         end associate
+      end subroutine answer_floor_modes
+   end subroutine answer_floor
 
    !> Fits a floor with `order` poles to the mobility `real` + i `imaginary`, m/(N s), at the frequencies `frequency`, Hz.
    !> `free_error` of the answer is the relative error before the fit was made passive.

@@ -30,11 +30,6 @@ module thud_injected_energy
    !> Minimum decay rate, 1/s: an undamped pole has an infinite peak.
    real(wp), parameter :: min_decay = 1.0e-6_wp
 
-   !> Nodes and weights on [-1, 1], and the matrix that turns values at the nodes into Legendre coefficients.
-   type :: rule_type
-      real(wp) :: node(n_node), weight(n_node), coefficient(0:n_node - 1, n_node)
-   end type rule_type
-
 contains
 
    !> Energies injected in bands.
@@ -51,7 +46,9 @@ contains
       !> Set by an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: complete
-      type(rule_type) :: rule
+      ! Nodes and weights on [-1, 1], and the matrix that turns values at the nodes into Legendre coefficients.
+      real(wp) :: node(n_node), weight(n_node), coefficient(0:n_node - 1, n_node)
+      real(wp), dimension(0:n_node - 1) :: value, first_derivative, second_derivative
       real(wp) :: step
       integer :: first, last, i, k, n_step
 
@@ -61,17 +58,54 @@ contains
       if (first == 0) return
       complete = with_conjugates(receiver)
       complete%pole%re = min(complete%pole%re, -min_decay)
-      rule = new_rule()
+      call get_gauss_legendre(node, weight)
+      do k = 1, n_node
+         call get_legendre(node(k), value, first_derivative, second_derivative)
+         coefficient(:, k) = [((i + 0.5_wp)*weight(k)*value(i), i=0, n_node - 1)]
+      end do
       do i = 1, size(bands)
          n_step = ceiling((bands(i)%upper - bands(i)%lower)*2*(last - first + 1)/sample_rate)
          step = (bands(i)%upper - bands(i)%lower)/n_step
          do k = 1, n_step
             call check_interrupt(error)
             if (allocated(error)) return
-            energy(i) = energy(i) + get_step_energy(complete, force(first:last), sample_rate, rule, &
-               bands(i)%lower + (k - 0.5_wp)*step, step/2)
+            energy(i) = energy(i) + get_step_energy(bands(i)%lower + (k - 0.5_wp)*step, step/2)
          end do
       end do
+   contains
+
+      !> Energy in a frequency step.
+      pure function get_step_energy(middle, half) result(step_energy)
+         !> Middle and half length of the step, Hz.
+         real(wp), intent(in) :: middle, half
+         !> The energy, J.
+         real(wp) :: step_energy
+         complex(wp), dimension(n_node) :: s, mobility
+         real(wp), dimension(n_node) :: frequency, square
+         real(wp) :: by_square(0:n_node - 1)
+         complex(wp) :: second(0:n_node - 1)
+         complex(wp) :: z
+         integer :: j
+
+         frequency = middle + half*node
+         s = cmplx(0.0_wp, 2*pi*frequency, wp)
+         square = abs(get_spectrum(force(first:last), sample_rate, frequency))**2
+         by_square = matmul(coefficient, square)
+         mobility = complete%direct
+         step_energy = 0.0_wp
+         do j = 1, size(complete%pole)
+            associate (pole => complete%pole(j), residue => complete%residue(j))
+               z = (cmplx(pole%im, -pole%re, wp)/(2*pi) - middle)/half
+               if (abs(z - 1) + abs(z + 1) > near) then
+                  mobility = mobility + residue/(s - pole)
+               else
+                  call get_second_legendre(z, second)
+                  step_energy = step_energy - 2/pi*aimag(residue*sum(second*by_square))
+               end if
+            end associate
+         end do
+         step_energy = step_energy + 2*half*sum(weight*square*real(mobility, wp))
+      end function get_step_energy
    end subroutine get_injected_energies
 
    !> Energy injected in all frequencies: work of the force, held for a sampling interval, on the receiver moved by it.
@@ -118,19 +152,6 @@ contains
       end do
    end function get_mean_conductances
 
-   !> Nodes, weights and Legendre coefficients.
-   pure function new_rule() result(rule)
-      type(rule_type) :: rule
-      real(wp), dimension(0:n_node - 1) :: value, first, second
-      integer :: j, n
-
-      call get_gauss_legendre(rule%node, rule%weight)
-      do j = 1, n_node
-         call get_legendre(rule%node(j), value, first, second)
-         rule%coefficient(:, j) = [((n + 0.5_wp)*rule%weight(j)*value(n), n=0, n_node - 1)]
-      end do
-   end function new_rule
-
    !> The receiver with the conjugates of its poles as poles of their own.
    pure function with_conjugates(receiver) result(complete)
       type(receiver_type), intent(in) :: receiver
@@ -143,46 +164,6 @@ contains
       ! Half of a doubled residue belongs to the conjugate pole; both halves of a real residue are equal.
       complete%residue = [receiver%residue, conjg(receiver%residue)]/2
    end function with_conjugates
-
-   !> Energy in a frequency step.
-   pure function get_step_energy(receiver, force, sample_rate, rule, middle, half) result(energy)
-      !> The receiver, with conjugate poles.
-      type(receiver_type), intent(in) :: receiver
-      !> Force from first touch to its end, N: [n_sample].
-      real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      type(rule_type), intent(in) :: rule
-      !> Middle and half length of the step, Hz.
-      real(wp), intent(in) :: middle, half
-      !> The energy, J.
-      real(wp) :: energy
-      complex(wp), dimension(n_node) :: s, mobility
-      real(wp), dimension(n_node) :: frequency, square
-      real(wp) :: by_square(0:n_node - 1)
-      complex(wp) :: second(0:n_node - 1)
-      complex(wp) :: z
-      integer :: k
-
-      frequency = middle + half*rule%node
-      s = cmplx(0.0_wp, 2*pi*frequency, wp)
-      square = abs(get_spectrum(force, sample_rate, frequency))**2
-      by_square = matmul(rule%coefficient, square)
-      mobility = receiver%direct
-      energy = 0.0_wp
-      do k = 1, size(receiver%pole)
-         associate (pole => receiver%pole(k), residue => receiver%residue(k))
-            z = (cmplx(pole%im, -pole%re, wp)/(2*pi) - middle)/half
-            if (abs(z - 1) + abs(z + 1) > near) then
-               mobility = mobility + residue/(s - pole)
-            else
-               call get_second_legendre(z, second)
-               energy = energy - 2/pi*aimag(residue*sum(second*by_square))
-            end if
-         end associate
-      end do
-      energy = energy + 2*half*sum(rule%weight*square*real(mobility, wp))
-   end function get_step_energy
 
    !> Fourier transform of a force at frequencies, N s: [n]. It is a polynomial in the phase factor of a sample, summed by
    !> Horner's scheme.
