@@ -1,14 +1,17 @@
 !> Constants of mathematics and acoustics, the band of records, the version and compiler of the program.
 module thud_constants
-   use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
+   use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version, int64
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: decay_of_60_db, fast_time, get_compiler, pi, recorded_band, reference_pressure, version
+   public :: decay_of_60_db, fast_time, get_compiler, not_a_number, pi, recorded_band, reference_pressure, version
 
    !> Ratio of a circle's circumference to its diameter.
    real(wp), parameter :: pi = acos(-1.0_wp)
+
+   !> A quiet NaN: a number that is not known.
+   real(wp), parameter :: not_a_number = transfer(int(z'7FF8000000000000', int64), 1.0_wp)
 
    !> Reference sound pressure, Pa.
    real(wp), parameter :: reference_pressure = 2.0e-5_wp

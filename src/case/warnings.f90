@@ -3,11 +3,11 @@ module thud_warnings
    use thud_ball, only: ball_type, get_density
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type, get_active_fields, get_model_number, get_unstated_fields
+   use thud_constants, only: not_a_number
    use thud_field, only: field_type, key_length
    use thud_floor_model, only: floor_state_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_power, only: not_a_number
    use thud_refined_drop, only: finer_quantities, get_resolution, max_error
    use thud_registry, only: floor_names
    use thud_room, only: box_type, new_box, room_level_type

@@ -2,10 +2,10 @@
 !> only this type and no source model.
 module thud_force_history
    use thud_band, only: octave_count
+   use thud_constants, only: not_a_number
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
-   use thud_power, only: not_a_number
    use thud_text, only: to_text
    implicit none (type, external)
    private

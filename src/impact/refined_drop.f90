@@ -5,7 +5,7 @@ module thud_refined_drop
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use thud_ball, only: ball_type
    use thud_band, only: band_type, get_octaves, octave_count
-   use thud_constants, only: pi
+   use thud_constants, only: not_a_number, pi
    use thud_drop, only: drop_type
    use thud_error, only: error_type, signal_base
    use thud_force_exposure, only: get_force_exposure_levels
@@ -13,7 +13,6 @@ module thud_refined_drop
       numerical_error_type
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
-   use thud_power, only: not_a_number
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: resolution_type, source_model_type

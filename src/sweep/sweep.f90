@@ -9,6 +9,7 @@ module thud_sweep
    use thud_case, only: case_type, check_case, get_active_fields, get_floor_number, keep_impact_only, set_floor_air
    use thud_column, only: column_type
    use thud_compute, only: assess_floor, compute_impact, drop_on_floor, impact_type, scope_type
+   use thud_constants, only: not_a_number
    use thud_ensemble, only: block_result_type, fill_samples, get_record, projections_type, set_projections, solve_drops, &
       suits_batch
    use thud_error, only: error_type, input_error
@@ -18,7 +19,6 @@ module thud_sweep
    use thud_force_history, only: force_count, force_history_type
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
-   use thud_power, only: not_a_number
    use thud_quantities, only: get_quantities, sample_quantity_count
    use thud_registry, only: floor_names
    use thud_result_column, only: get_result_columns, result_column_type, set_floor_values, set_source_values

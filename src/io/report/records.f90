@@ -7,13 +7,13 @@ module thud_records
    use thud_case, only: case_type
    use thud_compression, only: compression_type
    use thud_compute, only: assessment_type, get_assessed_force, impact_type, is_conforming, results_type
+   use thud_constants, only: not_a_number
    use thud_floor_model, only: floor_state_type
    use thud_floor_result, only: floor_result_type
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
-   use thud_power, only: not_a_number
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_rating, only: get_class, get_rounded, rating_names, rating_titles
    use thud_room, only: room_level_type

@@ -5,9 +5,9 @@
 !> turning point waits until all others have reached theirs or failed; then the turning points are located together, and
 !> each ball continues at its own time. A ball fails if a step leaves the reach of its series.
 module thud_shell_impacts
+   use thud_constants, only: not_a_number
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
-   use thud_power, only: not_a_number
    use thud_shell_series, only: batch_size, expand_series, series_batch_type, series_steps, shell_batch_type, &
       state_batch_type, take_step
    implicit none (type, external)
@@ -68,6 +68,8 @@ contains
       impacts%state%deflection = 0.0_wp
       impacts%state%velocity = impacts%impact_velocity
       impacts%whole_step = 1.0_wp
+      impacts%series%expansion_point = 0.0_wp
+      impacts%series%pressure = impacts%shell%gas_pressure
       first_step = 0.0_wp
       call march(impacts, .true., first_step, end_step, n_sample, substeps, force, last_step)
       turns = end_step < never

@@ -6,7 +6,7 @@ module thud_shell_samples
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_sizeof
    use thud_ball, only: ball_type, get_ball_fields
    use thud_cache_line, only: get_aligned_start, line_length
-   use thud_constants, only: pi
+   use thud_constants, only: not_a_number, pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_field, only: field_type
    use thud_force_history, only: holds_impulse, min_contact_samples
@@ -14,7 +14,6 @@ module thud_shell_samples
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_new_field, only: in_group
-   use thud_power, only: not_a_number
    use thud_sampling, only: get_sample_count, sampling_type
    use thud_shell_impacts, only: impact_batch_type, solve_impacts
    use thud_shell_series, only: batch_size
