@@ -9,7 +9,7 @@ module thud_prony
    implicit none (type, external)
    private
 
-   public :: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
+   public :: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_modulus_ratio
 
    !> Band in which a series fits a fractional law, Hz.
    real(wp), parameter, public :: series_from = 5.0_wp, series_to = 3000.0_wp
@@ -32,31 +32,17 @@ module thud_prony
 
 contains
 
-   !> Storage modulus divided by the long-term modulus.
-   pure function get_storage_ratio(relative_modulus, time, omega) result(ratio)
-      !> Relative moduli of the branches: [n_branch].
-      real(wp), intent(in) :: relative_modulus(:)
-      !> Their relaxation times, s: [n_branch].
-      real(wp), intent(in) :: time(:)
+   !> Complex modulus (storage and loss modulus) divided by the long-term modulus.
+   pure function get_modulus_ratio(relative_modulus, time, omega) result(ratio)
+      !> Relative moduli of the branches, and their relaxation times, s: [n_branch].
+      real(wp), intent(in) :: relative_modulus(:), time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
-      real(wp) :: ratio
+      complex(wp) :: ratio
 
-      ratio = 1 + sum(relative_modulus*(omega*time)**2/(1 + (omega*time)**2))
-   end function get_storage_ratio
-
-   !> Loss modulus divided by the long-term modulus.
-   pure function get_loss_ratio(relative_modulus, time, omega) result(ratio)
-      !> Relative moduli of the branches: [n_branch].
-      real(wp), intent(in) :: relative_modulus(:)
-      !> Their relaxation times, s: [n_branch].
-      real(wp), intent(in) :: time(:)
-      !> Angular frequency, rad/s.
-      real(wp), intent(in) :: omega
-      real(wp) :: ratio
-
-      ratio = sum(relative_modulus*omega*time/(1 + (omega*time)**2))
-   end function get_loss_ratio
+      ratio = cmplx(1 + sum(relative_modulus*(omega*time)**2/(1 + (omega*time)**2)), &
+         sum(relative_modulus*omega*time/(1 + (omega*time)**2)), wp)
+   end function get_modulus_ratio
 
    !> Series whose loss factor is constant from 10 to 1000 Hz.
    !>

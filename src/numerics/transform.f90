@@ -11,7 +11,7 @@ module thud_transform
 
    include 'fftw3.f03'
 
-   !> Number of lengths whose plans are kept, or more if more lengths are in use at the same time.
+   !> Maximum number of plans that are kept.
    integer, parameter :: kept_count = 16
 
    !> Maximum length of a transform whose plans are kept: longer plans take much memory.
@@ -19,20 +19,14 @@ module thud_transform
 
    !> Plans for one length. They fit all allocated arrays, because these are aligned to 16 bytes, as FFTW needs.
    type :: plans_type
-      !> Number of samples; 0 means no plans.
+      !> Number of samples.
       integer :: length = 0
-      !> Number of threads that use the plans now.
-      integer :: users = 0
-      !> Value of `use_count` at the last use.
-      integer(c_int64_t) :: last_use = 0
       !> Plans from a record to its transform, and back to the record multiplied by its length.
       type(c_ptr) :: forward = c_null_ptr, back = c_null_ptr
    end type plans_type
 
-   !> The kept plans; accessed only in the critical section `thud_fftw_planner`, like `use_count`.
+   !> Plans that are not in use, in the order of their last use; accessed only in the critical section `thud_fftw_planner`.
    type(plans_type), allocatable :: kept(:)
-   !> Number of uses of plans so far.
-   integer(c_int64_t) :: use_count = 0
 
 contains
 
@@ -140,47 +134,33 @@ contains
       integer :: at
 
       !$omp critical (thud_fftw_planner)
-      if (.not. allocated(kept)) allocate (kept(kept_count))
+      if (.not. allocated(kept)) allocate (kept(0))
       at = findloc(kept%length, size(signal), dim=1)
-      if (at == 0) then
-         at = minloc(kept%last_use, dim=1, mask=kept%users == 0)
-         if (at == 0) then
-            kept = [kept, plans_type()]
-            at = size(kept)
-         end if
-         call destroy(kept(at))
-         kept(at)%length = size(signal)
-         kept(at)%forward = fftw_plan_dft_r2c_1d(size(signal, kind=c_int), signal, spectrum, FFTW_ESTIMATE)
-         kept(at)%back = fftw_plan_dft_c2r_1d(size(signal, kind=c_int), spectrum, signal, FFTW_ESTIMATE)
+      if (at > 0) then
+         plans = kept(at)
+         kept = [kept(:at - 1), kept(at + 1:)]
+      else
+         plans%length = size(signal)
+         plans%forward = fftw_plan_dft_r2c_1d(size(signal, kind=c_int), signal, spectrum, FFTW_ESTIMATE)
+         plans%back = fftw_plan_dft_c2r_1d(size(signal, kind=c_int), spectrum, signal, FFTW_ESTIMATE)
       end if
-      use_count = use_count + 1
-      kept(at)%last_use = use_count
-      kept(at)%users = kept(at)%users + 1
-      plans = kept(at)
       !$omp end critical (thud_fftw_planner)
    end subroutine take_plans
 
-   !> Ends the use of plans.
+   !> Keeps plans after their use, and destroys those that are too long or too many.
    subroutine release(plans)
       type(plans_type), intent(in) :: plans
       integer :: at
 
       !$omp critical (thud_fftw_planner)
-      at = findloc(kept%length, plans%length, dim=1)
-      kept(at)%users = kept(at)%users - 1
-      if (kept(at)%users == 0 .and. plans%length > max_kept_length) call destroy(kept(at))
+      kept = [kept, plans]
+      if (plans%length > max_kept_length .or. size(kept) > kept_count) then
+         at = merge(size(kept), 1, plans%length > max_kept_length)
+         call fftw_destroy_plan(kept(at)%forward)
+         call fftw_destroy_plan(kept(at)%back)
+         kept = [kept(:at - 1), kept(at + 1:)]
+      end if
       !$omp end critical (thud_fftw_planner)
    end subroutine release
-
-   !> Destroys plans, if there are any.
-   subroutine destroy(plans)
-      !> The plans; empty afterwards.
-      type(plans_type), intent(inout) :: plans
-
-      if (plans%length == 0) return
-      call fftw_destroy_plan(plans%forward)
-      call fftw_destroy_plan(plans%back)
-      plans = plans_type()
-   end subroutine destroy
 
 end module thud_transform

@@ -6,7 +6,7 @@ module thud_material
    use thud_field, only: field_type, list_type, name_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, only_with, real_field
-   use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
+   use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_modulus_ratio
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -156,7 +156,7 @@ contains
       case default
          continue
       end select
-      material%shear_modulus = storage_modulus/get_storage_ratio(relative_modulus, material%branch_time, omega)
+      material%shear_modulus = storage_modulus/real(get_modulus_ratio(relative_modulus, material%branch_time, omega), wp)
       material%viscosity = viscosity*material%shear_modulus
       allocate (material%branch_modulus, source=relative_modulus*material%shear_modulus)
    end subroutine new_material
@@ -168,13 +168,10 @@ contains
       real(wp), intent(in) :: frequency
       !> Loss modulus divided by storage modulus.
       real(wp) :: loss_factor
-      real(wp) :: omega
+      complex(wp) :: ratio
 
-      omega = 2*pi*frequency
-      associate (relative_modulus => material%branch_modulus/material%shear_modulus, time => material%branch_time)
-         loss_factor = (get_loss_ratio(relative_modulus, time, omega) + omega*material%viscosity/material%shear_modulus) &
-            /get_storage_ratio(relative_modulus, time, omega)
-      end associate
+      ratio = get_modulus_ratio(material%branch_modulus/material%shear_modulus, material%branch_time, 2*pi*frequency)
+      loss_factor = (aimag(ratio) + 2*pi*frequency*material%viscosity/material%shear_modulus)/real(ratio, wp)
    end function get_material_loss_factor
 
 end module thud_material

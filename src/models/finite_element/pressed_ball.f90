@@ -92,7 +92,8 @@ contains
 
       halvings = 0
       do while (pressed%deflection < deflection)
-         step = min(deflection - pressed%deflection, max_step*pressed%element_thickness*pressed%body%mesh%n_radial/2**halvings)
+         step = min(deflection - pressed%deflection, &
+            max_step*pressed%element_thickness*pressed%body%mesh%n_radial/2**halvings)
          next = pressed
          next%deflection = merge(deflection, pressed%deflection + step, step >= deflection - pressed%deflection)
          call find_rest(next, converged, error)

@@ -199,7 +199,8 @@ contains
             outcome%computed = impacts%contact_steps(i) >= min_contact_samples*sampling%substeps &
                .and. min_stop_steps*max_deceleration <= v0 .and. holds_impulse(sampled(i), impulse)
             if (outcome%computed) outcome = sample_outcome_type(.true., impacts%contact_steps(i)*step, &
-               impacts%peak_elastic_force(i), impacts%peak_force(i), 2*ball%outer_radius*max_deflection, restitution, impulse)
+               impacts%peak_elastic_force(i), impacts%peak_force(i), 2*ball%outer_radius*max_deflection, restitution, &
+               impulse)
          end associate
       end do
    end subroutine solve_block

@@ -11,7 +11,7 @@ module thud_mode_step
    use thud_constants, only: pi
    use thud_kinds, only: wp
    use thud_matrix_exponential, only: get_exponential
-   use thud_prony, only: fit_fractional_loss, get_storage_ratio
+   use thud_prony, only: fit_fractional_loss, get_modulus_ratio
    use thud_sphere_modes, only: family_type
    use thud_surface_rings, only: surface_rings_type
    implicit none (type, external)
@@ -86,7 +86,8 @@ contains
          damping%retardation_time = loss_factor/(2*pi*loss_frequency)
       case ('fractional')
          call fit_fractional_loss(order, loss_factor, loss_frequency, damping%relative_modulus, damping%time, viscosity)
-         damping%equilibrium_ratio = 1/get_storage_ratio(damping%relative_modulus, damping%time, 2*pi*loss_frequency)
+         damping%equilibrium_ratio = 1/real(get_modulus_ratio(damping%relative_modulus, damping%time, &
+            2*pi*loss_frequency), wp)
          damping%relative_modulus = damping%relative_modulus*damping%equilibrium_ratio
          damping%retardation_time = viscosity*damping%equilibrium_ratio
       case default

@@ -67,8 +67,8 @@ contains
       factor = response
       call dpotrf('L', n, factor, n, info)
       if (info /= 0) then
-         error = numerical_error('&modal_ball: rings = '//to_text(n/n_dof)//' cannot be distinguished; allowed: fewer rings, ' &
-            //'or more substeps')
+         error = numerical_error('&modal_ball: rings = '//to_text(n/n_dof)//' cannot be distinguished; allowed: fewer ' &
+            //'rings, or more substeps')
          return
       end if
       do i = 1, n
