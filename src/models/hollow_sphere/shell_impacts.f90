@@ -108,7 +108,8 @@ contains
       real(wp), dimension(batch_size) :: elastic_force, floor_force
       real(wp) :: latest_start
       integer :: n, sample
-      logical :: moving(batch_size), all_moving
+      logical :: moving(batch_size)
+      logical :: all_moving
 
       all_moving = .false.
       latest_start = maxval(first_step, mask=first_step < never)
