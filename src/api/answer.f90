@@ -160,6 +160,7 @@ contains
       allocate (names(nint(request%get_number('key_count'))))
       names = ''
       read (keys, *, iostat=status, iomsg=message) names
+      if (status /= 0) names = keys
       call find_columns(case, names, columns, error)
       if (allocated(error)) return
       call acquire_sweep(sweep)
