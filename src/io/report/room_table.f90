@@ -65,12 +65,11 @@ contains
       text = text//newline
       do i = 1, size(rating_names)
          text = text//'  '//get_rating_title(case, i)//to_text(get_rounded(prediction%rating(i)))//' dB'//newline
-         if (rating_names(i) /= 'octaves') cycle
+         ! Another source than the ball has no class.
+         if (rating_names(i) /= 'octaves' .or. prediction%source_conforms .and. .not. has_class(case, prediction)) cycle
          class = get_class(prediction%rating(i))
          if (.not. prediction%source_conforms) then
             text = text//'    class not stated: the source does not conform'//newline
-         else if (.not. has_class(case, prediction)) then
-            cycle
          else if (class > 0) then
             text = text//'    class '//to_text(class)//' (at most '//fixed(class_limits(class), 0)//' dB)'//newline
          else
