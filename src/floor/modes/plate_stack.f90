@@ -197,8 +197,8 @@ contains
       part = stack
       associate (bearing => part%plate(part%bearing))
          bearing%edge = edge_type()
-         bearing%line_x = [real(wp) :: ]
-         bearing%line_y = [real(wp) :: ]
+         if (allocated(bearing%line_x)) deallocate (bearing%line_x)
+         if (allocated(bearing%line_y)) deallocate (bearing%line_y)
       end associate
       do while (get_resolved_frequency(part, simplified_limit) < simplified_limit &
          .and. max(part%length, part%width) > min_part)
