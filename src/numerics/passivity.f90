@@ -41,25 +41,26 @@ contains
       real(wp), allocatable, intent(out) :: omega(:)
       !> True if LAPACK finds no eigenvalues.
       logical, intent(out) :: failed
-      complex(wp), allocatable :: a(:), c(:), matrix(:, :), square(:), work(:)
-      complex(wp) :: none(1, 1)
+      complex(wp), dimension(size(pole) + count(aimag(pole) > 0.0_wp)) :: a, c, square
+      complex(wp) :: half(size(pole)), left(1, 1), right(1, 1)
+      complex(wp), allocatable :: matrix(:, :), work(:)
       real(wp), allocatable :: border(:), real_work(:)
       real(wp) :: scale
       integer :: info, j, n
 
       scale = maxval(abs(pole))
       a = [pole, pack(conjg(pole), pole%im > 0.0_wp)]/scale
-      c = merge(residue/2, residue, pole%im > 0.0_wp)
-      c = [c, pack(conjg(c), pole%im > 0.0_wp)]/scale
+      half = merge(residue/2, residue, pole%im > 0.0_wp)
+      c = [half, pack(conjg(half), pole%im > 0.0_wp)]/scale
       n = size(a)
       matrix = spread(a, 2, n)*spread(c/direct, 1, n)
       do j = 1, n
          matrix(j, j) = matrix(j, j) - a(j)**2
       end do
-      allocate (omega(0), square(n), work(33*n), real_work(2*n))
+      allocate (omega(0), work(33*n), real_work(2*n))
       failed = .not. all(abs(matrix) <= huge(1.0_wp))
       if (failed) return
-      call zgeev('N', 'N', n, matrix, n, square, none, 1, none, 1, work, size(work), real_work, info)
+      call zgeev('N', 'N', n, matrix, n, square, left, 1, right, 1, work, size(work), real_work, info)
       failed = info /= 0
       if (failed) return
       ! Candidates that are no zeros do no harm; zeros that rounding has moved off the real axis must not be missed.
