@@ -244,13 +244,14 @@ contains
    !> The resolution of a result, by the keys that set it.
    pure function get_resolution(history) result(text)
       type(force_history_type), intent(in) :: history
-      character(len=:), allocatable :: text
+      !> The keys with their values, then blanks.
+      character(len=96) :: text
       integer :: i
 
       text = ''
       do i = 1, size(resolution_quantities)
          associate (value => get_model_quantity(history, resolution_quantities(i)))
-            if (value > 0.0_wp) text = text//', '//trim(resolution_quantities(i))//' = '//fixed(value, 0)
+            if (value > 0.0_wp) text = trim(text)//', '//trim(resolution_quantities(i))//' = '//fixed(value, 0)
          end associate
       end do
       if (text == '') text = ', sample_rate = '//fixed(history%sample_rate, 0)
