@@ -37,11 +37,14 @@ contains
       end if
       if (allocated(error)) return
       allocate (character(len=bytes) :: text)
+      ! Threads may read the same file, and none can be open twice.
+      !$omp critical (thud_file)
       open (newunit=unit, file=path, action='read', access='stream', status='old', iostat=status, iomsg=reason)
       if (status == 0) then
          read (unit, iostat=status, iomsg=reason) text
          close (unit)
       end if
+      !$omp end critical (thud_file)
       if (status /= 0) error = input_error('the file cannot be read ('//trim(reason)//'); allowed: a readable namelist file')
       if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
