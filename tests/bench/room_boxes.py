@@ -3,7 +3,8 @@
     OPENBLAS_NUM_THREADS=1 .venv/bin/python tests/bench/room_boxes.py
 
 prints the scatter that `src/floor/room/room_uncertainty.f90` holds; options: --help. The
-estimate is the answer of thud for a drawn dwelling (construction, sides, height, reverberation time) without stated
+estimate is the answer of thud for a drawn dwelling (construction, sides, height, reverberation
+time) without stated
 edges. The truths are the same dwelling with what its user does not know drawn, too:
 
 - edges between free rotation and clamping, alike along all sides: rotational stiffness 0.1 to 100
