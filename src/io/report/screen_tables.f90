@@ -40,13 +40,15 @@ contains
       text = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) text = text//'   model '//trim(case%model)
       text = text//newline
-      if (case%has_modes) text = text//newline//'  free modes     frequency   harmonic   participation'//newline &
-         //'                       Hz                of the pole'//newline
-      do i = 1, merge(size(results%modes%frequency), 0, case%has_modes)
-         text = text//flush_right(to_text(i), 6)//flush_right(fixed(results%modes%frequency(i), 2), 19) &
-            //flush_right(to_text(results%modes%harmonic(i)), 11) &
-            //flush_right(fixed(results%modes%participation(i), 3), 16)//newline
-      end do
+      if (case%has_modes) then
+         text = text//newline//'  free modes     frequency   harmonic   participation'//newline &
+            //'                       Hz                of the pole'//newline
+         do i = 1, size(results%modes%frequency)
+            text = text//flush_right(to_text(i), 6)//flush_right(fixed(results%modes%frequency(i), 2), 19) &
+               //flush_right(to_text(results%modes%harmonic(i)), 11) &
+               //flush_right(fixed(results%modes%participation(i), 3), 16)//newline
+         end do
+      end if
       if (case%has_impact) text = text//newline//get_impact_table(case, results%impact, verbose)
       if (allocated(results%on_floor)) text = text//newline//get_floor_table(case, results)
       if (allocated(results%room%bands)) text = text//newline//get_room_table(case, results%room, &
