@@ -154,7 +154,7 @@ contains
       at = 1
       do while (at <= len(record%text) + 1)
          length = index(record%text(at:)//newline, newline) - 1
-         cells = [cells, [character(len=cell_length) :: record%text(at:at + length - 1)]]
+         cells = [character(len=cell_length) :: cells, record%text(at:at + length - 1)]
          at = at + length + 1
       end do
    end subroutine get_cells
