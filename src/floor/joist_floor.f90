@@ -5,7 +5,7 @@ module thud_joist_floor
    use thud_floor_model, only: floor_state_type
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, real_field
-   use thud_plate, only: plate_type
+   use thud_plate, only: get_thin_limit, plate_type
    use thud_plate_stack, only: get_spaced_positions, new_orthotropic, orthotropic_type, ribs_type
    use thud_rectangular_floor, only: rectangular_floor_type
    implicit none (type, external)
@@ -73,15 +73,16 @@ contains
       class(joist_floor_type), intent(in) :: self
       type(floor_state_type), intent(inout) :: state
       type(orthotropic_type), intent(out) :: bearing
+      type(plate_type) :: sheathing
       type(ribs_type) :: joists
 
       state%group = 'joist_floor'
       state%has_modal_conductance = .true.
-      state%plate = get_smeared(self)
-      bearing = new_orthotropic(plate_type(length=self%length, width=self%width, &
-         thickness=self%sheathing_thickness, density=self%sheathing_density, &
-         wave_speed=sqrt(self%sheathing_modulus/self%sheathing_density), loss_factor=self%loss_factor))
-      state%highest_frequency = (2*pi/(6*self%sheathing_thickness))**2*sqrt(bearing%along/bearing%mass)/(2*pi)
+      sheathing = plate_type(length=self%length, width=self%width, thickness=self%sheathing_thickness, &
+         density=self%sheathing_density, wave_speed=sqrt(self%sheathing_modulus/self%sheathing_density), &
+         loss_factor=self%loss_factor)
+      bearing = new_orthotropic(sheathing)
+      state%highest_frequency = get_thin_limit(sheathing)
       state%validity_reason = 'bending waves are shorter than six thicknesses of the sheathing, and it is not thin'
       associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
          arm => (self%joist_height + self%sheathing_thickness)/2)
@@ -107,6 +108,7 @@ contains
          end if
       end associate
       joists%loss_factor = self%loss_factor
+      state%plate = get_smeared(self, bearing%along, bearing%mass, joists)
       allocate (bearing%ribs, source=joists)
    end subroutine get_bearing
 
@@ -132,19 +134,17 @@ contains
    !>
    !> The bending stiffness along the joists is that of sheathing and joists over the span, across them B' of the sheathing;
    !> H = B' + G J of a joist/(2 spacing) (Timoshenko and Woinowsky-Krieger).
-   pure function get_smeared(self) result(plate)
+   pure function get_smeared(self, across, sheathing_mass, joists) result(plate)
       class(joist_floor_type), intent(in) :: self
+      !> Bending stiffness, N m, and mass per area, kg/m2, of the sheathing.
+      real(wp), intent(in) :: across, sheathing_mass
+      type(ribs_type), intent(in) :: joists
       type(plate_type) :: plate
-      real(wp) :: across, along, torsion, mass, composite, slip
+      real(wp) :: along, torsion, mass
 
-      call get_composite(self, composite, slip)
-      across = self%sheathing_modulus*self%sheathing_thickness**3/12
-      associate (e => self%joist_modulus, b => self%joist_width, h => self%joist_height, &
-         t => self%sheathing_thickness, a => self%spacing)
-         along = across + (e*b*h**3/12 + composite/(1 + slip*composite*(pi/self%length)**2))/a
-         torsion = across + shear_ratio*e*get_torsion_constant(b, h)/(2*a)
-         mass = self%sheathing_density*t + self%joist_density*b*h/a
-      end associate
+      along = across + (joists%bending + joists%composite/(1 + joists%slip*joists%composite*(pi/self%length)**2))/self%spacing
+      torsion = across + joists%torsion/(2*self%spacing)
+      mass = sheathing_mass + joists%mass/self%spacing
       plate = plate_type(length=self%length, width=self%width, thickness=self%sheathing_thickness, &
          density=mass/self%sheathing_thickness, stiffness_ratio=across/along, torsion_ratio=torsion/sqrt(along*across), &
          loss_factor=self%loss_factor, edges='absorption')

@@ -231,7 +231,7 @@ contains
    subroutine add_covering(self, receiver)
       class(rectangular_floor_type), intent(in) :: self
       type(receiver_type), intent(inout) :: receiver
-      real(wp), parameter :: omega = 100*acos(-1.0_wp)
+      real(wp), parameter :: omega = 100*pi
 
       associate (k => self%covering_stiffness, c => self%covering_stiffness*self%covering_loss_factor/omega)
          receiver%direct = receiver%direct + 1/c

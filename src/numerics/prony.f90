@@ -116,7 +116,6 @@ contains
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), parameter :: span = series_to/series_from*outside**2
       real(wp) :: omega, omega_max, spring, springpot
-      complex(wp) :: power
       complex(wp) :: term(n_term)
       real(wp) :: matrix(2*n_frequency, n_term), right(2*n_frequency), work(64*n_term)
       integer :: i, info
@@ -127,12 +126,10 @@ contains
          omega = 2*pi*series_from*(series_to/series_from)**((i - 1)/real(n_frequency - 1, wp))
          term = [cmplx(1.0_wp, 0.0_wp, wp), 1 - 1/cmplx(1.0_wp, omega*time, wp), cmplx(0.0_wp, omega/omega_max, wp)]
          term = term*(omega_max/omega)**order
-         power = exp(cmplx(0.0_wp, pi/2*order, wp))
          matrix(i, :) = real(term)
          matrix(n_frequency + i, :) = aimag(term)
-         right(i) = real(power)
-         right(n_frequency + i) = aimag(power)
       end do
+      right = [spread(cos(pi/2*order), 1, n_frequency), spread(sin(pi/2*order), 1, n_frequency)]
       ! The columns are independent, and the moduli are positive for any order (see the tests).
       call dgels('N', size(right), n_term, 1, matrix, size(right), right, size(right), work, size(work), info)
       ! Of the spring-pot at its frequency, over the storage modulus there.

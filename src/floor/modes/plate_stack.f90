@@ -258,7 +258,7 @@ contains
          end do
          if (.not. allocated(stack%plate(i)%ribs)) cycle
          associate (position => stack%plate(i)%ribs%position)
-            yes(2) = yes(2) .and. all(abs(position + position(size(position):1:-1) - stack%width) <= 1.0e-9_wp*stack%length)
+            yes(2) = yes(2) .and. all(abs(position + position(size(position):1:-1) - stack%width) <= 1.0e-9_wp*stack%width)
          end associate
       end do
    end function is_symmetric

@@ -74,7 +74,7 @@ contains
       ! The use of other keys depends on these, even in an unchecked case.
       call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
-      if (.not. allocated(error)) call check_use(assignments, case, error)
+      if (.not. allocated(error)) call check_use(assignments, case, pack(fields, is_used(case, fields)), error)
       if (present(unchecked)) then
          if (unchecked) return
       end if
@@ -105,17 +105,16 @@ contains
    end subroutine resolve_paths
 
    !> Returns an error if the case does not use a group.
-   subroutine check_use(assignments, case, error)
+   subroutine check_use(assignments, case, fields, error)
       !> Assignments of the file: [n_assignment].
       type(assignment_type), intent(in) :: assignments(:)
-      type(case_type), intent(in), target :: case
+      type(case_type), intent(in) :: case
+      !> The keys that the case uses: [n_field].
+      type(field_type), intent(in) :: fields(:)
       type(error_type), allocatable, intent(out) :: error
-      type(field_type), allocatable :: fields(:)
       character(len=:), allocatable :: where
       integer :: i
 
-      allocate (fields, source=get_fields(case))
-      fields = pack(fields, is_used(case, fields))
       do i = 1, size(assignments)
          if (any(fields%group == assignments(i)%group)) cycle
          where = 'with &modes alone'
@@ -169,7 +168,7 @@ contains
             call fields(field)%get_allowed(allowed)
             error = input_error(label//' has no value; allowed: '//allowed)
          else
-            stated = stated .or. fields%group == group .and. fields%key == key
+            stated(field) = .true.
             call fields(field)%set_from_text(assignments(i)%value, error)
          end if
       end associate

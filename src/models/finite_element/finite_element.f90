@@ -405,7 +405,7 @@ contains
          allocate (history%motion%snapshot(get_frame_count(self, sampling)))
       end if
       call march(self, run, contacts, sampling, history, error)
-      if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
+      if (.not. allocated(error)) call finish_record(run, speed, history, error)
    end subroutine solve_once
 
    !> Integrates in time until the ball has left for good.
@@ -438,8 +438,7 @@ contains
       check_stride = max(1, nint(check_interval*sampling%sample_rate))
       stride = max(1, nint(self%snapshot_interval*sampling%sample_rate))
       samples: do i = 1, size(history%floor_force)
-         time = (i - 1)*interval
-         if (mod(i - 1, check_stride) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
+         if (mod(i - 1, check_stride) == 0) call report_progress(1.0e3_wp*(i - 1)*interval, 1.0e3_wp*sampling%duration, 'ms')
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*step
             ! No further contact is wanted: a node may reach the floor in the next step.
@@ -468,7 +467,7 @@ contains
             call add_to_means(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), &
                history%floor_force)
             history%impulse = history%impulse + run%impulse
-            call follow_contact(run, contacts, time, interval/n_step, history)
+            call follow_contact(run, contacts, time, step, history)
             call update_position(run, step)
          end do
          if (contacts%n_over < self%bounces) cycle samples

@@ -1,6 +1,5 @@
 !> The record of an impact by finite elements: samples, contacts, flight after the computation, balances.
 module thud_impact_record
-   use thud_ball, only: ball_type
    use thud_constants, only: recorded_band
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
@@ -128,10 +127,8 @@ contains
    end subroutine continue_flight
 
    !> Sets the peaks of the impact, and checks the balances.
-   subroutine finish_record(ball, run, sampling, speed, history, error)
-      type(ball_type), intent(in) :: ball
+   subroutine finish_record(run, speed, history, error)
       type(impact_run_type), intent(in) :: run
-      type(sampling_type), intent(in) :: sampling
       !> Velocity downwards at the start, m/s.
       real(wp), intent(in) :: speed
       !> The history; its samples are complete.
@@ -162,7 +159,7 @@ contains
       call add_model_quantity(history, 'maximum_penetration', 'm', run%penetration)
       call add_model_quantity(history, 'radial_elements', '', real(run%body%mesh%n_radial, wp))
       call add_model_quantity(history, 'polar_elements', '', real(run%body%mesh%n_polar, wp))
-      gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
+      gain = run%total_mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
       if (.not. history%impulse_residual <= max_impulse_residual) then
          error = numerical_error('&finite_element: the balance of momentum misses by ' &
