@@ -7,7 +7,7 @@ module thud_answer
    use thud_compression, only: compression_type, compute_compression
    use thud_compute, only: compute, results_type, scope_type
    use thud_constants, only: get_compiler, version
-   use thud_directory_answers, only: answer_check_results, answer_close_results, answer_open_results
+   use thud_directory_answers, only: answer_directory
    use thud_error, only: error_type, input_error
    use thud_field, only: name_length
    use thud_finite_element, only: finite_element_type
@@ -61,12 +61,8 @@ contains
          if (.not. allocated(error)) call add_case(case, bundle)
       case ('run')
          call answer_run(request, bundle, error)
-      case ('check_results')
-         call answer_check_results(request, error)
-      case ('open_results')
-         call answer_open_results(request, bundle, error)
-      case ('close_results')
-         call answer_close_results(request, error)
+      case ('check_results', 'open_results', 'close_results')
+         call answer_directory(question, request, bundle, error)
       case ('solve')
          ! Without levels and energies: callers ask for them in the bands that they need.
          call compute(case, scope_type(levels=.false., energies=.false.), results, error)

@@ -10,72 +10,52 @@ module thud_directory_answers
    implicit none (type, external)
    private
 
-   public :: answer_check_results, answer_close_results, answer_open_results
+   public :: answer_directory
 
 contains
 
-   !> Checks that the directory `path` may be replaced by the files `names` of a command.
-   subroutine answer_check_results(request, error)
-      type(request_type), intent(in) :: request
-      !> Set if it may not.
-      type(error_type), allocatable, intent(out) :: error
-      character(len=path_length), allocatable :: names(:)
-
-      call get_list(request, 'names', names)
-      call check_target(new_directory(request), names, error)
-   end subroutine answer_check_results
-
-   !> Makes the new directory `folder` beside `path`.
-   subroutine answer_open_results(request, bundle, error)
+   !> Answers a question on a directory: texts `path`, `command`, `subject` and `inputs`, number `replace`.
+   subroutine answer_directory(question, request, bundle, error)
+      !> `check_results`: may the files `names` replace it; `open_results`: makes the new directory `folder` beside it;
+      !> `close_results`: puts `folder` in its place, or removes `folder`.
+      character(len=*), intent(in) :: question
       type(request_type), intent(in) :: request
       type(bundle_type), intent(inout) :: bundle
-      !> Set if it cannot be made.
+      !> Set if the directory may not be replaced, or `folder` cannot be made.
       type(error_type), allocatable, intent(out) :: error
-      type(result_directory_type) :: directory
-
-      directory = new_directory(request)
-      call open_results(directory, error)
-      if (.not. allocated(error)) call bundle%add_text('folder', directory%folder)
-   end subroutine answer_open_results
-
-   !> Puts the directory `folder` in the place of `path`, or removes it.
-   subroutine answer_close_results(request, error)
-      type(request_type), intent(in) :: request
-      !> Set if the directory may not be replaced.
-      type(error_type), allocatable, intent(out) :: error
-      type(result_directory_type) :: directory
-
-      directory = new_directory(request)
-      call close_results(directory, error)
-   end subroutine answer_close_results
-
-   !> The directory of a request: texts `path`, `command`, `subject` and `inputs`, number `replace`, perhaps text `folder`.
-   function new_directory(request) result(directory)
-      type(request_type), intent(in) :: request
       type(result_directory_type) :: directory
       character(len=:), allocatable :: path, command, subject
-      character(len=path_length), allocatable :: inputs(:)
 
       call request%get_text('path', path)
       call request%get_text('command', command)
       call request%get_text('subject', subject)
-      call get_list(request, 'inputs', inputs)
-      directory = new_result_directory(path, command, subject, inputs, request%get_number('replace') > 0.0_wp)
-      if (request%has('folder')) call request%get_text('folder', directory%folder)
-   end function new_directory
+      directory = new_result_directory(path, command, subject, get_list('inputs'), request%get_number('replace') > 0.0_wp)
+      select case (question)
+      case ('check_results')
+         call check_target(directory, get_list('names'), error)
+      case ('open_results')
+         call open_results(directory, error)
+         if (.not. allocated(error)) call bundle%add_text('folder', directory%folder)
+      case default
+         call request%get_text('folder', directory%folder)
+         call close_results(directory, error)
+      end select
 
-   !> Texts `name.1`, `name.2` and so on: [n_text].
-   subroutine get_list(request, name, texts)
-      type(request_type), intent(in) :: request
-      character(len=*), intent(in) :: name
-      character(len=path_length), allocatable, intent(out) :: texts(:)
-      character(len=:), allocatable :: text
+   contains
 
-      allocate (texts(0))
-      do while (request%has(name//'.'//to_text(size(texts) + 1)))
-         call request%get_text(name//'.'//to_text(size(texts) + 1), text)
-         texts = [texts, [character(len=path_length) :: text]]
-      end do
-   end subroutine get_list
+      !> Texts `name.1`, `name.2` and so on: [n_text].
+      function get_list(name) result(texts)
+         character(len=*), intent(in) :: name
+         character(len=path_length), allocatable :: texts(:)
+         character(len=:), allocatable :: text
+
+         allocate (texts(0))
+         do while (request%has(name//'.'//to_text(size(texts) + 1)))
+            call request%get_text(name//'.'//to_text(size(texts) + 1), text)
+            texts = [character(len=path_length) :: texts, text]
+         end do
+      end function get_list
+
+   end subroutine answer_directory
 
 end module thud_directory_answers
