@@ -4,7 +4,7 @@ module thud_directory_answers
    use thud_error, only: error_type
    use thud_kinds, only: wp
    use thud_request, only: request_type
-   use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, result_directory_type
+   use thud_result_directory, only: check_target, close_results, open_results, result_directory_type
    use thud_system, only: path_length
    use thud_text, only: to_text
    implicit none (type, external)
@@ -24,12 +24,12 @@ contains
       !> Set if the directory may not be replaced, or `folder` cannot be made.
       type(error_type), allocatable, intent(out) :: error
       type(result_directory_type) :: directory
-      character(len=:), allocatable :: path, command, subject
 
-      call request%get_text('path', path)
-      call request%get_text('command', command)
-      call request%get_text('subject', subject)
-      directory = new_result_directory(path, command, subject, get_list('inputs'), request%get_number('replace') > 0.0_wp)
+      call request%get_text('path', directory%path)
+      call request%get_text('command', directory%command)
+      call request%get_text('subject', directory%subject)
+      directory%inputs = get_list('inputs')
+      directory%replace = request%get_number('replace') > 0.0_wp
       select case (question)
       case ('check_results')
          call check_target(directory, get_list('names'), error)

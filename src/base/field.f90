@@ -88,7 +88,6 @@ module thud_field
       procedure :: get_words
       procedure :: get_text
       procedure :: get_allowed
-      procedure :: is_empty
       procedure :: get_needed_choice
       procedure :: has_effect
       procedure, private :: get_error
@@ -288,6 +287,8 @@ contains
          entries = [real(findloc(self%choices(:self%n_choice) == value, .true., dim=1), wp)]
       type is (list_type)
          entries = value%values(:value%count)
+      type is (text_list_type)
+         entries = spread(0.0_wp, 1, value%count)
       class default
          allocate (entries(0))
       end select
@@ -411,17 +412,5 @@ contains
    end subroutine get_allowed
 
    !> Whether the field is a list without entries, which a namelist cannot hold.
-   pure function is_empty(self) result(empty)
-      class(field_type), intent(in) :: self
-      logical :: empty
-
-      empty = .false.
-      select type (value => self%value)
-      type is (list_type)
-         empty = value%count == 0
-      type is (text_list_type)
-         empty = value%count == 0
-      end select
-   end function is_empty
 
 end module thud_field

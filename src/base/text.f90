@@ -98,6 +98,9 @@ contains
       character(len=number_length) :: buffer
       character(len=12) :: form
 
+      ! Not a number, infinite, or wider than the buffer.
+      if (.not. abs(value) < 1.0e20_wp) buffer = format_real(value)
+      if (.not. abs(value) < 1.0e20_wp) return
       write (form, '(a,i0,a)') '(f40.', decimals, ')'
       write (buffer, form) value
       buffer = adjustl(buffer)
@@ -115,7 +118,8 @@ contains
       integer :: exponent
 
       buffer = '0'
-      if (.not. abs(value) > 0.0_wp) return
+      if (.not. ieee_is_finite(value)) buffer = format_real(value)
+      if (.not. (abs(value) > 0.0_wp .and. ieee_is_finite(value))) return
       ! The exponent of the rounded number.
       write (form, '(a,i0,a)') '(es40.', digits - 1, 'e3)'
       write (buffer, form) value
@@ -135,12 +139,9 @@ contains
       real(wp) :: read_back
       integer :: digits, exponent
 
-      if (ieee_is_nan(value)) then
-         buffer = 'NaN'
-         return
-      end if
       if (.not. ieee_is_finite(value)) then
          buffer = merge('-Infinity', 'Infinity ', value < 0.0_wp)
+         if (ieee_is_nan(value)) buffer = 'NaN'
          return
       end if
       ! Digits behind the first.

@@ -244,7 +244,7 @@ contains
       integer :: i
 
       allocate (fields, source=get_fields(case))
-      fields = pack(fields, [(is_used(case, fields(i)) .and. .not. fields(i)%is_empty(), i=1, size(fields))])
+      fields = pack(fields, [(is_used(case, fields(i)) .and. size(fields(i)%get_entries()) > 0, i=1, size(fields))])
    end function get_active_fields
 
    !> The keys with an effect that have the value of the standard ball because the case does not state them: [n_field].

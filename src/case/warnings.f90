@@ -184,9 +184,9 @@ contains
 
       associate (next => prediction%n_modal + 1)
          if (next > size(prediction%bands)) return
-         if (prediction%bands(next)%center <= prediction%crossover) call add(warnings, '&room: from ' &
+         if (prediction%bands(next)%center <= prediction%box%crossover) call add(warnings, '&room: from ' &
             //trim(get_band_name(prediction%bands(next)))//' Hz on the level is statistical, below the frequency at which ' &
-            //'three modes of the room overlap, '//fixed(prediction%crossover, 0)//' Hz')
+            //'three modes of the room overlap, '//fixed(prediction%box%crossover, 0)//' Hz')
       end associate
    end subroutine add_modes_warning
 

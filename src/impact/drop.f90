@@ -26,10 +26,8 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         real_field('height', drop%height, 'm', "height of the ball's lowest point above the floor", &
-         '[1e-12, 1000000]'), &
-         real_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
-         '[1e-12, 1000]')]
+         real_field('height', drop%height, 'm', "height of the ball's lowest point above the floor", '[1e-12, 1000000]'), &
+         real_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', '[1e-12, 1000]')]
    end function get_drop_fields
 
    !> Velocity at first touch, m/s (paper eq. 4).

@@ -3,12 +3,10 @@
 module thud_quantities
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_text, only: fixed, significant
    implicit none (type, external)
    private
 
-   public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
-      sample_quantity_count, show
+   public :: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, sample_quantity_count
 
    !> A number that a result can have.
    type :: quantity_type
@@ -45,8 +43,7 @@ module thud_quantities
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 0, 'maximum force on the floor', of_sample), &
       quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 0, &
       'maximum elastic force', of_sample), &
-      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 2, &
-      'maximum deflection', of_sample), &
+      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 2, 'maximum deflection', of_sample), &
       quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 3, 'coefficient of restitution', of_sample), &
       quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 2, &
       'time integral of the force on the floor', of_sample), &
@@ -119,19 +116,5 @@ contains
 
       quantity = quantities(findloc(quantities%name == name, .true., dim=1))
    end function get_quantity
-
-   !> Number on the screen: below the last decimal with three significant digits, 0 as `0`.
-   pure function show(quantity, value) result(text)
-      type(quantity_type), intent(in) :: quantity
-      !> Value in the unit on the screen.
-      real(wp), intent(in) :: value
-      character(len=:), allocatable :: text
-
-      if (abs(value) < 10.0_wp**(-quantity%decimals)) then
-         text = significant(value, 3)
-      else
-         text = fixed(value, quantity%decimals)
-      end if
-   end function show
 
 end module thud_quantities

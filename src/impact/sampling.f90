@@ -43,8 +43,7 @@ contains
       fields = [ &
          real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second; from 16000 with finite_element', &
          '[2000, 1e7]'), &
-         real_field('duration', sampling%duration, 's', 'duration of the record from first touch', &
-         '[0.001, 10]'), &
+         real_field('duration', sampling%duration, 's', 'duration of the record from first touch', '[0.001, 10]'), &
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]'), &
          plain_field('verify', sampling%verify, 'compute again at a finer resolution, and state the changes')]
    end function get_sampling_fields

@@ -15,7 +15,7 @@ module thud_result_directory
    implicit none (type, external)
    private
 
-   public :: add_text, begin_file, check_target, close_results, new_result_directory, open_results, result_directory_type
+   public :: add_text, begin_file, check_target, close_results, open_results, result_directory_type
    public :: write_file
 
    !> Name of the file that identifies results, and the beginning of its first line.
@@ -42,24 +42,6 @@ module thud_result_directory
    end type result_directory_type
 
 contains
-
-   !> A directory of results.
-   function new_result_directory(path, command, subject, inputs, replace) result(self)
-      !> Path of the directory; command and subject.
-      character(len=*), intent(in) :: path, command, subject
-      !> Paths of the files that the results depend on: [n_input].
-      character(len=*), intent(in) :: inputs(:)
-      !> Whether to replace results of another subject or command.
-      logical, intent(in) :: replace
-      type(result_directory_type) :: self
-
-      self%path = path
-      self%command = command
-      self%subject = subject
-      allocate (self%inputs(size(inputs)))
-      self%inputs = inputs
-      self%replace = replace
-   end function new_result_directory
 
    !> Returns an error if a directory may not be replaced.
    !>
@@ -109,7 +91,8 @@ contains
          if (present_names(i) == identity .and. (command /= '' .or. self%replace) .and. .not. directory_exists(path)) cycle
          if (.not. directory_exists(path)) then
             if (any(names == present_names(i))) cycle
-            if (is_page(present_names(i))) then
+            ! A page, which only a command that writes it anew removes.
+            if (index(trim(present_names(i))//'|', '.html|') + index(trim(present_names(i))//'|', '.pdf|') > 0) then
                if (size(names) == 0) cycle
             else if (any(listed == present_names(i)) .or. (size(names) == 0 .and. self%replace)) then
                cycle
@@ -120,14 +103,6 @@ contains
          return
       end do
    end subroutine check_target
-
-   !> Whether a file is a page: only a command that writes it anew removes it.
-   pure function is_page(name) result(yes)
-      character(len=*), intent(in) :: name
-      logical :: yes
-
-      yes = index(trim(name)//'|', '.html|') > 0 .or. index(trim(name)//'|', '.pdf|') > 0
-   end function is_page
 
    !> Reads whose results a directory holds.
    subroutine read_identity(path, command, subject, names)
@@ -250,7 +225,7 @@ contains
       integer :: status
 
       if (self%file < 0) return
-      call close_file(self%file, status)
+      status = close_file(self%file)
       self%file = -1
       call require_written(self, status, error)
    end subroutine end_file

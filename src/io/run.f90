@@ -9,8 +9,8 @@ module thud_run
    use thud_file, only: get_file_stem, read_text_file
    use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
    use thud_records, only: add_results
-   use thud_result_directory, only: check_target, close_results, new_result_directory, open_results, &
-      result_directory_type, write_file
+   use thud_result_directory, only: check_target, close_results, open_results, result_directory_type, write_file
+   use thud_system, only: path_length
    use thud_screen_tables, only: get_screen_tables
    use thud_text, only: lower_case, newline
    implicit none (type, external)
@@ -76,7 +76,11 @@ contains
       if (allocated(error)) return
       outcome%directory = options%output
       if (options%output == '') outcome%directory = 'outputs/'//trim(case%name)
-      directory = new_result_directory(outcome%directory, 'run', trim(case%name), [path], options%replace)
+      directory%path = outcome%directory
+      directory%command = 'run'
+      directory%subject = trim(case%name)
+      directory%inputs = [character(len=path_length) :: path]
+      directory%replace = options%replace
       if (options%folder == '') call check_target(directory, no_names, error)
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)

@@ -8,8 +8,8 @@ module thud_samples_run
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_progress, only: report_progress
-   use thud_result_directory, only: add_text, begin_file, check_target, close_results, new_result_directory, &
-      open_results, result_directory_type, write_file
+   use thud_result_directory, only: add_text, begin_file, check_target, close_results, open_results, &
+      result_directory_type, write_file
    use thud_run, only: load_case, outcome_type, run_options_type
    use thud_sample_report, only: get_sample_header, get_sample_rows
    use thud_sample_table, only: open_sample_table, read_samples, sample_table_type
@@ -56,7 +56,6 @@ contains
       type(tally_type) :: tally
       type(result_directory_type) :: results
       character(len=:), allocatable :: text
-      character(len=path_length) :: inputs(2)
       integer :: i
 
       call load_case(path, case, error, unchecked=.true.)
@@ -72,9 +71,11 @@ contains
          i=1, size(case%unstated))])
       outcome%directory = options%output
       if (options%output == '') outcome%directory = 'outputs/'//trim(case%name)//'_samples'
-      inputs(1) = path
-      inputs(2) = table_path
-      results = new_result_directory(outcome%directory, 'samples', trim(case%name), inputs, options%replace)
+      results%path = outcome%directory
+      results%command = 'samples'
+      results%subject = trim(case%name)
+      results%inputs = [character(len=path_length) :: path, table_path]
+      results%replace = options%replace
       call check_target(results, [result_file, input_file], error)
       if (.not. allocated(error)) call open_results(results, error)
       call get_case_text(case, text)

@@ -94,10 +94,10 @@ contains
    !> Nominal frequency of a band as text: `31.5`, `63`.
    pure function get_band_name(band) result(name)
       type(band_type), intent(in) :: band
-      character(len=len(fixed(band%nominal, mod(nint(2*band%nominal), 2)))) :: name
+      character(len=len(fixed(band%nominal, nint(2*band%nominal) - 2*int(band%nominal)))) :: name
 
       ! Only the half in 31.5 needs a decimal.
-      name = fixed(band%nominal, mod(nint(2*band%nominal), 2))
+      name = fixed(band%nominal, nint(2*band%nominal) - 2*int(band%nominal))
    end function get_band_name
 
 end module thud_band

@@ -42,8 +42,6 @@ module thud_sweep
    type :: sweep_type
       !> Bands of the levels, octaves first: [n_band].
       type(band_type), allocatable :: bands(:)
-      !> Index of the first band that the case asks for.
-      integer :: first_band = 1
       !> Levels and verdicts are wanted.
       logical :: levels = .true.
       !> Matrices of the levels, reused by later calls.
@@ -84,10 +82,12 @@ contains
       logical, intent(in) :: levels
       !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
+      ! Index of the first band that the case asks for.
+      integer :: first_band
 
-      call get_level_bands(case%bands, sweep%bands, sweep%first_band)
+      call get_level_bands(case%bands, sweep%bands, first_band)
       sweep%levels = levels
-      sweep%columns = get_result_columns(case, sweep%bands, sweep%first_band)
+      sweep%columns = get_result_columns(case, sweep%bands, first_band)
       call set_projections(sweep%projections, case%sampling%sample_rate, sweep%bands, get_sample_count(case%sampling))
    end subroutine new_sweep
 
@@ -246,8 +246,8 @@ contains
       end do
       call set_floor_air(case)
       if (.not. allocated(error)) call check_case(case, error)
-      if (.not. allocated(error)) call compute_shared(case, is_of_floor(fields(columns%field)), values, scope, &
-         shared, error)
+      if (.not. allocated(error)) call compute_shared(case, [(any(fields(columns(i)%field)%owner &
+         == [character(len=key_length) :: 'floor', 'room', floor_names]), i=1, size(columns))], values, scope, shared, error)
       if (case%has_floor .and. .not. allocated(error)) call drop_on_floor(case, shared%floor, on_floor, error)
       if (.not. allocated(error)) call assess_floor(case, scope, shared%floor, shared%impact, on_floor, floor, room, error)
       sweep%status(sample) = 0
@@ -302,14 +302,6 @@ contains
       call case%floors(get_floor_number(case))%model%prepare(shared%floor, error)
       shared%has_floor = .not. allocated(error)
    end subroutine compute_shared
-
-   !> Whether a key is one of floor or room.
-   elemental function is_of_floor(field) result(yes)
-      type(field_type), intent(in) :: field
-      logical :: yes
-
-      yes = any(field%owner == [character(len=key_length) :: 'floor', 'room', floor_names])
-   end function is_of_floor
 
    !> Computes samples of the shell model in batches; threads share blocks of samples.
    subroutine solve_batch(case, columns, values, threads, sweep, error)

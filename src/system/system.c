@@ -107,12 +107,6 @@ void thud_prepare_process(void)
          sigaction(ending_signals[i], &action, NULL);
 }
 
-// Ends the process immediately. Threads of OpenBLAS that wait for memory would delay a usual exit.
-void thud_end_process(int code)
-{
-   _exit(code);
-}
-
 // Limit of the memory of the container, bytes, in version 2 or 1 of control groups below a directory; infinite if there is
 // none.
 double thud_get_container_limit(const char *directory)

@@ -60,8 +60,10 @@ module thud_system
    procedure(path_text_call), bind(c, name='thud_make_beside') :: c_make_beside
    procedure(two_path_call), bind(c, name='thud_is_same_file') :: c_is_same_file
    procedure(two_path_call), bind(c, name='thud_swap') :: c_swap
-   procedure(number_call), bind(c, name='thud_close') :: c_close
-   procedure(number_call), bind(c, name='isatty') :: c_isatty
+   !> Closes a file: 0, or the number of the error.
+   procedure(number_call), bind(c, name='thud_close') :: close_file
+   !> 1 if a descriptor is a terminal.
+   procedure(number_call), bind(c, name='isatty') :: is_terminal
 
    !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then set `latest_signal`, and the third of
    !> them ends the process.
@@ -75,8 +77,9 @@ module thud_system
    procedure(plain_call), bind(c, name='thud_interrupt_calls') :: interrupt_calls
 
    interface
-      !> Ends the process immediately; buffered output would be lost.
-      subroutine end_process(code) bind(c, name='thud_end_process')
+      !> Ends the process immediately; buffered output would be lost. Threads of OpenBLAS that wait for memory would delay a
+      !> usual exit.
+      subroutine end_process(code) bind(c, name='_exit')
          import :: c_int
          implicit none (type, external)
          !> Exit code.
@@ -111,24 +114,6 @@ contains
       call c_get_error_text(int(status, c_int), text, len(text, c_size_t))
       text = text(:index(text, c_null_char) - 1)
    end function get_system_message
-
-   !> Whether a descriptor is a terminal.
-   function is_terminal(descriptor) result(yes)
-      !> `standard_output` or `standard_error`.
-      integer, intent(in) :: descriptor
-      logical :: yes
-
-      yes = c_isatty(int(descriptor, c_int)) == 1
-   end function is_terminal
-
-   !> Closes a file.
-   subroutine close_file(descriptor, status)
-      integer, intent(in) :: descriptor
-      !> 0, or the number of the error.
-      integer, intent(out) :: status
-
-      status = int(c_close(int(descriptor, c_int)))
-   end subroutine close_file
 
    !> Creates a file.
    subroutine create_file(path, descriptor, status)

@@ -99,8 +99,10 @@ contains
       character(len=cell_length), allocatable, intent(out) :: cells(:)
       !> Set if a line cannot be read, a cell is too long, a quote is not closed, or a decimal mark is not clear.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: line
+      character(len=*), parameter :: known = tab//';, '
+      character(len=:), allocatable :: line, structure
       logical :: is_first
+      integer :: i
 
       is_first = table%line == 0
       do
@@ -110,43 +112,29 @@ contains
          ! On some systems lines end with a carriage return and a line feed.
          line = trim(adjustl(replaced(line(:index(line//'#', '#') - 1), achar(13), ' ')))
          if (line == '') cycle
-         if (is_first) call find_separator(line, table%separator)
-         call split_line(table, line, cells, error)
+         call get_structure(line, structure)
+         ! The first of tab, semicolon, comma and blank that the first row holds; a single column has none.
+         do i = len(known), 1, -1
+            if (is_first .and. index(structure, known(i:i)) > 0) table%separator = known(i:i)
+         end do
+         call split_line(table, line, structure, cells, error)
          if (.not. allocated(error)) call find_decimal(table, cells, error)
          return
       end do
       allocate (cells(0))
    end subroutine read_row
 
-   !> Separator of a table: the first of tab, semicolon, comma and blank that its first row holds.
-   pure subroutine find_separator(line, separator)
-      !> The first row.
-      character(len=*), intent(in) :: line
-      !> Unchanged for a single column.
-      character(len=1), intent(inout) :: separator
-      character(len=*), parameter :: known = tab//';, '
-      character(len=:), allocatable :: structure
-      integer :: i
-
-      call get_structure(line, structure)
-      do i = len(known), 1, -1
-         if (index(structure, known(i:i)) > 0) separator = known(i:i)
-      end do
-   end subroutine find_separator
-
    !> Splits a line into cells.
-   subroutine split_line(table, line, cells, error)
+   subroutine split_line(table, line, structure, cells, error)
       type(table_reader_type), intent(in) :: table
-      !> The line, without surrounding blanks.
-      character(len=*), intent(in) :: line
+      !> The line, without surrounding blanks, and without quoted text.
+      character(len=*), intent(in) :: line, structure
       !> The cells, without surrounding blanks and quotes: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
       !> Set if a cell is too long, or a quote is not closed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: structure
       integer :: i, n, at, length, last
 
-      call get_structure(line, structure)
       associate (separator => table%separator)
          last = len(line)
          ! Spreadsheets may end lines with the separator.
@@ -166,7 +154,10 @@ contains
                error = row_error(table, quoted(trim(cells(n)))//'... is too long; allowed: values of up to ' &
                   //to_text(cell_length)//' characters')
             else if (scan(cells(n)(1:1), '''"') == 1) then
-               call unquote(table, cells(n), error)
+               i = len_trim(cells(n))
+               if (i == 1 .or. cells(n)(i:i) /= cells(n)(1:1)) error = row_error(table, 'a quote is not closed: ' &
+                  //trim(cells(n))//'; allowed: quotes that begin and end in one cell')
+               cells(n) = adjustl(cells(n)(2:i - 1))
             end if
             if (allocated(error)) return
             at = at + length + 1
@@ -176,22 +167,6 @@ contains
       cells = cells(:n)
    end subroutine split_line
 
-   !> Removes the quotes around a cell, and blanks next to them.
-   subroutine unquote(table, cell, error)
-      type(table_reader_type), intent(in) :: table
-      character(len=cell_length), intent(inout) :: cell
-      !> Set if the quote is not closed.
-      type(error_type), allocatable, intent(out) :: error
-      integer :: last
-
-      last = len_trim(cell)
-      if (last > 1 .and. cell(last:last) == cell(1:1)) then
-         cell = adjustl(cell(2:last - 1))
-      else
-         error = row_error(table, 'a quote is not closed: '//trim(cell)//'; allowed: quotes that begin and end in one cell')
-      end if
-   end subroutine unquote
-
    !> Finds the decimal mark of a table from the numbers of a row, and replaces it by a point.
    subroutine find_decimal(table, cells, error)
       type(table_reader_type), intent(inout) :: table
@@ -199,7 +174,7 @@ contains
       character(len=cell_length), intent(inout) :: cells(:)
       !> Set if a number has another decimal mark than earlier ones, or its comma may also separate thousands.
       type(error_type), allocatable, intent(out) :: error
-      integer :: ambiguous, i, at
+      integer :: ambiguous, i, at, first
 
       ambiguous = 0
       do i = 1, size(cells)
@@ -210,7 +185,11 @@ contains
                //'allowed: one decimal mark in a table')
             return
          end if
-         if (table%decimal == ' ' .and. may_separate_thousands(cells(i))) then
+         first = verify(cells(i), '+-')
+         ! A comma may separate thousands, as in 1,575.
+         if (table%decimal == ' ' .and. cells(i)(at:at) == ',' .and. at > first .and. at - first <= 3 &
+            .and. len_trim(cells(i)) == at + 3 .and. cells(i)(first:first) /= '0' &
+            .and. verify(trim(cells(i)(first:)), '0123456789,') == 0) then
             ambiguous = i
          else
             table%decimal = cells(i)(at:at)
@@ -222,18 +201,6 @@ contains
          cells(i) = replaced(cells(i), ',', '.')
       end do
    end subroutine find_decimal
-
-   !> Whether the comma of a number may separate thousands, as in 1,575.
-   pure function may_separate_thousands(cell) result(may)
-      character(len=*), intent(in) :: cell
-      logical :: may
-      integer :: first, comma
-
-      first = verify(cell, '+-')
-      comma = index(cell, ',')
-      may = comma > first .and. comma - first <= 3 .and. len_trim(cell) - comma == 3 .and. cell(first:first) /= '0' &
-         .and. verify(trim(cell(first:)), '0123456789,') == 0
-   end function may_separate_thousands
 
    !> A line with `x` for quoted text, because separators in quotes do not separate.
    pure subroutine get_structure(line, structure)

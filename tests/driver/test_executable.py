@@ -218,7 +218,7 @@ BAD_CASES = {
     ),
     "memory": (
         f"{MINIMAL}&sampling sample_rate = 1e7 duration = 10 /",
-        naming("&sampling: duration", "10.0 s", "1.0e7 Hz", "5000000.0"),
+        naming("&sampling: duration", "10.0 s", "1.0e7 Hz", "5000000"),
     ),
     "time": (
         f"{MINIMAL}&sampling sample_rate = 1e6 duration = 4 substeps = 9999 /",

@@ -120,15 +120,12 @@ module thud_room
       logical :: source_conforms = .true.
       !> Mass per unit area of the radiating plate, kg/m2.
       real(wp) :: surface_mass = 0.0_wp
-      !> Volume of the room, m3, and its length, width and height, m.
-      real(wp) :: volume = 0.0_wp
-      real(wp) :: sides(3) = 0.0_wp
+      !> The room.
+      type(box_type) :: box
       !> Energy that the impact injects into the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
       real(wp), allocatable :: radiation_factor(:), loss_factor(:)
-      !> Reverberation time of the room, s: [n_band].
-      real(wp), allocatable :: reverberation_time(:)
       !> Fractions of the energy that enters the room, over all times: from the floor, directly or through a ceiling, and
       !> from each flanking wall: [n_band, 1 + n_wall].
       real(wp), allocatable :: path_share(:, :)
@@ -145,8 +142,6 @@ module thud_room
       real(wp), allocatable :: edge_level(:, :)
       !> Number of bands whose level follows from the modes of floor and room; the others are statistical.
       integer :: n_modal = 0
-      !> Frequency at which three modes of the room overlap, Hz.
-      real(wp) :: crossover = 0.0_wp
       !> Octave bands and their levels, dB: [n_octave].
       type(band_type), allocatable :: octaves(:)
       real(wp), allocatable :: octave_level(:)
@@ -354,7 +349,7 @@ contains
       associate (level => prediction%rated_level(:, of_thirds))
          prediction%rating = [get_a_weighted_level('octave', prediction%octave_level), &
             get_a_weighted_level('third', level), get_a_weighted_level('third', level &
-            + get_standardization(prediction%reverberation_time, prediction%volume))]
+            + get_standardization(prediction%box%reverberation_time, prediction%box%volume))]
       end associate
    end subroutine add_ratings
 

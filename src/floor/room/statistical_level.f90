@@ -40,14 +40,11 @@ contains
       prediction%bands = box%bands
       prediction%conductance = radiation%conductance
       prediction%surface_mass = get_surface_mass(plate)
-      prediction%volume = box%volume
-      prediction%sides = box%sides
+      prediction%box = box
       prediction%energy = 10**(force_level/10)*radiation%conductance
       prediction%radiation_factor = radiation%radiation_factor
       prediction%loss_factor = get_total_loss(plate, room%air, prediction%bands%center, &
          (radiation%radiation_factor + radiation%upper_factor)/2)
-      prediction%reverberation_time = box%reverberation_time
-      prediction%crossover = box%crossover
       n_path = 1 + room%walls%lengths%count
       allocate (prediction%flow(size(radiation)), prediction%path_share(size(radiation), n_path))
       do i = 1, size(radiation)
@@ -97,8 +94,8 @@ contains
 
       ! The part above the room.
       plate = floor
-      plate%length = min(prediction%sides(1), floor%length)
-      plate%width = min(prediction%sides(2), floor%width)
+      plate%length = min(prediction%box%sides(1), floor%length)
+      plate%width = min(prediction%box%sides(2), floor%width)
       plates = [plate, get_walls(room%walls)]
       at_room = size(plates) + 1
       has_ceiling = room%ceiling%mass > 0.0_wp
@@ -109,10 +106,10 @@ contains
          ceiling => room%ceiling, area => plate%length*plate%width, last => size(flow%energy))
          radiated = air%density*air%sound_speed/get_surface_mass(plates) &
             *[radiation%radiation_factor, get_plate_radiation(plates(2:), air, f)]
-         decay = decay_of_60_db/prediction%reverberation_time(band)
+         decay = decay_of_60_db/prediction%box%reverberation_time(band)
          flow%energy(1) = prediction%energy(band)
-         flow%weight(at_room) = air%density*air%sound_speed**2/prediction%volume
-         flow%mode_density(:at_room) = [get_mode_density(plates), 4*pi*prediction%volume*f**2/air%sound_speed**3]
+         flow%weight(at_room) = air%density*air%sound_speed**2/prediction%box%volume
+         flow%mode_density(:at_room) = [get_mode_density(plates), 4*pi*prediction%box%volume*f**2/air%sound_speed**3]
          flow%total(:at_room) = [2*pi*f*[prediction%loss_factor(band), get_total_loss(plates(2:), air, f)], decay]
          flow%internal_loss(:at_room) = [2*pi*f*plates%loss_factor &
             + radiated*[radiation%upper_factor/radiation%radiation_factor, spread(1.0_wp, 1, size(plates) - 1)], &
@@ -126,7 +123,7 @@ contains
                flow%internal_loss(at_cavity) = 2*pi*f*ceiling%loss_factor
                call connect(flow, 1, at_cavity, radiated(1)*free*(1 - transmission**2))
                call connect(flow, at_room, at_cavity, &
-                  air%sound_speed*area*transmission*(1 - transmission)/(4*prediction%volume))
+                  air%sound_speed*area*transmission*(1 - transmission)/(4*prediction%box%volume))
             end associate
             call connect(flow, 1, at_room, radiated(1)*(forced + free*transmission**2))
          else

@@ -237,7 +237,7 @@ contains
             text = text//newline//mark//'&'//trim(fields(i)%group)//newline
          end if
          text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline
-         if (mark == '' .and. (fields(i)%is_empty() .or. fields(i)%is_calibrated)) text = text//'! '
+         if (mark == '' .and. (size(fields(i)%get_entries()) == 0 .or. fields(i)%is_calibrated)) text = text//'! '
          text = text//mark//'   '//trim(fields(i)%key)//' = '//value//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
       end do

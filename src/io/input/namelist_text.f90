@@ -132,7 +132,15 @@ contains
       end if
       start = finish + merge(1, len('&end'), structure(finish:finish) == '/')
       do
-         call find_key(structure(:finish - 1), begin, first, last, equals)
+         ! The next key and its equals sign; all positions lie past the end if there is none.
+         first = finish
+         last = finish
+         equals = finish
+         if (index(structure(begin:finish - 1), '=') > 0) then
+            equals = begin - 1 + index(structure(begin:finish - 1), '=')
+            last = begin - 1 + verify(structure(begin:equals - 1), blanks, back=.true.)
+            first = begin + verify(structure(begin:last), name_characters, back=.true.)
+         end if
          call get_value(clean(begin:first - 1), new%value)
          if (new%key /= '') then
             assignments = [assignments, new]
@@ -150,24 +158,6 @@ contains
          begin = equals + 1
       end do
    end subroutine read_group
-
-   !> Finds the next key and its equals sign; all positions lie past the end if there is none.
-   pure subroutine find_key(structure, from, first, last, equals)
-      !> Text without comments and quoted text, up to the group's end.
-      character(len=*), intent(in) :: structure
-      !> Position to search from.
-      integer, intent(in) :: from
-      !> First character of the key; last character of the key; position of the equals sign.
-      integer, intent(out) :: first, last, equals
-
-      first = len(structure) + 1
-      last = first
-      equals = first
-      if (index(structure(from:), '=') == 0) return
-      equals = from - 1 + index(structure(from:), '=')
-      last = from - 1 + verify(structure(from:equals - 1), blanks, back=.true.)
-      first = from + verify(structure(from:last), name_characters, back=.true.)
-   end subroutine find_key
 
    !> The value in one line, without surrounding blanks and trailing comma.
    pure subroutine get_value(text, value)

@@ -275,10 +275,10 @@ contains
 
       bundle%group = 'room'
       call bundle%add_number('surface_mass', room%surface_mass)
-      call bundle%add_number('volume', room%volume)
+      call bundle%add_number('volume', room%box%volume)
       call bundle%add_number('n_modal', real(room%n_modal, wp))
-      call bundle%add_number('crossover', room%crossover)
-      call bundle%add_array('sides', [3], room%sides)
+      call bundle%add_number('crossover', room%box%crossover)
+      call bundle%add_array('sides', [3], room%box%sides)
       bundle%group = 'room_levels'
       n = size(room%bands)
       call bundle%add_array('nominal_Hz', n, room%bands%nominal)
@@ -290,7 +290,7 @@ contains
       call bundle%add_array('conductance_s_kg', n, room%conductance)
       call bundle%add_array('radiation_factor', n, room%radiation_factor)
       call bundle%add_array('loss_factor', n, room%loss_factor)
-      call bundle%add_array('reverberation_time_s', n, room%reverberation_time)
+      call bundle%add_array('reverberation_time_s', n, room%box%reverberation_time)
       call bundle%add_array('direct_share', n, room%path_share(:, 1))
       do i = 2, size(room%path_share, 2)
          call bundle%add_array('wall_'//to_text(i - 1)//'_share', n, room%path_share(:, i))

@@ -88,9 +88,9 @@ contains
       if (size(prediction%path_share, 2) > 1) text = text//'  Energy that enters the room through the floor: ' &
          //fixed(100*minval(prediction%path_share(:, 1)), 0)//' to '//fixed(100*maxval(prediction%path_share(:, 1)), 0) &
          //' %, from the walls the rest.'//newline
-      text = text//'  Room of '//fixed(prediction%volume, 1)//' m3, reverberation time ' &
-         //fixed(minval(prediction%reverberation_time), 2)
-      if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
+      text = text//'  Room of '//fixed(prediction%box%volume, 1)//' m3, reverberation time ' &
+         //fixed(minval(prediction%box%reverberation_time), 2)
+      if (case%room%reverberation_time%count > 1) text = text//' to '//fixed(maxval(prediction%box%reverberation_time), 2)
       text = text//' s. Resistance of the floor '//significant(resistance/1.0e3_wp, 3)//' kN s/m.'//newline
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor yields under the source, but the force on a rigid floor is used: see docs/rooms.md.'//newline

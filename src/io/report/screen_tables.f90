@@ -8,7 +8,7 @@ module thud_screen_tables
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_kinds, only: wp
    use thud_quantities, only: get_quantities, get_quantity, history_quantity_count, quantities, quantity_type, &
-      sample_quantity_count, show
+      sample_quantity_count
    use thud_records, only: get_verdict_word
    use thud_refined_drop, only: finer_prefix, finer_quantities
    use thud_room_table, only: get_room_table
@@ -85,8 +85,7 @@ contains
          ! In most models both forces are equal.
          if (.not. any(abs(level(:, other) - level(:, assessed)) > 0.0_wp)) other = 0
          text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
-         if (other > 0) text = text//flush_right(trim(merge('floor force  ', 'elastic force', &
-            force_names(other) == 'floor')), screen_width - len(text))
+         if (other > 0) text = text//flush_right(trim(force_names(other))//' force', screen_width - len(text))
          text = text//newline
          do i = 1, octave_count
             text = text//level_row(i, criteria(i))
@@ -149,7 +148,6 @@ contains
       type(results_type), intent(in) :: results
       character(len=:), allocatable :: text
       character(len=:), allocatable :: deviation, line
-      character(len=1) :: none(0)
       integer :: i
 
       associate (history => results%on_floor, floor => results%floor, &
@@ -160,7 +158,7 @@ contains
             text = text//padded(line(:len(line) - 1), 40)//flush_right(fixed(floor%contact_level(i) - blocked(i), 2), 8) &
                //' dB  '//with_prefix(floor%energy(i), 'J', 3, 8)//newline
          end do
-         text = text//newline//quantity_rows(case, history, none) &
+         text = text//newline//quantity_rows(case, history, [character(len=1) ::]) &
             //row('velocity of the floor', significant(1.0e3_wp*maxval(abs(history%floor_velocity)), 3), 'mm/s') &
             //row('its displacement', significant(1.0e3_wp*maxval(abs(history%floor_displacement)), 3), 'mm') &
             //quantity_row(get_quantity('floor_work'), history%floor_work) &
@@ -251,9 +249,14 @@ contains
       !> Limits, in SI units.
       type(criterion_type), intent(in), optional :: criterion
       character(len=:), allocatable :: text
+      character(len=:), allocatable :: number
+      real(wp) :: shown
 
-      text = row(quantity%title, show(quantity, quantity%display_scale*value), quantity%display_unit, criterion, &
-         quantity%display_scale)
+      shown = quantity%display_scale*value
+      number = fixed(shown, quantity%decimals)
+      ! Below the last decimal with three significant digits, 0 as `0`.
+      if (abs(shown) < 10.0_wp**(-quantity%decimals)) number = significant(shown, 3)
+      text = row(quantity%title, number, quantity%display_unit, criterion, quantity%display_scale)
    end function quantity_row
 
    !> Row for a number, with its limits if there are any.

@@ -390,6 +390,11 @@ contains
       call new_material(self%material, ball, material, error)
       if (allocated(error)) return
       contacts%settling_time = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
+      if (contacts%settling_time > huge(1.0_wp)) then
+         error = input_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low to compute with; ' &
+            //'allowed: a higher one')
+         return
+      end if
       if (sampling%duration <= self%flight_before + contacts%settling_time) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
             //'after '//significant(contacts%settling_time, 3)//' s without touch, in which shear waves cross the ball; ' &
