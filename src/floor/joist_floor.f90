@@ -142,7 +142,8 @@ contains
       type(plate_type) :: plate
       real(wp) :: along, torsion, mass
 
-      along = across + (joists%bending + joists%composite/(1 + joists%slip*joists%composite*(pi/self%length)**2))/self%spacing
+      along = across + (joists%bending + joists%composite/(1 + joists%slip*joists%composite*(pi/self%length)**2)) &
+         /self%spacing
       torsion = across + joists%torsion/(2*self%spacing)
       mass = sheathing_mass + joists%mass/self%spacing
       plate = plate_type(length=self%length, width=self%width, thickness=self%sheathing_thickness, &

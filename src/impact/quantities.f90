@@ -43,7 +43,8 @@ module thud_quantities
       quantity_type('peak_force', 'peak force', 'F_{max}', 'N', 'N', 1.0_wp, 0, 'maximum force on the floor', of_sample), &
       quantity_type('peak_elastic_force', 'peak elastic force', 'F_{E,max}', 'N', 'N', 1.0_wp, 0, &
       'maximum elastic force', of_sample), &
-      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 2, 'maximum deflection', of_sample), &
+      quantity_type('max_deflection', 'peak deflection', 'd_{max}', 'm', 'mm', 1.0e3_wp, 2, &
+      'maximum deflection', of_sample), &
       quantity_type('restitution', 'restitution', 'e', '', '', 1.0_wp, 3, 'coefficient of restitution', of_sample), &
       quantity_type('impulse', 'impulse', 'I', 'N s', 'N s', 1.0_wp, 2, &
       'time integral of the force on the floor', of_sample), &
@@ -103,8 +104,8 @@ contains
 
       values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
          history%restitution, history%impulse, history%impact_velocity, &
-         history%exact_contact_time, history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual, &
-         history%numerical_error%octave, history%numerical_error%contact_time, history%numerical_error%restitution, &
+         history%exact_contact_time, history%touch_time, history%sample_rate, history%impulse_residual, &
+         history%energy_residual, history%numerical_error%octave, history%numerical_error%contact_time, history%numerical_error%restitution, &
          history%numerical_error%peak_force]
    end function get_quantities
 

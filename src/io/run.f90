@@ -10,8 +10,8 @@ module thud_run
    use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
    use thud_records, only: add_results
    use thud_result_directory, only: check_target, close_results, open_results, result_directory_type, write_file
-   use thud_system, only: path_length
    use thud_screen_tables, only: get_screen_tables
+   use thud_system, only: path_length
    use thud_text, only: lower_case, newline
    implicit none (type, external)
    private

@@ -247,7 +247,9 @@ def test_what_level_below_my_slab(browser: Browser, server: Served) -> None:
     fill(page, "room.required", "49")
     settle(page)
     sync_api.expect(page.locator("#verdict")).to_have_class("does_not_conform")
-    sync_api.expect(page.locator("#verdict")).to_contain_text(f"Does not conform: {prediction.rating}")
+    sync_api.expect(page.locator("#verdict")).to_contain_text(
+        f"Does not conform: {prediction.rating}"
+    )
     sync_api.expect(page.locator("#improve")).to_have_text("Change that meets 49 dB")
     # Another construction fills floor and ceiling, and names its sources.
     page.locator("#construction").select_option("concrete 180, screed on 15 MN/m3, ceiling")

@@ -125,7 +125,7 @@ def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> 
     wrong = ""
     if again and has_model:
         impact = thud.read_results(out)
-        if not np.array_equal(impact.floor_force, found["samples"]["floor_force"]):
+        if not np.array_equal(impact.floor_force, found["force"]["floor_force_N"]):
             return "mixed", "results are not read as they were computed"
         wrong = _levels(impact)
     if wrong:
