@@ -105,8 +105,8 @@ contains
       values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
          history%restitution, history%impulse, history%impact_velocity, &
          history%exact_contact_time, history%touch_time, history%sample_rate, history%impulse_residual, &
-         history%energy_residual, history%numerical_error%octave, history%numerical_error%contact_time, history%numerical_error%restitution, &
-         history%numerical_error%peak_force]
+         history%energy_residual, history%numerical_error%octave, history%numerical_error%contact_time, &
+         history%numerical_error%restitution, history%numerical_error%peak_force]
    end function get_quantities
 
    !> A quantity of the table by its name.

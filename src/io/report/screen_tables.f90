@@ -148,6 +148,7 @@ contains
       type(results_type), intent(in) :: results
       character(len=:), allocatable :: text
       character(len=:), allocatable :: deviation, line
+      character(len=1) :: none(0)
       integer :: i
 
       associate (history => results%on_floor, floor => results%floor, &
@@ -158,7 +159,7 @@ contains
             text = text//padded(line(:len(line) - 1), 40)//flush_right(fixed(floor%contact_level(i) - blocked(i), 2), 8) &
                //' dB  '//with_prefix(floor%energy(i), 'J', 3, 8)//newline
          end do
-         text = text//newline//quantity_rows(case, history, [character(len=1) :: ]) &
+         text = text//newline//quantity_rows(case, history, none) &
             //row('velocity of the floor', significant(1.0e3_wp*maxval(abs(history%floor_velocity)), 3), 'mm/s') &
             //row('its displacement', significant(1.0e3_wp*maxval(abs(history%floor_displacement)), 3), 'mm') &
             //quantity_row(get_quantity('floor_work'), history%floor_work) &
