@@ -48,7 +48,7 @@ contains
       character(len=:), allocatable :: lines
 
       lines = 'thud: '//text//newline
-      if (is_terminal(standard_error) == 1) call wrap_lines('thud: '//text//newline, lines)
+      if (is_terminal(standard_error)) call wrap_lines('thud: '//text//newline, lines)
       if (has_colors(standard_error)) lines = painted(lines(:5), color)//lines(6:)
       call write_screen(standard_error, lines, exit_code)
    end subroutine print_message
@@ -79,7 +79,7 @@ contains
 
       call get_environment_variable('NO_COLOR', length=unwanted)
       call get_environment_variable('TERM', terminal)
-      yes = is_terminal(descriptor) == 1 .and. unwanted == 0 .and. terminal /= '' .and. terminal /= 'dumb'
+      yes = is_terminal(descriptor) .and. unwanted == 0 .and. terminal /= '' .and. terminal /= 'dumb'
    end function has_colors
 
    !> Colors a word wherever it stands alone.

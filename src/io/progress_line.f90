@@ -29,7 +29,7 @@ contains
 
    !> Shows progress from now on.
    subroutine begin_progress()
-      if (is_terminal(standard_error) /= 1) return
+      if (.not. is_terminal(standard_error)) return
       call system_clock(latest, rate)
       first = latest
       latest_done = 0.0_wp

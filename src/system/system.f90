@@ -62,8 +62,7 @@ module thud_system
    procedure(two_path_call), bind(c, name='thud_swap') :: c_swap
    !> Closes a file: 0, or the number of the error.
    procedure(number_call), bind(c, name='thud_close') :: close_file
-   !> 1 if a descriptor is a terminal.
-   procedure(number_call), bind(c, name='isatty') :: is_terminal
+   procedure(number_call), bind(c, name='isatty') :: c_isatty
 
    !> Turns signals of full and closed outputs into errors; SIGINT and SIGTERM then set `latest_signal`, and the third of
    !> them ends the process.
@@ -114,6 +113,15 @@ contains
       call c_get_error_text(int(status, c_int), text, len(text, c_size_t))
       text = text(:index(text, c_null_char) - 1)
    end function get_system_message
+
+   !> Whether a descriptor is a terminal.
+   function is_terminal(descriptor) result(yes)
+      !> `standard_output` or `standard_error`.
+      integer, intent(in) :: descriptor
+      logical :: yes
+
+      yes = c_isatty(int(descriptor, c_int)) == 1
+   end function is_terminal
 
    !> Creates a file.
    subroutine create_file(path, descriptor, status)
