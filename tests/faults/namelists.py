@@ -7,7 +7,7 @@ import math
 import re
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from attempts import SANITIZED
@@ -113,6 +113,7 @@ def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> 
     out = Path("o")
     out.mkdir()
     found = ask("run", path=str(path), folder=str(out), progress=0)
+    _fill_free_limits(found.get("levels", {}))
     if wrong := _no_numbers("", found):
         return "NaN", wrong
     files = {one.name: one.read_bytes() for one in out.iterdir() if one.is_file()}
@@ -145,6 +146,14 @@ def _differing(files: dict[str, bytes]) -> list[str]:
         Path("effective.nml").unlink()
     again = {one.name: one.read_bytes() for one in Path("o").iterdir() if one.is_file()}
     return [name for name in files.keys() | again if files.get(name) != again.get(name)]
+
+
+def _fill_free_limits(levels: dict[str, Any]) -> None:
+    """Give 0 to the limits of the bands that say that they have none; no others may lack one."""
+    for name in [name for name in levels if name.startswith("verdict_")]:
+        free = np.array([word == b"no limit" for word in levels[name].split(b"\n")])
+        for limit in ("lower_limit_dB", "upper_limit_dB"):
+            levels[limit] = np.where(free, 0.0, levels[limit])
 
 
 def _no_numbers(name: str, found: object) -> str:
