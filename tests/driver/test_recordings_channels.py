@@ -76,8 +76,7 @@ def test_load_cells_are_added(channels: Any, tmp_path: Path) -> None:  # noqa: A
     path = write_table(tmp_path / "cells.csv", cells(), NAMES)
     (signal,) = open_signals(path, channels=channels)
     np.testing.assert_allclose(signal.read(0, signal.n_sample), sum(cells()), atol=1e-3)
-    assert signal.steps[-1] == "The forces of 4 load cells were added."
-    assert not signal.warnings
+    assert (signal.notes[-1].code, signal.notes[-1].value) == ("cells_added", 4)
     found = thud.read_recording(path, channels=channels)
     (whole,) = open_signals(write_table(tmp_path / "sum.csv", [sum(cells())], ["F"]))
     expected = thud.Recording.from_signals([whole], Config())
@@ -97,7 +96,7 @@ def test_each_load_cell_has_its_calibration(tmp_path: Path) -> None:
     inverted = [f"-{chain}" if isinstance(chain, str) else -chain for chain in chains]
     (signal,) = open_signals(path, channels=[1, 2, 3, 4], calibration=inverted)
     np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
-    assert any("negative" in step for step in signal.steps)
+    assert "sign_changed" in [note.code for note in signal.notes]
     (signal,) = open_signals(path, channels="sum", calibration=inverted, polarity="positive")
     np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
     with pytest.raises(InputError, match=naming("2 calibrations for 4 channels")):
@@ -179,16 +178,15 @@ def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
         ({"channels": "F1+F2+F3"}, "F4"),
     ):
         (signal,) = open_signals(path, **given)
-        (message,) = signal.warnings
-        assert message.endswith(f"other channels, too, which are not included: {missing}")
-    (signal,) = open_signals(path, channels="sum")
-    assert not signal.warnings
+        note = signal.notes[-1]
+        assert (note.code, note.others["channels"]) == ("forces_left_out", missing)
+    assert not warned(open_signals(path, channels="sum"))
     # The sum of load cells, small lateral forces, and a channel without any signal.
     force = sum(cells())
     columns = [*cells(), force, 0.01 * force, np.ones(len(force))]
     path = write_table(tmp_path / "plate.csv", columns, [*NAMES, "Fz", "Fx", "F0"])
-    assert not open_signals(path, channel="Fz")[0].warnings
-    assert not open_signals(path, channels="F1+F2+F3+F4")[0].warnings
+    assert not warned(open_signals(path, channel="Fz"))
+    assert not warned(open_signals(path, channels="F1+F2+F3+F4"))
 
 
 def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
@@ -200,9 +198,7 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=naming("F1", "all samples are 0")):
         thud.read_recording(path, channels="sum")
     path = write_table(tmp_path / "inverted.csv", [-first, *others], NAMES)
-    (message,) = open_signals(path, channels="sum")[0].warnings
-    assert "F1" in message
-    assert "sign of this load cell may be wrong" in message
+    assert warned(open_signals(path, channels="sum")) == [("cell_sign", "inverted.csv, F1")]
     lost = first.copy()
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
     path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)
@@ -210,6 +206,11 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     assert any("F1: 1 dropouts of 0.5 ms" in step for step in found.steps)
     expected = thud.read_recording(write_table(path, cells(), NAMES), channels="sum")
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=0.02)
+
+
+def warned(signals: list[Signal]) -> list[tuple[str, str]]:
+    """Return codes and subjects of the warnings on signals."""
+    return [(n.code, n.subject) for signal in signals for n in signal.notes if n.is_warning]
 
 
 def loads(**changed: NDArray[np.float64]) -> list[NDArray[np.float64]]:
@@ -262,8 +263,8 @@ def test_load_cell_in_another_unit_is_named(tmp_path: Path) -> None:
     head = "t [s],F1 [N],F2 [N],F3 [N],F4 [V],trigger [V]"
     np.savetxt(path, table, "%.7g", ",", header=head, comments="")
     (signal,) = open_signals(path, channels="sum")
-    (message,) = signal.warnings
-    assert re.search(r"not included: F4 \[V\];", message)
+    assert signal.notes[-1].code == "channels_similar"
+    assert signal.notes[-1].others["channels"] == "F4 [V]"
 
 
 def test_channels_of_unequal_length_are_refused() -> None:

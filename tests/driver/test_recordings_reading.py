@@ -95,6 +95,11 @@ def test_samples_have_the_levels_of_their_spectrum(rate: float) -> None:
     np.testing.assert_allclose(found, sampled_levels(rate), atol=5e-4)
 
 
+def codes(signal: Signal) -> list[str]:
+    """Return the codes of the notes on a signal."""
+    return [note.code for note in signal.notes]
+
+
 def read_all(path: Path, **given: Any) -> tuple[Signal, NDArray[np.float64]]:  # noqa: ANN401
     (signal,) = open_signals(path, **given)
     return signal, signal.read(0, signal.n_sample)
@@ -176,7 +181,8 @@ def test_negative_compression_is_found_and_told(name: str, tmp_path: Path) -> No
     WRITERS[name](tmp_path / name, -exact, 8000.0, "N")
     signal, force = read_all(tmp_path / name)
     np.testing.assert_allclose(force, exact, atol=1e-6)
-    assert any(re.search(naming("sign", "-1500 N"), step) for step in signal.steps)
+    (note,) = [note for note in signal.notes if note.code == "sign_changed"]
+    assert (note.subject, note.value) == (signal.name, pytest.approx(-1500))
     _, given = read_all(tmp_path / name, polarity="negative")
     np.testing.assert_array_equal(given, force)
     with pytest.raises(InputError, match=naming(name, "peak", "0 N")):
@@ -195,7 +201,7 @@ def test_polarity_of_a_record_without_quiet(cut: float, tmp_path: Path) -> None:
     for sign in (1, -1):
         signal, force = read_all(write_sound(tmp_path / "bare.wav", sign * pulse + 3.0))
         assert force.max() > 1490
-        assert bool(signal.steps[1:]) == (sign < 0)
+        assert ("sign_changed" in codes(signal)) == (sign < 0)
 
 
 def test_unclear_polarity_is_refused(tmp_path: Path) -> None:
@@ -220,14 +226,14 @@ def test_quiet_is_found_at_either_end() -> None:
 def test_polarity_is_doubted_from_half_as_much_again_on() -> None:
     for low, expected in ((-1490.0, False), (-1510.0, True)):
         told = check_peak(Extremes(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
-        assert any("polarity" in one for one in told) == expected
+        assert any(note.code == "polarity_doubtful" for note in told) == expected
 
 
 def test_wrong_polarity_is_doubted(tmp_path: Path) -> None:
     force = np.concatenate([half_sine(8000.0), -0.25 * half_sine(8000.0)])
     path = write_sound(tmp_path / "plate.wav", force)
     (signal,) = open_signals(path, unit="N", polarity="negative")
-    assert "polarity" in signal.warnings[-1]
+    assert codes(signal)[-1] == "polarity_doubtful"
 
 
 @pytest.mark.parametrize(
@@ -251,8 +257,9 @@ def test_wrong_units_are_told(factor: float, unit: str | None, words: str, tmp_p
 def test_small_peaks_raise_a_warning(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "plate.wav", 0.1 * half_sine(8000.0))
     (signal,) = open_signals(path, unit="N")
-    (warning,) = signal.warnings
-    assert re.search(naming("peak", "150 N", 300, "15000 N"), warning)
+    (note,) = signal.notes
+    assert note.code == "peak_unusual"
+    assert (note.value, note.low, note.high) == (pytest.approx(150), 300, 15_000)
 
 
 def test_units_and_rates_that_are_replaced_are_told(tmp_path: Path) -> None:
@@ -260,9 +267,9 @@ def test_units_and_rates_that_are_replaced_are_told(tmp_path: Path) -> None:
     signal, force = read_all(tmp_path / "plate.h5", unit="kN", sample_rate=8001.0)
     assert force.max() == pytest.approx(1500)
     assert signal.sample_rate == 8001
-    rate, unit = signal.steps
-    assert re.search(naming("rate", "8000 Hz", "8001 Hz"), rate)
-    assert re.search(naming("unit", "N", "kN"), unit)
+    rate, unit = signal.notes
+    assert (rate.code, rate.value, rate.others["of_file"]) == ("rate_replaced", 8001.0, 8000.0)
+    assert (unit.code, unit.unit, unit.others["of_file"]) == ("unit_replaced", "kN", "N")
     assert signal.date == "2024-05-06"
 
 
@@ -352,7 +359,7 @@ def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:
     for channel in (3, "3", "Fz", "fz"):
         (signal,) = open_signals(tmp_path / "t.csv", channel=channel)
         assert signal.name == "t.csv, Fz"
-        assert signal.steps == ()
+        assert signal.notes == ()
     with pytest.raises(InputError, match=naming("'Fy'", "2 'Fx'", "3 'Fz'", 4)):
         open_signals(tmp_path / "t.csv", channel="Fy")
     with pytest.raises(InputError, match=naming("V", "calibration")):
@@ -416,8 +423,8 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
     (signal,) = open_signals(tmp_path / "t.csv")
     # Of 1764 times rounded to 1 us the slope is off by 1e-6 sqrt(1 / 1764**3) steps and more.
     assert signal.sample_rate == pytest.approx(44100, rel=4e-6)
-    (step,) = signal.steps
-    assert re.search(naming("times", "1e-06 s"), step)
+    (note,) = signal.notes
+    assert (note.code, note.value) == ("times_rounded", pytest.approx(1e-6))
 
 
 def test_rounded_times_miss_the_grid_by_a_digit_at_most() -> None:
@@ -425,7 +432,7 @@ def test_rounded_times_miss_the_grid_by_a_digit_at_most() -> None:
     rounded = np.floor(exact / 1e-5 + 1e-6) * 1e-5
     _, step, (told,) = uniform_grid(rounded, "t.csv")
     assert step == pytest.approx(1.25e-4, rel=1e-6)
-    assert re.search(naming("1e-05 s"), told)
+    assert told.value == pytest.approx(1e-5)
     # Half a digit below the time, and another one below the mean.
     rounded[501] -= 1e-5
     with pytest.raises(InputError, match=naming("t.csv", "row 502")):
@@ -1227,7 +1234,7 @@ def test_date_times_are_an_axis(title: str, shown: str, tmp_path: Path) -> None:
     path.write_text(title + "\n" + "\n".join(rows), encoding="utf-8")
     signal, found = read_all(path)
     assert signal.sample_rate == pytest.approx(8000, rel=1e-7)
-    assert any("date-times" in step for step in signal.steps)
+    assert codes(signal)[0] == "date_times_rate"
     np.testing.assert_allclose(found, 1e3 * force, atol=1e-3)
 
 
@@ -1349,7 +1356,8 @@ def test_text_of_a_calibration_is_as_in_the_configuration(
     WRITERS[name](tmp_path / name, exact / FULL_SCALE, 8000.0, "V")
     signal, force = read_all(tmp_path / name, calibration=calibration)
     np.testing.assert_allclose(force, exact, atol=1e-3)
-    assert bool(unit) == any(step.endswith(f"the values are in {unit}.") for step in signal.steps)
+    units = [note.unit for note in signal.notes if note.code == "unit_of_calibration"]
+    assert units == [unit] * bool(unit)
     lab = tmp_path / "lab.toml"
     lab.write_text(f'calibration = "{calibration}"\n', encoding="utf-8")
     _, force = read_all(tmp_path / name, calibration=read_config(lab).calibration)

@@ -150,7 +150,9 @@ def _renamed(signal: Signal, copy: str, title: str) -> Signal:
     return replace(
         signal,
         name=signal.name.replace(copy, title),
-        warnings=tuple(warning.replace(copy, title) for warning in signal.warnings),
+        notes=tuple(
+            replace(note, subject=note.subject.replace(copy, title)) for note in signal.notes
+        ),
         cells=tuple(_renamed(cell, copy, title) for cell in signal.cells),
     )
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from thud.base.note import Note
+
 # Maximum size of files that are read as a whole, bytes.
 MAX_IN_MEMORY = 2**27
 # Maximum number of characters of a library's message that are shown.
@@ -52,8 +54,8 @@ class Channel:
         Counts at full scale if the values are integers, else None.
     date : str
         Date of the measurement, or empty.
-    steps : tuple of str
-        Processing when the file was read, a sentence each.
+    notes : tuple of Note
+        Processing when the file was read.
     may_be_fractions : bool
         Whether values without a unit may be fractions of full scale, as those of float audio.
     unapplied : str
@@ -69,7 +71,7 @@ class Channel:
     sample_rate: float | None = None
     counts: float | None = None
     date: str = ""
-    steps: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     may_be_fractions: bool = False
     unapplied: str = ""
 

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.signal import correlate
 
 from thud.base.checks import refuse, shown
+from thud.base.note import Note
 from thud.recordings.faults import fill_dropouts, read_repaired, refuse_clipped
 from thud.recordings.polarity import MIN_PEAK_RATIO, scan
 
@@ -90,6 +91,10 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
                 "channels that were recorded together",
             )
     uncertainties = [cell.calibration_uncertainty for cell in cells]
+    notes: list[Note] = []
+    for note in (note for cell in cells for note in cell.notes):
+        common = replace(note, subject=name)
+        notes += [common] * (common not in notes)
     known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     return replace(
         first,
@@ -99,13 +104,12 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
         calibration="; ".join(dict.fromkeys(cell.calibration for cell in cells)),
         # The reference of all calibrations is usually the same.
         calibration_uncertainty=max(known) if len(known) == len(cells) else None,
-        steps=tuple(dict.fromkeys(step for cell in cells for step in cell.steps)),
-        warnings=(),
+        notes=tuple(notes),
         cells=tuple(cells),
     )
 
 
-def check_signs(total: Signal, peak: float) -> tuple[str, ...]:
+def check_signs(total: Signal, peak: float) -> tuple[Note, ...]:
     """Return a warning for each cell whose force is mostly negative; the peak is that of the sum.
 
     Raise InputError if all samples of a cell are equal.
@@ -115,10 +119,8 @@ def check_signs(total: Signal, peak: float) -> tuple[str, ...]:
         extremes = scan(cell.read, cell.n_sample, cell.name)
         up, down = extremes.peak(1.0), extremes.peak(-1.0)
         if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
-            warnings.append(
-                f"{cell.name}: the peak is {-down:.4g} N in a sum of {peak:.4g} N; the sign of "
-                "this load cell may be wrong"
-            )
+            note = Note("cell_sign", cell.name, -down, unit="N", others={"total": peak})
+            warnings.append(note)
     return tuple(warnings)
 
 

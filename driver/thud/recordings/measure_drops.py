@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
@@ -52,9 +52,15 @@ class Origin:
     @classmethod
     def of(cls, signal: Signal, drops: int, notes: tuple[str, ...]) -> Origin:
         """Return the origin of a number of drops of a signal, with notes on others."""
-        names = (field.name for field in fields(cls)[:-1])
-        origin = cls(**{name: getattr(signal, name) for name in names}, drops=drops)
-        return replace(origin, steps=(*origin.steps, *notes))
+        names = ("name", "path", "checksum", "date", "calibration", "sample_rate")
+        steps = (str(note) for note in signal.notes if not note.is_warning)
+        warnings = (f"{note.subject}: {note}" for note in signal.notes if note.is_warning)
+        return cls(
+            **{name: getattr(signal, name) for name in names},
+            steps=(*steps, *notes),
+            warnings=tuple(warnings),
+            drops=drops,
+        )
 
 
 def measure_signals(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,12 +77,12 @@ def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: s
 
 def find_sign(
     extremes: Extremes, scale: float, polarity: str | None, name: str
-) -> tuple[float, tuple[str, ...]]:
+) -> tuple[float, tuple[Note, ...]]:
     """Return the sign that makes a compression positive, and notes."""
     # `polarity` refers to the recorded values, before the calibration.
     if polarity is not None:
         sign = POLARITIES[polarity] * float(np.sign(scale))
-        changed = f"The sign was changed: polarity = {polarity!r}."
+        changed = Note("sign_stated", name, others={"polarity": polarity})
         return sign, (changed,) if sign * scale < 0 else ()
     up, down = extremes.peak(scale), extremes.peak(-scale)
     if max(up, down) < MIN_PEAK_RATIO * min(up, down):
@@ -92,7 +93,7 @@ def find_sign(
         )
     if up > down:
         return 1.0, ()
-    return -1.0, (f"The sign was changed: the largest peak, {-down:.4g} N, is negative.",)
+    return -1.0, (Note("sign_changed", name, value=-down, unit="N"),)
 
 
 def _refuse_staying(extremes: Extremes, peak: float, name: str) -> None:
@@ -105,7 +106,7 @@ def _refuse_staying(extremes: Extremes, peak: float, name: str) -> None:
         )
 
 
-def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[str, ...]:
+def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) -> tuple[Note, ...]:
     """Return warnings about a peak force; `scale` is N per value, with its sign.
 
     Raise InputError if the unit must be wrong, or an assumed unit may be.
@@ -131,11 +132,10 @@ def check_peak(extremes: Extremes, scale: float, name: str, *, assumed: bool) ->
             )
     if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
         refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong", allowed)
-    warnings: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     if not low <= peak <= high:
-        warnings += (f"The peak is {peak:.4g} N; usual is {allowed}.",)
+        notes += (Note("peak_unusual", name, peak, low, high, "N"),)
     if opposite_peak > MIN_PEAK_RATIO * peak:
-        warnings += (
-            f"The peaks are {-opposite_peak:.4g} N and {peak:.4g} N; the polarity may be wrong.",
-        )
-    return warnings
+        opposite = {"opposite": -opposite_peak}
+        notes += (Note("polarity_doubtful", name, peak, unit="N", others=opposite),)
+    return notes

@@ -129,8 +129,8 @@ class Recording(Displayed):
             calibration_uncertainty=calibration_uncertainty,
         )
         signal = Signal.from_array(force, sample_rate, name)
-        warnings = check_peak(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
-        return cls.from_signals([replace(signal, warnings=warnings)], config)
+        notes = check_peak(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
+        return cls.from_signals([replace(signal, notes=notes)], config)
 
     @classmethod
     def from_signals(

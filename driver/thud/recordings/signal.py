@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from thud.base.note import Note
+
 # Number of bytes of a file per read for the checksum.
 BLOCK = 2**20
 
@@ -44,10 +46,9 @@ class Signal(Immutable):
         Description of the calibration.
     calibration_uncertainty : float or None
         Relative standard uncertainty of the calibration; None if unknown.
-    steps : tuple of str
-        Processing when the file was read, a sentence each.
-    warnings : tuple of str
-        Possible faults, a sentence each.
+    notes : tuple of Note
+        Processing when the file was read, and possible faults; the subject is the name of the
+        signal, or of one of its load cells.
     cells : tuple of Signal
         Load cells whose sum this is.
     samples : callable
@@ -63,8 +64,7 @@ class Signal(Immutable):
     date: str = ""
     calibration: str = ""
     calibration_uncertainty: float | None = None
-    steps: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     cells: tuple[Signal, ...] = ()
 
     @classmethod

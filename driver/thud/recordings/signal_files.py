@@ -16,6 +16,7 @@ import numpy as np
 
 from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
 from thud.base.errors import InputError
+from thud.base.note import Note
 from thud.recordings.channel import MIB, MIN_SAMPLES, Channel, shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
@@ -193,11 +194,8 @@ def _with_missing(signal: Signal, chosen: list[Channel], entries: list[Channel])
     # The chosen channel may be the sum of the others.
     if not large or abs(sum(peaks.values()) / own - 1) < MAX_SUM_DEVIATION:
         return signal
-    warning = (
-        f"{signal.name}: the file has forces in other channels, too, which are not included: "
-        f"{', '.join(large)}"
-    )
-    return replace(signal, warnings=(*signal.warnings, warning))
+    note = Note("forces_left_out", signal.name, others={"channels": ", ".join(large)})
+    return replace(signal, notes=(*signal.notes, note))
 
 
 def _with_others(signal: Signal, chosen: list[Channel], entries: list[Channel]) -> Signal:
@@ -215,12 +213,8 @@ def _with_others(signal: Signal, chosen: list[Channel], entries: list[Channel]) 
     ]
     if not similar:
         return signal
-    warning = (
-        f"{signal.name}: channels in another unit resemble the force, but are not included: "
-        f"{', '.join(similar)}; if they are load cells, name all channels and state a calibration "
-        "for each"
-    )
-    return replace(signal, warnings=(*signal.warnings, warning))
+    note = Note("channels_similar", signal.name, others={"channels": ", ".join(similar)})
+    return replace(signal, notes=(*signal.notes, note))
 
 
 def _correlation(signal: Signal, channel: Channel) -> float:
@@ -341,8 +335,11 @@ def _signal(path: Path, channel: Channel, stated: _Stated, *, several: bool) -> 
     return replace(
         signal,
         samples=partial(_read_scaled, channel.samples, sign * scale),
-        steps=(*signal.steps, *changed),
-        warnings=check_peak(extremes, sign * scale, signal.name, assumed=assumed),
+        notes=(
+            *signal.notes,
+            *changed,
+            *check_peak(extremes, sign * scale, signal.name, assumed=assumed),
+        ),
     )
 
 
@@ -373,10 +370,10 @@ def _sum(path: Path, channels: list[Channel], stated: list[_Stated]) -> Signal:
         cells = [replace(cell, samples=partial(_read_scaled, cell.samples, sign)) for cell in cells]
         total = add_signals(cells, name)
     assumed = any(entry for _, _, entry in scaled)
+    added = Note("cells_added", name, len(cells))
     warnings = check_peak(extremes, sign, name, assumed=assumed)
     warnings += check_signs(total, extremes.peak(sign))
-    note = f"The forces of {len(cells)} load cells were added."
-    return replace(total, steps=(*total.steps, *changed, note), warnings=warnings)
+    return replace(total, notes=(*total.notes, *changed, added, *warnings))
 
 
 def _scaled(
@@ -391,8 +388,8 @@ def _scaled(
         name += f", {shown_text(channel.name) or f'channel {channel.number}'}"
     if channel.n_sample < MIN_SAMPLES:
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
-    rate, steps = _rate(channel, stated, name)
-    unit, replaced = _unit(channel, stated, name)
+    rate, rate_notes = _rate(channel, stated, name)
+    unit, unit_notes = _unit(channel, stated, name)
     if channel.unapplied:
         unapplied = shown_text(channel.unapplied)
         if stated.calibration is None:
@@ -401,7 +398,7 @@ def _scaled(
                 "by it",
                 "calibration = N per stored value, such as 1 if the values are in N",
             )
-        replaced += (f"{unapplied} of the file was not applied; the calibration replaces it.",)
+        unit_notes += (Note("factor_not_applied", name, others={"factor": unapplied}),)
     factor, description, uncertainty = newtons_per_unit(
         unit, stated.calibration, channel.counts, name
     )
@@ -417,15 +414,20 @@ def _scaled(
         date=shown_text(channel.date),
         calibration=description,
         calibration_uncertainty=uncertainty,
-        steps=(*channel.steps, *steps, *replaced),
+        notes=(
+            *(replace(note, subject=name) for note in channel.notes),
+            *rate_notes,
+            *unit_notes,
+        ),
     )
     return signal, scale, unit == ASSUMED
 
 
-def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[str, ...]]:
+def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[Note, ...]]:
     rate = channel.sample_rate if stated.sample_rate is None else float(stated.sample_rate)
     if rate is None:
-        reason = "".join(f" ({step.rstrip('.')})" for step in channel.steps if "coarse" in step)
+        coarse = [note for note in channel.notes if note.code == "date_times_coarse"]
+        reason = "".join(f" ({note})" for note in coarse)
         refuse(
             f"{name}: the sample rate is not known{reason}",
             "sample_rate in Hz, or a column of times",
@@ -434,11 +436,11 @@ def _rate(channel: Channel, stated: _Stated, name: str) -> tuple[float, tuple[st
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:
         return rate, ()
-    file_rate = f"{channel.sample_rate:.7g} Hz"
-    return rate, (f"The rate of the file, {file_rate}, was replaced by {rate:.7g} Hz as stated.",)
+    of_file = {"of_file": channel.sample_rate or 0.0}
+    return rate, (Note("rate_replaced", name, rate, unit="Hz", others=of_file),)
 
 
-def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str, ...]]:
+def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[Note, ...]]:
     file_unit = find_unit(channel.unit)
     if stated.unit is not None:
         if file_unit == "FS" and stated.unit not in {"FS", "counts"}:
@@ -448,19 +450,18 @@ def _unit(channel: Channel, stated: _Stated, name: str) -> tuple[str, tuple[str,
             )
         if file_unit in {"", "FS", stated.unit}:
             return stated.unit, ()
-        return stated.unit, (
-            f"The unit of the file, {file_unit}, was replaced by {stated.unit} as stated.",
-        )
+        of_file = {"of_file": file_unit}
+        return stated.unit, (Note("unit_replaced", name, unit=stated.unit, others=of_file),)
     if file_unit:
         return file_unit, ()
     if not channel.unit and stated.calibration is None:
-        return ASSUMED, ("The file states no unit; the values are assumed to be in N.",)
+        return ASSUMED, (Note("unit_assumed", name, unit="N"),)
     if channel.unit or isinstance(stated.calibration, str | Calibration):
         calibration = stated.calibration
         chain = calibration.chain if isinstance(calibration, Calibration) else str(calibration)
         unit = "" if channel.unit else unit_of_chain(chain)
         if unit and (unit != "FS" or channel.may_be_fractions):
-            return unit, (f"The file states no unit; by the calibration the values are in {unit}.",)
+            return unit, (Note("unit_of_calibration", name, unit=unit),)
         description = f"in {shown_text(channel.unit)!r}" if channel.unit else "without a unit"
         refuse(f"{name}: the values are {description}", f"unit = one of {ALLOWED}")
     return "", ()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.recordings.channel import MIN_SAMPLES
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class Record(NamedTuple):
     sample_rate: float
 
 
-def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[str, ...]]:
+def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[Note, ...]]:
     """Return start and step, s, of the uniform grid that fits times best, and notes.
 
     Times, s, shape (n_sample,), may deviate by their rounding to the last written digit: at
@@ -65,8 +66,8 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
     begin = float(time.mean() + index[0] * step)
     if deviation[worst] <= TOLERANCE:
         return begin, step, ()
-    note = f"The times, rounded to {rounding:.1g} s, were replaced by a grid of {1 / step:.7g} Hz."
-    return begin, step, (note,)
+    rounded = Note("times_rounded", name, value=rounding, unit="s", others={"rate": 1 / step})
+    return begin, step, (rounded,)
 
 
 def last_digit(time: NDArray[np.float64]) -> float:

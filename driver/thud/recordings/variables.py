@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud.base.note import Note
+
 # Maximum number of columns of a matrix of channels.
 MAX_COLUMNS = 256
 # Maximum number of times, and number of rows that show whether a column may hold times.
@@ -123,11 +125,12 @@ def channels_of_variables(variables: list[Variable], header: Header, name: str) 
         if (variable in times and len(columns) > 1) or (variable in own_times and i == 0):
             continue
         own, near, entries = _header_of(variable, header)
-        rate, since, steps = find_rate(near), "", tuple[str, ...]()
+        notes: tuple[Note, ...] = ()
+        rate, since = find_rate(near), ""
         time = variable if variable in own_times else _times_of(variable, times)
         # Times override a rate in the header of an outer group.
         if time is not None and (rate is None or time is variable):
-            rate, since, steps = _rate(time, header, name)
+            rate, since, notes = _rate(time, header, name)
         unit = _unit(variable, own, entries)
         factor, offset, applied = _scaling(own)
         channels.append(
@@ -139,7 +142,7 @@ def channels_of_variables(variables: list[Variable], header: Header, name: str) 
                 unit=unit,
                 sample_rate=rate or find_rate(entries),
                 date=find_word(entries, DATE) or since,
-                steps=steps,
+                notes=notes,
                 unapplied=find_unapplied((e for e in entries if e not in applied), unit),
             )
         )
@@ -243,7 +246,7 @@ def _times_of(variable: Variable, times: list[Variable]) -> Variable | None:
     return max(fitting, key=closeness, default=None)
 
 
-def _rate(time: Variable, header: Header, name: str) -> tuple[float | None, str, tuple[str, ...]]:
+def _rate(time: Variable, header: Header, name: str) -> tuple[float | None, str, tuple[Note, ...]]:
     """Return sample rate, Hz, the date of time zero if it is stated, and notes, from times.
 
     The rate is None if it is not known whether the times were multiplied by a factor.
@@ -260,5 +263,5 @@ def _rate(time: Variable, header: Header, name: str) -> tuple[float | None, str,
         unit, _, since = find_word(own, UNIT).partition(" since ")
         scale = time_scale(unit or split_title(time.title)[1], label)
     values = (time.read(0, 0, time.n_sample) * factor + offset) * scale
-    _, step, steps = uniform_grid(values, label)
-    return 1 / step, since, steps
+    _, step, notes = uniform_grid(values, label)
+    return 1 / step, since, notes

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.recordings.channel import Channel, guarded, library, shown_path
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def read_channels(path: Path) -> list[Channel]:
     name = shown_path(path)
     with path.open("rb") as file:
         is_flac = file.read(4) == b"fLaC"
-        date, steps = ("", ()) if is_flac else _read_chunks(file, name)
+        date, notes = ("", ()) if is_flac else _read_chunks(file, name)
     with soundfile.SoundFile(os.fsencode(path)) as file:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate = float(file.samplerate)
@@ -79,19 +80,19 @@ def read_channels(path: Path) -> list[Channel]:
             sample_rate=rate,
             counts=counts,
             date=date,
-            steps=steps,
+            notes=notes,
             may_be_fractions=True,
         )
         for column in range(columns)
     ]
 
 
-def _read_chunks(file: BinaryIO, name: str) -> tuple[str, tuple[str, ...]]:
+def _read_chunks(file: BinaryIO, name: str) -> tuple[str, tuple[Note, ...]]:
     """Return the date of a WAV file, and notes; raise InputError if it is cut off.
 
     The library does not detect this.
     """
-    steps: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     size = os.fstat(file.fileno()).st_size
     lengths: dict[bytes, int] = {}
     date, missing = "", None
@@ -100,9 +101,7 @@ def _read_chunks(file: BinaryIO, name: str) -> tuple[str, tuple[str, ...]]:
             missing = begin + length - size
             if length in STREAMED and missing > 0:
                 missing = 0
-                steps = (
-                    "The header states no length; the samples were read to the end of the file.",
-                )
+                notes = (Note("length_unknown"),)
         if kind == b"ds64":
             file.seek(begin)
             lengths[b"data"] = struct.unpack("<QQ", file.read(16))[1]
@@ -117,7 +116,7 @@ def _read_chunks(file: BinaryIO, name: str) -> tuple[str, tuple[str, ...]]:
         refuse(f"{name}: has no chunk of samples", "an undamaged WAV file")
     if missing > 0:
         refuse(f"{name}: is cut off, {missing} bytes are missing", "a complete file")
-    return date, steps
+    return date, notes
 
 
 def _chunks(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.recordings.channel import MIN_SAMPLES, Channel
 from thud.recordings.date_times import DAY, are_days, step_of_date_times
 from thud.recordings.header_aliases import DATE, find_rate, find_word
@@ -38,15 +39,15 @@ def read_channels(path: Path) -> list[Channel]:
         first = columns[0]
         time = first if rate is None or _are_times(first.values) else None
     step = None
-    steps: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     if time is not None and (len(columns) > 1 or table.clock is not None):
         columns.remove(time)
         if not time.unit and are_days(time.values):
-            step, steps = _date_time_step(time.values, DAY, name)
+            step, notes = _date_time_step(time.values, DAY, name)
         else:
-            _, step, steps = uniform_grid(time.to("s"), name)
+            _, step, notes = uniform_grid(time.to("s"), name)
     elif table.clock is not None:
-        step, steps = _date_time_step(table.clock, 1.0, name)
+        step, notes = _date_time_step(table.clock, 1.0, name)
     if step is not None:
         if rate is not None and abs(step * rate - 1) > SAME_RATE:
             refuse(
@@ -63,7 +64,7 @@ def read_channels(path: Path) -> list[Channel]:
             unit=column.unit,
             sample_rate=rate,
             date=find_word(table.header, DATE),
-            steps=steps,
+            notes=notes,
         )
         for column in columns
     ]
@@ -71,12 +72,12 @@ def read_channels(path: Path) -> list[Channel]:
 
 def _date_time_step(
     times: NDArray[np.float64], unit: float, name: str
-) -> tuple[float | None, tuple[str, ...]]:
+) -> tuple[float | None, tuple[Note, ...]]:
     """Return the step of date-times, s, and notes; `unit` is that of the times, s."""
     step = step_of_date_times(times, name)
     if step is None:
-        return None, ("The date-times are too coarse to show the sample rate.",)
-    return unit * step, (f"The sample rate is that of the date-times, {1 / (unit * step):.7g} Hz.",)
+        return None, (Note("date_times_coarse"),)
+    return unit * step, (Note("date_times_rate", value=1 / (unit * step), unit="Hz"),)
 
 
 def _are_times(column: NDArray[np.float64]) -> bool:

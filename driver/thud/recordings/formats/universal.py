@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.recordings.channel import Channel, library, require_small, shown_path
 from thud.recordings.force_units import UNITS, find_unit
 from thud.recordings.header_aliases import time_scale
@@ -94,12 +95,12 @@ def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
     if data.size < expected or expected < 1:
         refuse(f"{name}: {data.size} samples, {expected} expected", "a complete file")
     scale = time_scale(data_set.label("abscissa_axis_units_lab"), name)
-    steps: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     if record["abscissa_spacing"] == 1:
         step = record["abscissa_inc"] * scale
     else:
         times = np.asarray(record["x"], dtype=np.float64)[:expected] * scale
-        _, step, steps = uniform_grid(times, name)
+        _, step, notes = uniform_grid(times, name)
     unit, newtons, note = _ordinate(data_set)
     return Channel(
         name=data_set.label("ordinate_axis_lab") or record["id1"].strip(),
@@ -109,11 +110,11 @@ def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
         unit=unit,
         sample_rate=1 / step if step > 0 else None,
         date=data_set.label("id3"),
-        steps=steps + note,
+        notes=notes + note,
     )
 
 
-def _ordinate(data_set: DataSet) -> tuple[str, float, tuple[str, ...]]:
+def _ordinate(data_set: DataSet) -> tuple[str, float, tuple[Note, ...]]:
     """Return the unit of the samples, a factor that converts them to it, and notes.
 
     The unit is that of the label; without a label, that of the data type in data set 164. If both
@@ -127,8 +128,7 @@ def _ordinate(data_set: DataSet) -> tuple[str, float, tuple[str, ...]]:
             return f"{label} by the label, {force:.5g} N by data set 164", 1.0, ()
         return label, 1.0, ()
     if kind in FORCES:
-        system = f"in units of {force:.6g} N" if force else "read in N"
-        return "N", force or 1.0, (f"The data set has no label of a unit; it is a force {system}.",)
+        return "N", force or 1.0, (Note("unit_of_data_type", value=force or 1.0, unit="N"),)
     if kind in UNKNOWN and force in {None, 1.0}:
         return "", 1.0, ()
     return SYMBOLS.get(kind, "units of data set 164"), 1.0, ()
