@@ -271,7 +271,7 @@ def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty(
 def test_stated_time_constant_that_the_record_contradicts_raises_a_warning() -> None:
     level = recorded(12.0, 2, noise=0.001)
     wrong, _ = calibrated(level, time_constant=11.0, time_constant_uncertainty=0.01)
-    assert re.search(naming("time constant", "11 s", "11.98 s"), *wrong.warnings)
+    assert re.search(naming("time constant", "11 s", "11.99 s"), *wrong.warnings)
     for right in (
         {"time_constant": 11.5, "time_constant_uncertainty": 0.03},
         {"time_constant": 12.0},
@@ -344,14 +344,13 @@ def test_step_is_that_of_least_squares_with_its_uncertainty() -> None:
     index = np.arange(100)
     level = 3 + 0.02 * index + (index >= 50) + rng.normal(scale=0.1, size=100)
     plateaus = [load_steps.Plateau(5, 45), load_steps.Plateau(56, 96)]
-    found, misfit = load_steps._fit_steps(level, plateaus, 4, load_steps.Rate(0, 0))  # noqa: SLF001
+    found, misfit = load_steps._fit_steps(level, plateaus, load_steps.Rate(0, 0))  # noqa: SLF001
     used = np.r_[5:45, 56:96]
-    columns = np.column_stack([used >= 50, np.ones(80), used, used**2])
+    columns = np.column_stack([used >= 50, np.ones(80), used, used**2]).astype(float)
     factors, (square,), *_ = np.linalg.lstsq(columns, level[used])
-    # What still decays takes one more degree of freedom.
-    variance = np.linalg.inv(columns.T @ columns)[0, 0] * square / 75
+    variance = np.linalg.inv(columns.T @ columns)[0, 0] * square / 76
     assert found.sizes == pytest.approx([factors[0]])
-    factor = stats.t(75).ppf(0.975) / stats.norm.ppf(0.975)
+    factor = stats.t(76).ppf(0.975) / stats.norm.ppf(0.975)
     assert found.uncertainty == pytest.approx(np.sqrt(variance) * factor)
     assert (misfit, found.rate) == (0, (0, 0))
 

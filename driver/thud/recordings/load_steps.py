@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.linalg import orth
 from scipy.special import fdtrc, stdtrit
 
 from thud.base.checks import refuse
@@ -28,15 +28,10 @@ STEP = 0.5
 SETTLING = 0.15
 # A plateau is reduced to about this many means, within which noise may be correlated.
 BLOCKS = 24
-# Number of trial rates (reciprocals of the time constant), and the smallest times the duration. The
-# largest is the reciprocal of the lag.
-TRIALS, MIN_RATE = 40, 1e-3
 # Maximum decay within the lag, in time constants: a faster one is hardly distinguished from a step.
 MAX_DECAY = 0.5
 # Degree of the drift.
 DRIFT = 2
-# Prior standard deviation of what still decays when the record begins, in ranges of the level.
-EARLIER = 2.0
 # Degree of the polynomials, for each plateau, that search for other curvature.
 DEGREE = 3
 # Probability of noise below which such curvature is significant. The uncertainty then includes its
@@ -125,7 +120,7 @@ def measure_steps(
             f"{name}: has no clear step", "a record in which a known force is put on or taken off"
         )
     _refuse_clipped(record, plateaus, name, full_scale)
-    steps, misfit = _fit_steps(level, plateaus, lag, stated)
+    steps, misfit = _fit_steps(level, plateaus, stated)
     if MISFIT_WEIGHT * misfit > MAX_MISFIT:
         refuse(
             f"{name}: the level between the steps deviates by {misfit:.2g} of the step from any "
@@ -139,7 +134,7 @@ def measure_steps(
             f"a time constant of {lag / MAX_DECAY / len(level):.2g} of the record or more",
         )
     if stated:
-        steps = steps._replace(shown=_fit_steps(level, plateaus, lag, None)[0].rate)
+        steps = steps._replace(shown=_fit_steps(level, plateaus, None)[0].rate)
     return steps
 
 
@@ -192,104 +187,28 @@ def _edges(level: NDArray[np.float64], lag: int) -> list[tuple[int, int]]:
     return edges
 
 
-class _Droop:
-    """Model of the plateaus behind a first-order high-pass; times are in means.
+class _Plateaus:
+    """The plateaus of a level, each reduced to means within which noise may be correlated.
 
-    Plateau k, which begins at t_k, has the level B(t) + (v_k - B(t_k)) exp(-rate (t - t_k)), where
-    B(t) = v_0 + u + d x + c x**2, x = (t - t_0) / duration, is that without a force. It is linear
-    in the parameters: the levels v_k, what still decays when the record begins (-u), and the drift
-    d, c.
+    A first-order high-pass of rate r, the reciprocal of its time constant, changes a force f to a
+    level v with v' = f' - r (v - b), where b is the level without a force: on plateau k,
+    v + r (integral of v) = f_k + a drift. This is linear in f_k, the drift and r, however the force
+    was put on, and whatever decays when the record begins.
     """
 
-    def __init__(
-        self, level: NDArray[np.float64], plateaus: list[Plateau], stated: Rate | None
-    ) -> None:
-        self.level, self.plateaus, self.stated = level, plateaus, stated
-        self.range = float(np.ptp(level))
-        self.origin, self.duration = plateaus[0].start - 0.5, len(level)
-        count = len(plateaus)
-        begins = np.array([plateau.start - 0.5 for plateau in plateaus])
-        # Coefficients of v_k - B(t_k).
-        self.excess = np.eye(count, count + 1 + DRIFT) - self.baseline(begins)
-        self.times = [_blocks(plateau) for plateau in plateaus]
-        self.index = np.repeat(np.arange(count), [len(time) for time in self.times])
-        self.values = np.concatenate([level[time].mean(axis=1) for time in self.times])
-        self.baselines = np.concatenate([self.baseline(time).mean(axis=1) for time in self.times])
-        self.delays = [time - begin for time, begin in zip(self.times, begins, strict=True)]
+    def __init__(self, level: NDArray[np.float64], plateaus: list[Plateau]) -> None:
+        self.blocks = [_blocks(plateau) for plateau in plateaus]
+        self.index = np.repeat(np.arange(len(plateaus)), [len(block) for block in self.blocks])
+        self.values = self.means(level)
+        position = self.means(np.arange(len(level)) / len(level))
+        levels = self.index[:, None] == np.arange(len(plateaus))
+        self.columns = np.hstack([levels, position[:, None] ** np.arange(1, DRIFT + 1)])
+        # The mean is a linear drift of the integral.
+        self.integral = _integral(level - level.mean())
 
-    def baseline(self, time: NDArray[Any]) -> NDArray[np.float64]:
-        """Return the coefficients of the level without a force, shape (..., n_parameter)."""
-        rows = np.zeros((*time.shape, len(self.plateaus) + 1 + DRIFT))
-        rows[..., 0] = 1.0
-        rows[..., -1 - DRIFT :] = ((time - self.origin) / self.duration)[..., None] ** np.arange(
-            DRIFT + 1
-        )
-        return rows
-
-    def design(self, rate: float) -> NDArray[np.float64]:
-        """Return the coefficients of the values, shape (n_value, n_parameter)."""
-        decay = np.concatenate([np.exp(-rate * delay).mean(axis=1) for delay in self.delays])
-        return self.baselines + decay[:, None] * self.excess[self.index]
-
-    def slope(self, rate: float, parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives of the values by the rate, shape (n_value,)."""
-        slope = [(-delay * np.exp(-rate * delay)).mean(axis=1) for delay in self.delays]
-        return np.asarray(np.concatenate(slope) * (self.excess[self.index] @ parameters))
-
-    def priors(self, noise: float) -> NDArray[np.float64]:
-        """Return the rows of the priors, those of the parameters and of the rate."""
-        rows = np.zeros((2, self.excess.shape[1] + 1))
-        rows[0, -2 - DRIFT] = noise / (EARLIER * self.range)
-        if self.stated and self.stated.uncertainty:
-            rows[1, -1] = noise / self.stated.uncertainty
-        return rows
-
-    def solve(self, rate: float, noise: float) -> tuple[NDArray[np.float64], float]:
-        """Return the parameters at a rate and the sum of squares, both with the priors."""
-        priors = self.priors(noise)
-        rows = np.vstack([self.design(rate), priors[:1, :-1]])
-        right = np.append(self.values, 0.0)
-        parameters = np.linalg.lstsq(rows, right, rcond=None)[0]
-        residual = right - rows @ parameters
-        square = float(residual @ residual)
-        if self.stated:
-            square += float(priors[1, -1] * (rate - self.stated.value)) ** 2
-        return parameters, square
-
-    def best_rate(self, noise: float, highest: float) -> float:
-        """Return the rate of the least sum of squares, 0 or more."""
-
-        def square(rate: float) -> float:
-            return self.solve(rate, noise)[1]
-
-        trials = np.append(0.0, np.geomspace(MIN_RATE / self.duration, highest, TRIALS))
-        best = int(np.argmin([square(rate) for rate in trials]))
-        low, high = trials[max(best - 1, 0)], trials[min(best + 1, TRIALS)]
-        tolerance = {"xatol": 1e-6 * (high - low)}
-        found = minimize_scalar(square, bounds=(low, high), method="bounded", options=tolerance).x
-        return 0.0 if low == 0 and square(0.0) <= square(found) else float(found)
-
-    def steps(
-        self, rate: float, parameters: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-        """Return the steps, their derivatives by parameters and rate, and the means between.
-
-        A step is the change of the level plus what has decayed meanwhile, the rate times the
-        integral of the recorded level: the inverse of a high-pass, however the force was put on.
-        """
-        sizes, gradients, between = [], [], 0
-        for k, (before, after) in enumerate(itertools.pairwise(self.plateaus)):
-            time = np.arange(before.stop, after.start)
-            delay = before.stop - before.start
-            # The difference to the level without a force: after the step, and before it.
-            last = math.exp(-rate * delay) * self.excess[k]
-            decayed = self.level[time].sum() - self.baseline(time).sum(axis=0) @ parameters
-            gradient = self.excess[k + 1] - last - rate * self.baseline(time).sum(axis=0)
-            slope = delay * last @ parameters + decayed
-            sizes.append((self.excess[k + 1] - last) @ parameters + rate * decayed)
-            gradients.append([*gradient, slope])
-            between += len(time)
-        return np.array(sizes), np.array(gradients), between
+    def means(self, values: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the means of values of each index over the blocks, shape (n_block,)."""
+        return np.concatenate([values[block].mean(axis=1) for block in self.blocks])
 
 
 def _blocks(plateau: Plateau) -> NDArray[np.int64]:
@@ -299,86 +218,103 @@ def _blocks(plateau: Plateau) -> NDArray[np.int64]:
     return np.arange(plateau.start, plateau.start + count * width).reshape(count, width)
 
 
+def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral of values from the first to the middle of each."""
+    return np.asarray(np.cumsum(values) - values / 2)
+
+
 def _fit_steps(
-    level: NDArray[np.float64], plateaus: list[Plateau], lag: int, stated: Rate | None
+    level: NDArray[np.float64], plateaus: list[Plateau], stated: Rate | None
 ) -> tuple[Steps, float]:
     """Return the steps between plateaus, and other curvature as a fraction of the mean step."""
-    droop = _Droop(level, plateaus, stated)
+    data = _Plateaus(level, plateaus)
+    count = len(plateaus)
+    droop = -data.means(data.integral)
     fixed = stated is not None and not stated.uncertainty
-    used = slice(None, -1 if fixed else None)
-    freedom = max(len(droop.values) - droop.excess.shape[1] - (not fixed), 1)
-    rate, noise = stated.value if stated else 0.0, 1e-12 * droop.range
-    # The weight of the priors depends on the noise.
-    for _ in range(2):
-        if not fixed:
-            rate = droop.best_rate(noise, 1 / lag)
-        parameters, square = droop.solve(rate, noise)
-        noise = max(math.sqrt(square / freedom), noise)
-    jacobian = np.column_stack([droop.design(rate), droop.slope(rate, parameters)])[:, used]
-    residual = droop.values - droop.design(rate) @ parameters
-    rows = np.vstack([jacobian, droop.priors(noise)[:, used]])
-    scale = np.linalg.norm(rows, axis=0)
-    inverse = np.linalg.pinv(rows / scale) / scale[:, None]
-    covariance = noise**2 * inverse @ inverse.T
-    sizes, gradients, between = droop.steps(rate, parameters)
-    gradient = np.sign(sizes) @ gradients[:, used] / len(sizes)
-    width = max(time.shape[1] for time in droop.times)
-    variance = gradient @ covariance @ gradient
-    variance += (rate * noise / len(sizes)) ** 2 * between * width
-    deviation = math.sqrt(variance) * float(stdtrit(freedom, 0.975)) / NORMAL_FACTOR
-    last = droop.excess.shape[1] - 1
-    if abs(parameters[last]) > SIGNIFICANT_DRIFT * math.sqrt(covariance[last, last]):
-        effect = parameters[last] * (gradient @ covariance)[last] / covariance[last, last]
-        deviation = math.hypot(deviation, effect)
-    signs, sizes = np.sign(sizes), np.abs(sizes)
+    design = data.columns if fixed else np.column_stack([data.columns, droop])
+    values = data.values - droop * stated.value if stated and fixed else data.values
+    fit = _LeastSquares(design, values)
+    if stated and not fixed:
+        fit = _LeastSquares(design, values, (stated.value, stated.uncertainty / fit.noise))
+    rate = stated.value if stated and fixed else max(float(fit.parameters[-1]), 0.0)
+    # A rate of zero fits nothing, but is uncertain.
+    used = design if fixed or rate else data.columns
+    parameters = fit.parameters if used is design else _LeastSquares(used, values).parameters
+    sizes = np.diff(parameters[:count])
+    signs = np.sign(sizes)
+    gradient = np.zeros(design.shape[1])
+    gradient[:count] = -np.diff(signs, prepend=0, append=0) / len(sizes)
+    variance = float(gradient @ fit.covariance @ gradient)
+    # The integral of the noise between the plateaus, at random from one mean to the next.
+    between = sum(after.start - before.stop for before, after in itertools.pairwise(plateaus))
+    width = max(block.shape[1] for block in data.blocks)
+    variance += (rate * fit.noise / len(sizes)) ** 2 * between * width
+    deviation = math.sqrt(variance) * float(stdtrit(fit.freedom, 0.975)) / NORMAL_FACTOR
+    if not rate:
+        # A droop makes a linear drift of the level a quadratic one of its integral.
+        deviation = math.hypot(deviation, fit.effect_without(count + DRIFT - 1, gradient))
+    sizes = np.abs(sizes)
     if len(sizes) > 1:
         deviation = max(deviation, float(sizes.std(ddof=1)) / math.sqrt(len(sizes)))
-    # A rate at its bound fits nothing.
-    misfit = _misfit(droop, jacobian[:, : droop.excess.shape[1] + (rate > 0)], residual)
+    if rate and not fixed:
+        # A second high-pass in series takes away the integral of the integral, too.
+        twice = data.means(_integral(data.integral))
+        further = _LeastSquares(np.column_stack([design, twice]), values)
+        if further.significance(-1) > SIGNIFICANT_SECOND:
+            changed = float(gradient @ (further.parameters[:-1] - fit.parameters))
+            deviation = math.hypot(deviation, changed)
+    misfit = _misfit(data, used, values - used @ parameters)
     deviation = math.hypot(deviation, MISFIT_WEIGHT * misfit)
-    if rate > 0 and not fixed:
-        # A second high-pass in series.
-        projection = jacobian @ inverse[:, : len(residual)]
-        lost = _lost_level(droop, projection, residual, parameters, noise)
-        if lost is not None:
-            other = _Droop(level + lost, plateaus, stated)
-            first = other.best_rate(noise, 1 / lag)
-            changed = np.abs(other.steps(first, other.solve(first, noise)[0])[0])
-            deviation = math.hypot(deviation, float(changed.mean() - sizes.mean()))
-    fitted = Rate(rate, 0.0 if fixed else math.sqrt(covariance[-1, -1]))
+    fitted = Rate(rate, 0.0 if fixed else math.sqrt(fit.covariance[-1, -1]))
     return Steps(sizes, deviation, fitted, signs), misfit / float(sizes.mean())
 
 
-def _lost_level(
-    droop: _Droop,
-    projection: NDArray[np.float64],
-    residual: NDArray[np.float64],
-    parameters: NDArray[np.float64],
-    noise: float,
-) -> NDArray[np.float64] | None:
-    """Return the level that a second high-pass in series has taken away, if it is significant."""
-    time = np.arange(len(droop.level))
-    integral = np.cumsum(droop.level - droop.baseline(time) @ parameters)
-    curve = np.concatenate([integral[block].mean(axis=1) for block in droop.times])
-    curve -= projection @ curve
-    square, product = float(curve @ curve), float(curve @ residual)
-    if abs(product) < SIGNIFICANT_SECOND * noise * math.sqrt(square):
-        return None
-    return -product / square * integral
+class _LeastSquares:
+    """Least squares of values by columns; the last parameter may have a prior.
+
+    The prior is its mean, and its standard deviation in standard deviations of the noise.
+    """
+
+    def __init__(
+        self,
+        columns: NDArray[np.float64],
+        values: NDArray[np.float64],
+        prior: tuple[float, float] | None = None,
+    ) -> None:
+        rows, right = columns, values
+        if prior:
+            row = np.zeros(columns.shape[1])
+            row[-1] = 1 / prior[1]
+            rows, right = np.vstack([columns, row]), np.append(values, prior[0] / prior[1])
+        scale = np.linalg.norm(rows, axis=0)
+        inverse = np.linalg.pinv(rows / scale) / scale[:, None]
+        self.parameters = inverse @ right
+        self.freedom = max(len(right) - columns.shape[1], 1)
+        square = float(((right - rows @ self.parameters) ** 2).sum())
+        self.noise = max(math.sqrt(square / self.freedom), 1e-12 * float(np.ptp(values)))
+        self.covariance = self.noise**2 * inverse @ inverse.T
+
+    def significance(self, index: int) -> float:
+        """Return the magnitude of a parameter in its standard deviations."""
+        return abs(float(self.parameters[index])) / math.sqrt(self.covariance[index, index])
+
+    def effect_without(self, index: int, gradient: NDArray[np.float64]) -> float:
+        """Return the change of a weighted sum without a parameter; 0 if that is not significant."""
+        if self.significance(index) < SIGNIFICANT_DRIFT:
+            return 0.0
+        ratio = (gradient @ self.covariance)[index] / self.covariance[index, index]
+        return float(self.parameters[index] * ratio)
 
 
-def _misfit(droop: _Droop, jacobian: NDArray[np.float64], residual: NDArray[np.float64]) -> float:
+def _misfit(data: _Plateaus, design: NDArray[np.float64], residual: NDArray[np.float64]) -> float:
     """Return the root mean square of the significant curvature in the residual, or 0."""
-    curves = np.zeros((len(residual), len(droop.times) * DEGREE))
-    for k, time in enumerate(droop.times):
-        position = np.linspace(-1, 1, len(time))
+    curves = np.zeros((len(residual), len(data.blocks) * DEGREE))
+    for k, block in enumerate(data.blocks):
+        position = np.linspace(-1, 1, len(block))
         columns = np.polynomial.legendre.legvander(position, DEGREE)[:, 1:]
-        curves[droop.index == k, k * DEGREE : (k + 1) * DEGREE] = columns
-    scale = np.linalg.norm(jacobian, axis=0)
-    fitted, sizes, _ = np.linalg.svd(jacobian / np.where(scale > 0, scale, 1), full_matrices=False)
-    fitted = fitted[:, sizes > NEGLIGIBLE * sizes[0]]
-    curves, sizes, _ = np.linalg.svd(curves - fitted @ (fitted.T @ curves), full_matrices=False)
-    curves = curves[:, sizes > NEGLIGIBLE * sizes[0]]
+        curves[data.index == k, k * DEGREE : (k + 1) * DEGREE] = columns
+    fitted = orth(design / np.linalg.norm(design, axis=0), NEGLIGIBLE)
+    curves = orth(curves - fitted @ (fitted.T @ curves), NEGLIGIBLE)
     count = curves.shape[1]
     freedom = len(residual) - fitted.shape[1] - count
     explained = float(np.sum((curves.T @ residual) ** 2))
