@@ -39,7 +39,8 @@ from scipy.special import ndtr, stdtrit
 
 import thud
 from thud.base.errors import InputError
-from thud.recordings.config import Config, PlateConfig
+from thud.recordings.config import Config
+from thud.recordings.plate import Plate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -90,7 +91,7 @@ SUSPECT = 0.02
 CLOCK = 1e-4
 # Keys of the installed package; those it does not know are left out, where a condition is not about
 # them.
-KNOWN = {field.name for kind in (Config, PlateConfig) for field in fields(kind)}
+KNOWN = {field.name for kind in (Config, Plate) for field in fields(kind)}
 # What the words of a warning concern; a warning with none of them concerns everything.
 CONCERNS = (
     (re.compile(r"\[?\bplate\b|resonance|\bfilter\b"), {*LEVELS, CONTACT, PEAK}),

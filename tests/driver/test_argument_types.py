@@ -12,14 +12,9 @@ import thud
 from thud.base.arguments import check_arguments
 from thud.base.key import Group
 from thud.recordings.calibration import calibrate
-from thud.recordings.config import (
-    Config,
-    FilterConfig,
-    Instrument,
-    PlateConfig,
-    Properties,
-    ReportConfig,
-)
+from thud.recordings.config import Config, Instrument, Properties, ReportConfig
+from thud.recordings.plate import Plate
+from thud.recordings.recorder_filter import RecorderFilter
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,10 +96,10 @@ def test_groups_take_numbers_of_numpy_and_refuse_wrong_types(kind: type[Group]) 
 
 
 @pytest.mark.parametrize(
-    "kind", [Config, FilterConfig, Instrument, PlateConfig, Properties, ReportConfig]
+    "kind", [Config, RecorderFilter, Instrument, Plate, Properties, ReportConfig]
 )
 def test_configurations_refuse_wrong_types_at_once(kind: type) -> None:
-    for name in vars(kind()):
+    for name in kind.__dataclass_fields__:
         for wrong in WRONG:
             refused(kind, **{name: wrong})
 

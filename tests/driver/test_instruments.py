@@ -14,7 +14,7 @@ from synthetic import make_drop
 
 import thud
 from thud.recordings.assumptions import PulseSpectra, assumed_contributions
-from thud.recordings.config import Config, FilterConfig, PlateConfig
+from thud.recordings.config import Config
 from thud.recordings.plate import Plate
 from thud.recordings.recorder_filter import RecorderFilter, assumed_filter
 from thud.recordings.response import Chain, Response
@@ -31,7 +31,7 @@ STATED: dict[str, Any] = {
     "height_uncertainty": 0.002,
     "calibration_uncertainty": 0.002,
 }
-FLAT = {"plate": PlateConfig(flat_limit=1e5), "filter": FilterConfig("none")}
+FLAT = {"plate": Plate(flat_limit=1e5), "filter": RecorderFilter("none")}
 
 
 def felt(response: Response) -> np.ndarray:
@@ -58,15 +58,18 @@ def names(recording: thud.Recording) -> list[str]:
 @pytest.mark.parametrize(
     ("instrument", "stated"),
     [
-        (Plate(1100.0, 8.0), {"plate": PlateConfig(f0=1100.0, Q=8.0, f0_uncertainty=0.001)}),
+        (Plate(1100.0, 8.0), {"plate": Plate(f0=1100.0, Q=8.0, f0_uncertainty=0.001)}),
         (
             Plate(1300.0, 10.0, share=0.4),
-            {"plate": PlateConfig(f0=1300.0, Q=10.0, f0_uncertainty=0.001, share=0.4)},
+            {"plate": Plate(f0=1300.0, Q=10.0, f0_uncertainty=0.001, share=0.4)},
         ),
-        (RecorderFilter("bessel", 4, 1250.0), {"filter": FilterConfig("bessel", 4, 1250.0, 0.001)}),
+        (
+            RecorderFilter("bessel", 4, 1250.0),
+            {"filter": RecorderFilter("bessel", 4, 1250.0, 0.001)},
+        ),
         (
             RecorderFilter("butterworth", 4, 625.0),
-            {"filter": FilterConfig("butterworth", 4, 625.0, 0.001)},
+            {"filter": RecorderFilter("butterworth", 4, 625.0, 0.001)},
         ),
     ],
 )
@@ -103,7 +106,7 @@ def test_unstated_resonance_that_rings_is_in_the_budget_with_its_whole_effect() 
     plate = Plate(1100.0, 25.0)
     force = felt(plate)
     truth = measured(PULSE, **FLAT).levels()[-1]
-    recording = measured(force, filter=FilterConfig("none"))
+    recording = measured(force, filter=RecorderFilter("none"))
     (ringing,) = (drop.ringing for drop in recording.drops)
     assert ringing is not None
     assert ringing.frequency == pytest.approx(1100, rel=0.005)
@@ -116,7 +119,7 @@ def test_unstated_resonance_that_rings_is_in_the_budget_with_its_whole_effect() 
 
 
 def test_unstated_plate_is_assumed_as_flat_as_the_standard_demands() -> None:
-    recording = measured(PULSE, filter=FilterConfig("none"))
+    recording = measured(PULSE, filter=RecorderFilter("none"))
     (warning,) = (text for text in recording.warnings if "[plate]" in text)
     assert "up to 1000 Hz" in warning
     found = assumed_contributions(recording.drops, recording.config)["plate, assumed"]
@@ -124,15 +127,15 @@ def test_unstated_plate_is_assumed_as_flat_as_the_standard_demands() -> None:
     low, high = (20 * math.log10(1 + 0.02 * f**2) / math.sqrt(3) for f in (0.355, 0.708))
     assert low < found[-1] < high
     assert "plate, assumed" not in assumed_contributions(
-        recording.drops, Config(plate=PlateConfig(f0=5000.0, Q=30.0), filter=FilterConfig("none"))
+        recording.drops, Config(plate=Plate(f0=5000.0, Q=30.0), filter=RecorderFilter("none"))
     )
 
 
 def test_stated_plate_that_is_not_in_the_record_is_told() -> None:
-    stated = PlateConfig(f0=2000.0, Q=20.0, f0_uncertainty=0.005)
-    right = measured(felt(Plate(2000.0, 20.0)), plate=stated, filter=FilterConfig("none"))
-    wrong = measured(PULSE, plate=stated, filter=FilterConfig("none"))
-    hidden = measured(PULSE, 20.0, plate=stated, filter=FilterConfig("none"))
+    stated = Plate(f0=2000.0, Q=20.0, f0_uncertainty=0.005)
+    right = measured(felt(Plate(2000.0, 20.0)), plate=stated, filter=RecorderFilter("none"))
+    wrong = measured(PULSE, plate=stated, filter=RecorderFilter("none"))
+    hidden = measured(PULSE, 20.0, plate=stated, filter=RecorderFilter("none"))
     assert [r.drops[0].plate_recorded for r in (right, wrong, hidden)] == [True, False, None]
     truth = measured(PULSE, **FLAT).levels()[-1]
     level = wrong.level_estimates()[-1]
@@ -145,7 +148,7 @@ def test_stated_plate_that_is_not_in_the_record_is_told() -> None:
 
 def test_unstated_filter_is_assumed_by_the_rate() -> None:
     slow = Signal.from_array(PULSE[::19], RATE / 19, "slow")
-    config = Config(**STATED, plate=PlateConfig(flat_limit=1e5))
+    config = Config(**STATED, plate=Plate(flat_limit=1e5))
     recording = thud.Recording.from_signals([slow], config)
     assert any("[filter]" in warning for warning in recording.warnings)
     effect = PulseSpectra(recording.drops).level_change(
@@ -154,7 +157,7 @@ def test_unstated_filter_is_assumed_by_the_rate() -> None:
     found = assumed_contributions(recording.drops, config)["recorder filter, assumed"]
     np.testing.assert_allclose(found, -effect / math.sqrt(3))
     assert 0.3 < -effect[-1] < 2
-    fast = measured(PULSE, plate=PlateConfig(flat_limit=1e5))
+    fast = measured(PULSE, plate=Plate(flat_limit=1e5))
     assert any("less than 0.01 dB" in warning for warning in fast.warnings if "[filter]" in warning)
     assert not any("[filter]" in warning for warning in measured(PULSE, **FLAT).warnings)
     assert assumed_contributions(fast.drops, fast.config)["recorder filter, assumed"][-1] < 0.01
@@ -227,7 +230,7 @@ def test_tables_of_instruments_are_checked(config: dict[str, Any], words: tuple[
 
 def test_filter_below_the_bands_is_refused() -> None:
     with pytest.raises(thud.InputError, match=naming("cutoff", "300 Hz", "707.9 Hz")):
-        measured(PULSE, filter=FilterConfig("butterworth", 6, 300.0))
+        measured(PULSE, filter=RecorderFilter("butterworth", 6, 300.0))
     chain = Chain((Plate(1100.0, 8.0), RecorderFilter("bessel", 4, 900.0)))
     assert chain.highest == min(part.highest for part in chain.instruments)
 
@@ -235,8 +238,8 @@ def test_filter_below_the_bands_is_refused() -> None:
 def test_share_that_is_not_stated_is_assumed_and_named() -> None:
     half = Plate(1100.0, 8.0, share=0.5)
     stated: dict[str, Any] = {"f0": 1100.0, "Q": 8.0, "f0_uncertainty": 0.001}
-    assumed = measured(felt(half), plate=PlateConfig(**stated))
-    known = measured(felt(half), plate=PlateConfig(**stated, share=0.5))
+    assumed = measured(felt(half), plate=Plate(**stated))
+    known = measured(felt(half), plate=Plate(**stated, share=0.5))
     error = abs(float((assumed.levels() - known.levels())[-1]))
     (text,) = [warning for warning in assumed.warnings if "share" in warning]
     named = re.search(r"share; up to ([\d.]+) dB", text)
@@ -247,5 +250,5 @@ def test_share_that_is_not_stated_is_assumed_and_named() -> None:
 
 def test_limit_of_a_flat_plate_below_that_of_the_standard_is_a_warning() -> None:
     for limit, warned in ((999.0, True), (1000.0, False)):
-        recording = measured(PULSE, plate=PlateConfig(flat_limit=limit))
+        recording = measured(PULSE, plate=Plate(flat_limit=limit))
         assert any("asks for 1000 Hz" in text for text in recording.warnings) == warned

@@ -22,7 +22,8 @@ from synthetic import half_sine, make_recording
 import thud
 from thud import cli
 from thud.recordings.budgets import AMPLITUDE_DECIBEL, average_estimates
-from thud.recordings.config import Config, PlateConfig, read_config
+from thud.recordings.config import Config, read_config
+from thud.recordings.plate import Plate
 from thud.recordings.signal import Signal
 from thud.report.contents import report_data
 
@@ -184,7 +185,7 @@ def test_configurations_hold_what_files_state() -> None:
     stated = Config(
         date=date(2024, 5, 3), plate={"f0": 1100, "Q": np.int64(25)}, mass=np.float32(2.5)
     )  # type: ignore[arg-type]
-    assert stated == Config(date="2024-05-03", plate=PlateConfig(1100.0, 25.0), mass=2.5)
+    assert stated == Config(date="2024-05-03", plate=Plate(1100.0, 25.0), mass=2.5)
     assert type(stated.mass) is float
 
 

@@ -9,8 +9,8 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.recordings.choice import parse_numbers
 from thud.recordings.config import Config
+from thud.recordings.config_values import parse_numbers
 from thud.recordings.drops import Search, search_drops
 from thud.recordings.signal import Signal
 

@@ -22,7 +22,7 @@ from thud.level.estimate import Contribution, Estimate
 from thud.recordings.assumptions import assumed_contributions
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
-from thud.recordings.config import Config, PlateConfig
+from thud.recordings.config import Config
 from thud.recordings.contact import cells_between, uniform_bounds
 from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
@@ -398,7 +398,7 @@ def through_plate(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return time and the force that a plate measures, integrated at 64 times the rate."""
     fine = np.arange(round(0.1 * rate * 64)) / (64 * rate) - 0.03
-    omega, quality = 2 * np.pi * plate.frequency, plate.quality
+    omega, quality = 2 * np.pi * plate.f0, plate.Q
     system = lti([omega**2], [1, omega / quality, omega**2])
     _, measured, _ = lsim(system, force(fine), fine - fine[0])
     return fine[::64], np.asarray(measured)[::64]
@@ -416,7 +416,7 @@ def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     # Aliases of what the plate measures fall by 24 dB per octave above its resonance.
     assert after.max() < 1e-3
     assert np.abs(corrected - half_sine(time)).max() < 0.01 * 1500
-    assert f"{plate.frequency:.4g} Hz" in sentence
+    assert f"{plate.f0:.4g} Hz" in sentence
 
 
 def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
@@ -428,12 +428,12 @@ def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
     expected = stiffness / (stiffness - 10 * omega**2 + 1j * omega * damping)
     np.testing.assert_allclose(plate.response(omega / 2 / np.pi), expected)
     # Kept up to twice the resonance, nothing from four times on, cos2 of the octave between.
-    f = plate.frequency * np.array([0.1, 1.99, 2 * 2 ** (1 / 3), 2 * np.sqrt(2), 4, 9])
+    f = plate.f0 * np.array([0.1, 1.99, 2 * 2 ** (1 / 3), 2 * np.sqrt(2), 4, 9])
     np.testing.assert_allclose(Chain((plate,)).passed(f), [1, 1, 0.75, 0.5, 0, 0], atol=1e-12)
-    uncertain = replace(plate, frequency_uncertainty=1e-6)
+    uncertain = replace(plate, f0_uncertainty=1e-6)
     edge = thud.get_bands().upper
-    step = replace(plate, frequency=1600 * (1 + 1e-6), quality=1e9)
-    change = np.abs(step.response(edge) / replace(plate, quality=1e9).response(edge))
+    step = Plate(1600 * (1 + 1e-6), 1e6)
+    change = np.abs(step.response(edge) / Plate(1600, 1e6).response(edge))
     np.testing.assert_allclose(
         uncertain.level_uncertainty(), np.abs(20 * np.log10(change)), rtol=1e-4
     )
@@ -458,7 +458,7 @@ def test_end_of_a_record_does_not_reach_its_begin_in_the_correction() -> None:
 
 
 def test_uncertain_resonance_makes_levels_uncertain() -> None:
-    plate = Plate(1600, 30, frequency_uncertainty=0.01)
+    plate = Plate(1600, 30, f0_uncertainty=0.01)
     _, measured = through_plate(half_sine, 51200.0, plate)
     right = correct_force(measured, 51200.0, Chain((plate,)))
     wrong = correct_force(measured, 51200.0, Chain((Plate(1600 * 1.01, 30),)))
@@ -478,12 +478,12 @@ def test_resonance_near_the_bands_is_refused() -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ((0.0, 30.0), naming("plate", "frequency", 0.0)),
-        ((1600.0, 0.0), naming("plate", "quality", 0.0)),
-        ((1600.0, -1.0), naming("plate", "quality", -1.0)),
-        ((1600.0, 30.0, -0.01), naming("plate", "frequency_uncertainty", -0.01)),
-        ((1600.0, 30.0, 1.0), naming("plate", "frequency_uncertainty", 1.0)),
-        ((math.nan, 30.0), naming("plate", "frequency", "nan")),
+        ((0.0, 30.0), naming("plate", "f0", 0.0)),
+        ((1600.0, 0.0), naming("plate", "Q", 0.0)),
+        ((1600.0, -1.0), naming("plate", "Q", -1.0)),
+        ((1600.0, 30.0, -0.01), naming("plate", "f0_uncertainty", -0.01)),
+        ((1600.0, 30.0, 1.0), naming("plate", "f0_uncertainty", 1.0)),
+        ((math.nan, 30.0), naming("plate", "f0")),
     ],
 )
 def test_impossible_plates_are_refused(values: tuple[Any, ...], words: str) -> None:
@@ -492,27 +492,30 @@ def test_impossible_plates_are_refused(values: tuple[Any, ...], words: str) -> N
 
 
 def test_plate_is_compared_with_the_standard() -> None:
-    assert [check.met for check in check_plate()] == [None] * 4
-    paper = check_plate(Plate(1600, 30), full_scale=4000.0, time_constant=1.0)
+    assert [check.met for check in check_plate(Plate())] == [None] * 4
+    paper = check_plate(Plate(1600, 30, full_scale=4000.0, time_constant=1.0))
     assert [check.met for check in paper] == [False, None, False, None]
     assert "4000 N" in paper[2].reason
     # A time constant of 3.92 s is just enough: 2 %.
-    edge = check_plate(full_scale=5000.0, time_constant=3.92)
+    edge = check_plate(Plate(full_scale=5000.0, time_constant=3.92))
     assert [edge[0].met, edge[2].met] == [True, True]
-    assert check_plate(time_constant=3.9)[0].met is False
+    assert check_plate(Plate(time_constant=3.9))[0].met is False
     # Of a resonance that is less by 1.96 uncertainties, (1 - r2)/(1 - r2/(1 - s)2) is 1.02.
     square = (1000 / 1600) ** 2
     shift = 1 - np.sqrt(square / (1 - (1 - square) / 1.02))
     for factor, met in ((0.999, True), (1.001, False)):
-        plate = Plate(1600, 1e6, frequency_uncertainty=factor * shift / 1.96)
+        plate = Plate(1600, 1e6, f0_uncertainty=factor * shift / 1.96)
         assert check_plate(plate)[1].met == met
     forces = [500.0, 1000.0, 2000.0, 5000.0]
-    straight = check_plate(linearity=[(f, 1.3 * f * (1 + 0.001 * i)) for i, f in enumerate(forces)])
-    assert straight[3].met
-    assert check_plate(linearity=[(f, f * (1 + f / 5e4)) for f in forces])[3].met is False
-    assert check_plate(linearity=[(f, f) for f in forces[:3]])[3].met is None
+    for indicated, met in (
+        ([1.3 * f * (1 + 0.001 * i) for i, f in enumerate(forces)], True),
+        ([f * (1 + f / 5e4) for f in forces], False),
+        (forces[:3], None),
+    ):
+        pairs = tuple(zip(forces, indicated, strict=False))
+        assert check_plate(Plate(linearity=pairs))[3].met == met
     with pytest.raises(thud.InputError, match=naming("plate", "linearity", "pairs")):
-        check_plate(linearity=[(0.0, 1.0)])
+        Plate(linearity=((0.0, 1.0),))
 
 
 def test_budget_after_the_gum() -> None:
@@ -633,7 +636,7 @@ def test_level_budget_has_calibration_and_plate() -> None:
 def test_plate_of_unstated_uncertainty_is_no_line_of_zero() -> None:
     drops = [make_drop(1.0)]
     for uncertainty, stated in ((0.0, False), (0.01, True)):
-        config = Config(plate=PlateConfig(f0=1600.0, Q=20.0, f0_uncertainty=uncertainty))
+        config = Config(plate=Plate(f0=1600.0, Q=20.0, f0_uncertainty=uncertainty))
         assert ("plate" in assumed_contributions(drops, config)) == stated
 
 

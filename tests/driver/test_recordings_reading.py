@@ -31,9 +31,10 @@ from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import guarded
-from thud.recordings.config import PlateConfig, read_config
+from thud.recordings.config import read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
+from thud.recordings.plate import Plate
 from thud.recordings.polarity import Extremes, check_peak, scan
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
@@ -1138,9 +1139,7 @@ def test_configuration_is_read(tmp_path: Path) -> None:
     assert found.calibration == "4.1 pC/N, 10 mV/pC"
     assert found.calibration_uncertainty == 0.005
     assert found.instruments == ("force plate 9281", "charge amplifier 5015")
-    assert found.plate == PlateConfig(
-        950.0, 30.0, 0.01, linearity=((100.0, 101.0), (1000.0, 990.0))
-    )
+    assert found.plate == Plate(950.0, 30.0, 0.01, linearity=((100.0, 101.0), (1000.0, 990.0)))
     assert found.limits == {"octave_500": (10.0, 15.0)}
     assert (found.channel, found.unit, found.polarity) == (1, "V", "negative")
 

@@ -27,10 +27,11 @@ from thud.base.errors import ReportWarning
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
-from thud.recordings.config import Config, PlateConfig, ReportConfig, read_config
+from thud.recordings.config import Config, ReportConfig, read_config
 from thud.recordings.dates import read_date
 from thud.recordings.outliers import Outlier
 from thud.recordings.picture import read_picture
+from thud.recordings.plate import Plate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.report.contents import FIELDS, missing_fields, report_data
@@ -96,7 +97,7 @@ def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN40
 
 
 def test_page_lists_the_requirements_that_the_plate_meets(one: Recording) -> None:
-    plate = PlateConfig(full_scale=6000.0)
+    plate = Plate(full_scale=6000.0)
     data = report_data(replace(one, config=replace(LAB, plate=plate)))
     assert "the plate reads up to 6000 N" in report_page(data, [], "")
 
@@ -527,7 +528,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
 
 
 def test_levels_and_criteria_agree_on_uncertainty(one: Recording) -> None:
-    plate = PlateConfig(f0=1600.0, Q=20.0, f0_uncertainty=0.005)
+    plate = Plate(f0=1600.0, Q=20.0, f0_uncertainty=0.005)
     for recording in (one, many(one, 5), many(one, 5, plate=plate)):
         data = report_data(recording)
         found = data["levels"]["octave"]
@@ -752,7 +753,7 @@ def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -
     # An effective mass has the uncertainties of its origins.
     effective = replace(many(one, 1), config=replace(LAB, mass=None), calibration_uncertainty=None)
     assert set(excluded(effective)["mass"]) <= {"calibration", "drop height", SCATTER}
-    plate = PlateConfig(f0=1600.0, Q=20.0)
+    plate = Plate(f0=1600.0, Q=20.0)
     assert excluded(many(one, 5, plate=plate))["octave_500"] == ["resonance of the plate"]
 
 

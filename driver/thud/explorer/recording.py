@@ -132,7 +132,7 @@ def _config_of(paths: Sequence[str], table: Mapping[str, object]) -> Config:
     if not paths:
         return config_from(table)
     stated, _ = read_toml(Path(paths[0]))
-    config = config_from(stated, f"{paths[0]}: ")
+    config = config_from(stated, paths[0])
     if config.report.accreditation_mark:
         refuse(f"{paths[0]}: accreditation_mark cannot be sent by a page", "thud-driver measure")
     stated_tables = {name: stated[name] for name in TABLES if name in stated and name in table}

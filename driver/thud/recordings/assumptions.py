@@ -138,14 +138,14 @@ def _plate_warnings(drops: Sequence[Drop], plate: Plate, effect: str) -> dict[st
         return {}
     if False in seen:
         absent = (
-            f"the record does not show the stated resonance of {plate.frequency:.4g} Hz: its "
+            f"the record does not show the stated resonance of {plate.f0:.4g} Hz: its "
             f"correction, {effect}, is in the uncertainty; check [plate]"
         )
         return {absent: 0.0}
     changes = PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f)))
     change = float(np.nanmax(np.abs(changes)))
     unclear = (
-        f"the record neither shows nor excludes the stated resonance of {plate.frequency:.4g} Hz: "
+        f"the record neither shows nor excludes the stated resonance of {plate.f0:.4g} Hz: "
         f"its correction, {change:.2f} dB at 500 Hz, depends on [plate] alone"
     )
     return {unclear: change} if change > MIN_WARNED else {}

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse
+from thud.recordings.config_values import parse_numbers
 from thud.recordings.drops import LeftOut
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from thud.recordings.drops import Window
-
-MAX_NUMBER = 1_000_000
-
-
-def parse_numbers(text: str, key: str) -> list[range]:
-    """Return the ranges of numbers in a text such as ``"1-5, 8"``; raise InputError if none."""
-    parts = [re.fullmatch(r"(\d+)(?:\s*-\s*(\d+))?", part.strip()) for part in text.split(",")]
-    ranges = [
-        range(int(part[1]), int(part[2] or part[1]) + 1) if part and len(part[0]) < 20 else range(0)  # noqa: PLR2004
-        for part in parts
-    ]
-    if not all(ranges) or any(r.start < 1 or r.stop > MAX_NUMBER for r in ranges):
-        refuse(f"{key} = {shown(text)} is not allowed", 'numbers of drops from 1, such as "1-5, 8"')
-    return ranges
 
 
 def choose(

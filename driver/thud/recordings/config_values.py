@@ -1,57 +1,92 @@
-"""Checks of the values in a configuration; each returns the value or raises InputError."""
+"""Keys of a configuration: a check, a unit and a meaning each, and the base of their tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, fields
 from datetime import date
-from typing import Any
+from typing import Any, ClassVar, Self
 
 from thud.base.checks import (
     refuse,
     refuse_unknown,
+    refuse_value,
     require_choice,
     require_number,
     require_whole,
-    shown,
 )
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings import dates
-from thud.recordings.choice import parse_numbers
 from thud.recordings.force_units import Calibration, plain_number, read_chain
 
 MAX_TEXT = 500
+# Maximum number of digits of the number of a drop.
+MAX_DIGITS = 6
 
 
-def to_number(low: float, high: float, value: object, key: str, unit: str = "") -> float:
-    """Return a number between two limits, in a unit."""
-    require_number(key, value)
-    number = float(value)  # type: ignore[arg-type]
-    if not low <= number <= high:
-        refuse(f"{key} = {shown(value)} is not allowed", f"{low:g} to {high:g} {unit}".rstrip())
-    return number
+@dataclass(frozen=True)
+class Number:
+    """Check of a number between two limits in a unit; empty for a pure number."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def __call__(self, value: object, key: str) -> float:
+        """Return the number; raise InputError if it is none or out of range."""
+        require_number(key, value)
+        number = float(value)  # type: ignore[arg-type]
+        if not self.low <= number <= self.high:
+            refuse_value(key, value, f"{self.low:g} to {self.high:g} {self.unit}".rstrip())
+        return number
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Check of a whole number between two limits."""
+
+    low: int
+    high: int
+
+    def __call__(self, value: object, key: str) -> int:
+        """Return the number; raise InputError if it is none or out of range."""
+        require_whole(key, value, self.low, self.high)
+        return int(value)  # type: ignore[call-overload, no-any-return]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Check of one of several words."""
+
+    words: Collection[str]
+
+    def __call__(self, value: object, key: str) -> str:
+        """Return the word; raise InputError if it is not known."""
+        require_choice(key, value, self.words)
+        return str(value)
+
+
+@dataclass(frozen=True)
+class Listed:
+    """Check of each entry of a list, or of a single entry, which need not be in a list."""
+
+    entry: Callable[[object, str], object]
+    numbered: bool = False
+
+    def __call__(self, value: object, key: str) -> tuple[Any, ...]:
+        """Return the entries; messages number them if `numbered`."""
+        entries = value if isinstance(value, list | tuple) else [value]
+        names = [f"{key}, entry {i}" if self.numbered else key for i in range(1, len(entries) + 1)]
+        return tuple(map(self.entry, entries, names))
 
 
 def to_line(value: object, key: str) -> str:
     """Return a line of text."""
     if not isinstance(value, str) or len(value) > MAX_TEXT or not value.isprintable():
-        refuse(f"{key} = {shown(value)} is not allowed", f"a line of up to {MAX_TEXT} characters")
+        refuse_value(key, value, f"a line of up to {MAX_TEXT} characters")
     return value
-
-
-def to_whole(low: int, high: int, value: object, key: str) -> int:
-    """Return a whole number between two limits."""
-    require_whole(key, value, low, high)
-    return int(value)  # type: ignore[call-overload, no-any-return]
-
-
-def to_lines(value: object, key: str) -> tuple[str, ...]:
-    """Return one or more lines of text."""
-    return tuple(
-        to_line(text, key) for text in (value if isinstance(value, list | tuple) else [value])
-    )
 
 
 def to_date(value: object, key: str) -> str:
@@ -61,7 +96,7 @@ def to_date(value: object, key: str) -> str:
     text = to_line(value, key)
     read = dates.read_date(text) if text else None
     if text and read is None:
-        refuse(f"{key} = {shown(value)} is not allowed", 'a date, such as "2024-05-03"')
+        refuse_value(key, value, 'a date, such as "2024-05-03"')
     return read.date().isoformat() if read else ""
 
 
@@ -70,16 +105,10 @@ def to_day(value: object, key: str) -> str:
     return value.isoformat() if isinstance(value, date) else to_line(value, key)
 
 
-def to_choice(choices: Mapping[str, object] | tuple[str, ...], value: object, key: str) -> str:
-    """Return one of several words."""
-    require_choice(key, value, choices)
-    return str(value)
-
-
 def to_channel(value: object, key: str) -> int | str:
     """Return the number or the name of a channel."""
     is_number = isinstance(value, int) and not isinstance(value, bool)
-    return int(to_number(1, 1e6, value, key)) if is_number else to_line(value, key)
+    return Whole(1, 1_000_000)(value, key) if is_number else to_line(value, key)
 
 
 def to_calibration(value: object, key: str) -> Calibration | str | float:
@@ -88,7 +117,7 @@ def to_calibration(value: object, key: str) -> Calibration | str | float:
         return value
     value = plain_number(value)
     if not isinstance(value, str):
-        return to_number(-1e30, 1e30, value, key)
+        return Number(-1e30, 1e30)(value, key)
     try:
         read_chain(to_line(value, key))
     except InputError as error:
@@ -97,40 +126,48 @@ def to_calibration(value: object, key: str) -> Calibration | str | float:
     return value
 
 
-def to_calibrations(
-    value: object, key: str
-) -> Calibration | str | float | tuple[Calibration | str | float, ...]:
+def to_calibrations(value: object, key: str) -> Any:  # noqa: ANN401 - one, or a tuple of them
     """Return a calibration, or one for each channel."""
     if not isinstance(value, list | tuple):
         return to_calibration(value, key)
-    return tuple(to_calibration(entry, f"{key}, entry {i}") for i, entry in enumerate(value, 1))
+    return Listed(to_calibration, numbered=True)(value, key)
 
 
-def to_table(value: object, key: str) -> Mapping[str, object]:
-    """Return a table."""
+def _table(value: object, key: str) -> Mapping[str, object]:
     if not isinstance(value, Mapping):
-        refuse(f"{key} = {shown(value)} is not allowed", "a table")
+        refuse_value(key, value, "a table")
     return value
 
 
-def _pair(value: object, key: str, ends: str, low: float, high: float) -> tuple[float, float]:
+def _pair(value: object, key: str, ends: str, number: Number) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        refuse(f"{key} = {shown(value)} is not allowed", f"[{ends}]")
-    return to_number(low, high, value[0], key), to_number(low, high, value[1], key)
+        refuse_value(key, value, f"[{ends}]")
+    return number(value[0], key), number(value[1], key)
 
 
 def to_linearity(value: object, key: str) -> tuple[tuple[float, float], ...]:
     """Return pairs of an applied and an indicated force, N."""
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
-        refuse(
-            f"{key} = {shown(value)} is not allowed", "two or more pairs [applied, indicated], N"
-        )
-    return tuple(_pair(pair, key, "applied, indicated", 1e-3, 1e9) for pair in pairs)
+        refuse_value(key, value, "two or more pairs [applied, indicated], N")
+    return tuple(_pair(pair, key, "applied, indicated", Number(1e-3, 1e9)) for pair in pairs)
+
+
+def parse_numbers(text: str, key: str) -> list[range]:
+    """Return the ranges of numbers in a text such as ``"1-5, 8"``; raise InputError if none."""
+    ranges = []
+    for part in text.split(","):
+        first, dash, last = (side.strip() for side in part.partition("-"))
+        sides = (first, last) if dash else (first, first)
+        is_valid = all(side.isdecimal() and len(side) <= MAX_DIGITS for side in sides)
+        ranges.append(range(int(sides[0]), int(sides[1]) + 1) if is_valid else range(0))
+    if not all(ranges) or any(part.start < 1 for part in ranges):
+        refuse_value(key, text, 'numbers of drops from 1, such as "1-5, 8"')
+    return ranges
 
 
 def to_numbers(value: object, key: str) -> str:
-    """Return numbers of drops."""
+    """Return the text of numbers of drops."""
     text = to_line(value, key)
     parse_numbers(text, key)
     return text
@@ -138,9 +175,9 @@ def to_numbers(value: object, key: str) -> str:
 
 def to_reasons(value: object, key: str) -> dict[str, str]:
     """Return reasons by numbers of drops."""
-    table = to_table(value, key)
     reasons = {
-        to_numbers(str(number), key): to_line(reason, key) for number, reason in table.items()
+        to_numbers(str(number), key): to_line(reason, key)
+        for number, reason in _table(value, key).items()
     }
     for number, reason in reasons.items():
         if not reason.strip():
@@ -150,49 +187,65 @@ def to_reasons(value: object, key: str) -> dict[str, str]:
 
 def to_limits(value: object, key: str) -> dict[str, tuple[float, float]]:
     """Return minimum and maximum by criterion."""
-    table = to_table(value, key)
+    table = _table(value, key)
     refuse_unknown(key, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
     limits = {}
     for name, span in table.items():
-        low, high = _pair(span, f"{key}: {name}", "minimum, maximum", -1e6, 1e6)
+        low, high = _pair(span, f"{key}: {name}", "minimum, maximum", Number(-1e6, 1e6))
         if not low < high:
-            refuse(f"{key}: {name} = {shown(span)} is not allowed", "minimum < maximum")
+            refuse_value(f"{key}: {name}", span, "minimum < maximum")
         limits[name] = (low, high)
     return limits
 
 
-def checked_values(table: Mapping[str, object], kind: type[Any], prefix: str) -> dict[str, Any]:
-    """Return the values of a table; raise InputError for an unknown key or a wrong value."""
-    checks = {key.name: key.metadata["check"] for key in fields(kind)}
-    refuse_unknown(prefix.removesuffix(": "), table, checks)
-    return {key: checks[key](value, f"{prefix}{key}") for key, value in table.items()}
+def key(
+    check: Callable[[object, str], object],
+    meaning: str,
+    default: object = None,
+) -> Any:  # noqa: ANN401 - a field of any type
+    """Declare a key: its check, which returns the value or raises InputError, and its meaning."""
+    metadata = {"check": check, "meaning": meaning}
+    if isinstance(default, dict):
+        return field(default_factory=dict, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
-class Checked:
-    """Base of the tables of a configuration, whose values are checked when they are stated."""
+class Table:
+    """Base of the tables of a configuration, whose values are checked when they are stated.
+
+    `title` is the name of the table in messages, with a colon.
+    """
+
+    title: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         """Replace each stated value by that of its check, or raise InputError."""
-        for name, value in checked_values(self.stated(), type(self), "").items():
-            object.__setattr__(self, name, value)
+        for name in self.stated:
+            check = self.__dataclass_fields__[name].metadata["check"]
+            object.__setattr__(self, name, check(getattr(self, name), f"{self.title}{name}"))
 
-    def stated(self) -> dict[str, object]:
-        """Return the values that are not the defaults."""
-        values = {key.name: getattr(self, key.name) for key in fields(self)}
-        defaults = {key.name: key.default for key in fields(self)}
-        return {k: v for k, v in values.items() if v is not None and v is not defaults[k]}
+    @classmethod
+    def read(cls, value: object, key: str) -> Self:
+        """Return a table from that of a file; raise InputError if a key is unknown."""
+        if isinstance(value, cls):
+            return value
+        table = _table(value, key)
+        refuse_unknown(key, table, [entry.name for entry in fields(cls)])
+        return cls(**table)
 
+    @property
+    def stated(self) -> list[str]:
+        """Names of the keys whose values are not the defaults."""
+        values = ((entry, getattr(self, entry.name)) for entry in fields(self))
+        return [
+            entry.name
+            for entry, value in values
+            if value is not None and value is not entry.default
+        ]
 
-def to_instance(kind: type[Any], value: object, key: str) -> Any:  # noqa: ANN401 - of `kind`
-    """Return an instance of a dataclass from a table."""
-    if isinstance(value, kind):
-        return value
-    return kind(**checked_values(to_table(value, key), kind, f"{key}: "))
-
-
-def require_keys(table: Mapping[str, object], key: str, *names: str) -> None:
-    """Raise InputError if a table lacks a key."""
-    for name in names:
-        if name not in table:
-            refuse(f"{key}: {name} is missing", " and ".join(names))
+    def require(self, *names: str) -> None:
+        """Raise InputError if a key is not stated."""
+        for name in names:
+            if name not in self.stated:
+                refuse(f"{self.title}{name} is missing", " and ".join(names))

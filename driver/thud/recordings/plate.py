@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, refuse_value, require_number
+from thud.base.checks import refuse
 from thud.base.units import frequency_text
 from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import get_bands
+from thud.recordings.config_values import Number, Table, key, to_linearity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -33,62 +32,74 @@ RINGING = 2.0
 
 
 @dataclass(frozen=True)
-class Plate:
-    """A force plate whose first mode of vibration is excited by the force on it.
+class Plate(Table):
+    """A force plate; the force on it excites its first mode of vibration, which is corrected."""
 
-    Attributes are the frequency of the first resonance, Hz, its quality factor, the relative
-    standard uncertainty of the frequency, and the share of the mode in the static response: 1 for a
-    mass on a spring, whose deformation is measured.
-    """
-
-    frequency: float
-    quality: float
-    frequency_uncertainty: float = 0.0
-    share: float = 1.0
+    title = "plate: "
+    f0: float = key(Number(1.0, 1e6, "Hz"), "frequency of the first resonance", math.nan)
+    Q: float = key(Number(0.5, 1e6), "quality factor of the first resonance", math.nan)
+    f0_uncertainty: float | None = key(
+        Number(0.0, 0.5), "relative standard uncertainty of the resonance"
+    )
+    share: float | None = key(
+        Number(0.001, 1.0), "share of this mode in the static response, 1 for a mass on a spring"
+    )
+    flat_limit: float | None = key(
+        Number(100.0, 1e6, "Hz"),
+        "frequency up to which the response is flat within 2 %, if no resonance is stated",
+    )
+    time_constant: float | None = key(Number(1e-3, 1e9, "s"), "time constant of the amplifier")
+    full_scale: float | None = key(
+        Number(1.0, 1e9, "N"), "largest force that plate and recorder can measure"
+    )
+    linearity: tuple[tuple[float, float], ...] = key(
+        to_linearity, "pairs of a force applied and the force indicated, N", ()
+    )
 
     def __post_init__(self) -> None:
-        """Raise InputError for impossible values."""
-        for name in ("frequency", "quality", "frequency_uncertainty", "share"):
-            require_number(f"plate: {name}", getattr(self, name))
-        if self.frequency <= 0:
-            refuse_value("plate: frequency", self.frequency, "frequency > 0, Hz")
-        if self.quality <= 0:
-            refuse_value("plate: quality", self.quality, "quality > 0")
-        if not 0 <= self.frequency_uncertainty < 1:
-            refuse_value("plate: frequency_uncertainty", self.frequency_uncertainty, "0 to 1")
-        if not 0 < self.share <= 1:
-            refuse_value("plate: share", self.share, "share > 0, up to 1")
+        """Raise InputError if a value is not allowed, or one is missing."""
+        super().__post_init__()
+        if {"f0", "Q", "f0_uncertainty", "share"} & set(self.stated):
+            self.require("f0", "Q")
+            if self.flat_limit is not None:
+                refuse("plate: f0 and flat_limit are both stated", "one of them")
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the ratio of measured and applied force, at frequencies in Hz."""
-        ratio = frequency / self.frequency
-        return np.asarray(1 + self.share * (1 / (1 - ratio**2 + 1j * ratio / self.quality) - 1))
+        ratio = frequency / self.f0
+        mode = 1 / (1 - ratio**2 + 1j * ratio / self.Q)
+        return np.asarray(1 + self.mode_share * (mode - 1))
+
+    @property
+    def mode_share(self) -> float:
+        """Share of the mode in the static response; 1 if it is not stated."""
+        return self.share or 1.0
 
     @property
     def highest(self) -> float:
         """Highest corrected frequency, Hz: above the resonance the response falls to 1/3 there."""
-        return self.frequency * math.sqrt(1 + self.share / (4 / 3 - self.share))
+        return self.f0 * math.sqrt(1 + self.mode_share / (4 / 3 - self.mode_share))
 
     @property
     def decay(self) -> float:
         """Duration of the ringing, s."""
-        return RINGING * self.quality / self.frequency
+        return RINGING * self.Q / self.f0
 
     def describe(self, sample_rate: float) -> str:
         """Describe the correction at a sample rate, Hz."""
         highest = min(self.highest, sample_rate / 2)
         gain = 1 / abs(self.response(np.array([highest]))[0])
         return (
-            f"force plate: resonance of {frequency_text(self.frequency)}, "
-            f"quality {self.quality:g}, corrected up to {frequency_text(highest)}; "
+            f"force plate: resonance of {frequency_text(self.f0)}, "
+            f"quality {self.Q:g}, corrected up to {frequency_text(highest)}; "
             f"noise there times {gain:.2g}"
         )
 
     def require_above(self, edge: float) -> None:
         """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""
-        if self.frequency < MIN_RATIO * edge:
+        if self.f0 < MIN_RATIO * edge:
             refuse(
-                f"plate: the resonance, {frequency_text(self.frequency)}, is too close "
+                f"plate: the resonance, {frequency_text(self.f0)}, is too close "
                 f"to the bands, which reach up to {frequency_text(edge)}, for a correction",
                 f"{frequency_text(MIN_RATIO * edge)} or more",
             )
@@ -99,10 +110,10 @@ class Plate:
         At the upper edge of each band, r times the resonance, a relative error of the resonance
         changes the response of the mode by 2 r**2 / (1 - r**2) times as much.
         """
-        square = (get_bands(bands).upper / self.frequency) ** 2
-        mode = self.share / (1 - square)
-        change = 2 * square / (1 - square) * mode / (1 - self.share + mode)
-        return np.asarray(20 / math.log(10) * np.abs(change) * self.frequency_uncertainty)
+        square = (get_bands(bands).upper / self.f0) ** 2
+        mode = self.mode_share / (1 - square)
+        change = 2 * square / (1 - square) * mode / (1 - self.mode_share + mode)
+        return np.asarray(20 / math.log(10) * np.abs(change) * (self.f0_uncertainty or 0.0))
 
 
 @dataclass(frozen=True)
@@ -117,90 +128,67 @@ class PlateCheck:
     reason: str
 
 
-def check_plate(
-    plate: Plate | None = None,
-    *,
-    time_constant: float | None = None,
-    full_scale: float | None = None,
-    linearity: Sequence[tuple[float, float]] | None = None,
-) -> tuple[PlateCheck, ...]:
+def check_plate(plate: Plate) -> tuple[PlateCheck, ...]:
     """Check a plate by the standard: flat from 0.2 to 1000 Hz, 0 to 5000 N, linear within 2 %.
 
-    The resonance of the plate is corrected. The time constant, s, is that of the amplifier (a
-    high-pass), infinite if static. The full scale, N, is that of plate and recorder. The linearity
-    is pairs of the force applied and the force indicated, N.
+    The resonance of the plate is corrected.
     """
-    return (
-        _check_low(time_constant),
-        _check_high(plate),
-        _check_range(full_scale),
-        _check_linearity(linearity),
-    )
+    return _check_low(plate), _check_high(plate), _check_range(plate), _check_linearity(plate)
 
 
-def _check_low(time_constant: float | None) -> PlateCheck:
+def _check_low(plate: Plate) -> PlateCheck:
     """Check the lowest frequency of a first-order high-pass."""
-    requirement, low = "flat above", FLAT[0]
+    low, time_constant = FLAT[0], plate.time_constant
     if time_constant is None:
-        return PlateCheck(
-            requirement, None, f"the response at {low:g} Hz is not known (time constant)"
-        )
-    if not time_constant > 0:
-        refuse_value("plate: time_constant", time_constant, "time_constant > 0, s")
+        unknown = f"the response at {low:g} Hz is not known (time constant)"
+        return PlateCheck("flat above", None, unknown)
     loss = 1 - 1 / math.hypot(1, 1 / (2 * math.pi * low * time_constant))
     needed = 1 / (2 * math.pi * low * math.sqrt((1 - TOLERANCE) ** -2 - 1))
     return PlateCheck(
-        requirement,
+        "flat above",
         loss <= TOLERANCE,
         f"at {low:g} Hz the plate reads {100 * loss:.2g} % too little (time constant "
         f"{time_constant:g} s; {100 * TOLERANCE:g} % need {needed:.1f} s)",
     )
 
 
-def _check_high(plate: Plate | None) -> PlateCheck:
+def _check_high(plate: Plate) -> PlateCheck:
     """Check the highest frequency by the deviation that remains after the correction."""
-    requirement, high = "flat below", FLAT[1]
-    if plate is None or not plate.frequency_uncertainty:
-        missing = "resonance" if plate is None else "uncertainty of the resonance"
-        return PlateCheck(
-            requirement, None, f"the response up to {high:g} Hz is not known ({missing})"
-        )
+    high = FLAT[1]
+    if not plate.f0_uncertainty:
+        missing = "resonance" if math.isnan(plate.f0) else "uncertainty of the resonance"
+        unknown = f"the response up to {high:g} Hz is not known ({missing})"
+        return PlateCheck("flat below", None, unknown)
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     # Expanded uncertainty of the resonance, in both directions.
-    shift = NORMAL_FACTOR * plate.frequency_uncertainty
+    shift = NORMAL_FACTOR * plate.f0_uncertainty
     ratios = [np.abs(plate.response(frequency / (1 + sign * shift))) / response for sign in (-1, 1)]
     deviation = max(float(np.abs(ratio - 1).max()) for ratio in ratios)
     return PlateCheck(
-        requirement,
+        "flat below",
         deviation <= TOLERANCE,
-        f"up to {high:g} Hz the plate with its resonance of "
-        f"{frequency_text(plate.frequency)} is up to {100 * deviation:.2g} % off "
-        "(after the correction, whose resonance is known to "
+        f"up to {high:g} Hz the plate with its resonance of {frequency_text(plate.f0)} is up to "
+        f"{100 * deviation:.2g} % off (after the correction, whose resonance is known to "
         f"{100 * shift:.2g} %)",
     )
 
 
-def _check_range(full_scale: float | None) -> PlateCheck:
-    if full_scale is None:
+def _check_range(plate: Plate) -> PlateCheck:
+    if plate.full_scale is None:
         return PlateCheck("range", None, f"whether the plate reads up to {RANGE:g} N is not known")
-    require_number("plate: full_scale", full_scale)
     return PlateCheck(
         "range",
-        full_scale >= RANGE,
-        f"the plate reads up to {full_scale:.4g} N; the standard asks for {RANGE:g} N",
+        plate.full_scale >= RANGE,
+        f"the plate reads up to {plate.full_scale:.4g} N; the standard asks for {RANGE:g} N",
     )
 
 
-def _check_linearity(linearity: Sequence[tuple[float, float]] | None) -> PlateCheck:
+def _check_linearity(plate: Plate) -> PlateCheck:
     """Check the linearity by the relative deviation from the best line through zero."""
-    requirement = "linear"
-    if linearity is None:
-        return PlateCheck(requirement, None, "the linearity is not known (pairs of forces)")
-    table = np.asarray(linearity, dtype=np.float64)
-    if table.ndim != 2 or table.shape[1] != 2 or len(table) < 2 or not (table > 0).all():  # noqa: PLR2004
-        refuse("plate: linearity is not a list of pairs", "two or more pairs of forces, N, above 0")
-    applied, indicated = table.T
+    if not plate.linearity:
+        return PlateCheck("linear", None, "the linearity is not known (pairs of forces)")
+    applied, indicated = np.array(plate.linearity).T
     # Relative deviations give small forces as much weight as large ones.
     slope = float(np.mean(indicated / applied))
     relative = indicated / (slope * applied) - 1
@@ -208,7 +196,7 @@ def _check_linearity(linearity: Sequence[tuple[float, float]] | None) -> PlateCh
     restriction = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
     met = bool(abs(relative[worst]) <= TOLERANCE)
     return PlateCheck(
-        requirement,
+        "linear",
         None if met and restriction else met,
         f"from {applied.min():.4g} to {applied.max():.4g} N the plate is linear within "
         f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){restriction}",

@@ -221,8 +221,8 @@ def calibrate_tap(
         warnings = (message,)
     plate = Plate(math.exp(frequency), math.exp(quality))
     return TappedPlate(
-        plate.frequency,
-        plate.quality,
+        plate.f0,
+        plate.Q,
         math.hypot(u_frequency, CLOCK),
         u_quality,
         len(firsts),
@@ -244,8 +244,8 @@ def _share(
     """
     half = round(CONTACT * rate)
     highest_frequency = MAX_FREQUENCY * rate
-    count = int(math.log(highest_frequency / plate.frequency) / math.log(NEAR) * POINTS)
-    grid = plate.frequency * NEAR ** (np.arange(-POINTS, count) / POINTS)
+    count = int(math.log(highest_frequency / plate.f0) / math.log(NEAR) * POINTS)
+    grid = plate.f0 * NEAR ** (np.arange(-POINTS, count) / POINTS)
     transform = np.exp(-2j * np.pi / rate * np.outer(grid, np.arange(2 * half)))
     sizes, depths = [], []
     for top in tops:
@@ -269,7 +269,7 @@ def _share(
     above = grid[POINTS:-POINTS]
     possible = np.flatnonzero(highest < POSSIBLE)
     first = int(possible[0]) if possible.size else len(above) - 1
-    minimum = 1 - (plate.frequency / float(above[first])) ** 2
+    minimum = 1 - (plate.f0 / float(above[first])) ** 2
     stop = first + int(np.argmax(highest[first:] >= POSSIBLE))
     inside = depth[:, first:stop]
     if len(depth) == 1 or stop == first or not inside.min(axis=1).max() < ZERO:
@@ -280,7 +280,7 @@ def _share(
     slopes = np.log([size[beyond] / size[0] for size in sizes])
     if scatter > SAME_ZERO or slopes.std(ddof=1) < DIFFERENT:
         return None, 0.0, minimum
-    rest = (plate.frequency / zero) ** 2
+    rest = (plate.f0 / zero) ** 2
     return 1 - rest, 2 * rest * scatter / math.sqrt(len(zeros)), minimum
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.signal import bessel, butter, freqs_zpk
 
-from thud.base.checks import refuse, refuse_value, require_choice, require_number, require_whole
+from thud.base.checks import refuse
 from thud.base.units import frequency_text
+from thud.recordings.config_values import Choice, Number, Table, Whole, key
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,25 +29,27 @@ ASSUMED_CUTOFF = 0.25
 
 
 @dataclass(frozen=True)
-class RecorderFilter:
-    """A low-pass filter before sampling.
+class RecorderFilter(Table):
+    """The low-pass filter of the recorder or amplifier, which is corrected."""
 
-    Attributes are ``"bessel"`` or ``"butterworth"``, the order, the cutoff at -3 dB, Hz, and the
-    relative standard uncertainty of the cutoff.
-    """
-
-    kind: Literal["bessel", "butterworth"]
-    order: int
-    cutoff: float
-    cutoff_uncertainty: float = 0.0
+    title = "filter: "
+    kind: str = key(
+        Choice((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
+    )
+    order: int | None = key(Whole(1, MAX_ORDER), "order")
+    cutoff: float = key(Number(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
+    cutoff_uncertainty: float | None = key(
+        Number(0.0, 0.5), "relative standard uncertainty of the cutoff"
+    )
 
     def __post_init__(self) -> None:
-        """Raise InputError for impossible values."""
-        require_choice("filter: kind", self.kind, KINDS)
-        require_whole("filter: order", self.order, 1, MAX_ORDER)
-        require_number("filter: cutoff", self.cutoff)
-        if self.cutoff <= 0:
-            refuse_value("filter: cutoff", self.cutoff, "cutoff > 0, Hz")
+        """Raise InputError if a value is not allowed, or one is missing."""
+        super().__post_init__()
+        self.require("kind")
+        if self.kind != "none":
+            self.require("order", "cutoff")
+        elif len(self.stated) > 1:
+            refuse("filter: kind = 'none' has an order or a cutoff", "kind alone, or another kind")
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the ratio of output and input, at frequencies in Hz."""
@@ -87,7 +91,7 @@ class RecorderFilter:
 
     def shifted(self) -> RecorderFilter:
         """Return the filter with a cutoff that is higher by its standard uncertainty."""
-        return replace(self, cutoff=self.cutoff * (1 + self.cutoff_uncertainty))
+        return replace(self, cutoff=self.cutoff * (1 + (self.cutoff_uncertainty or 0.0)))
 
 
 def assumed_filter(sample_rate: float) -> RecorderFilter:

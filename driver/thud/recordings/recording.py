@@ -282,7 +282,7 @@ class Recording(Displayed):
         plate, stated = config.resonance, config.recorder_filter
         missing = {
             "calibration": self.calibration_uncertainty is None,
-            "resonance of the plate": plate is not None and not plate.frequency_uncertainty,
+            "resonance of the plate": plate is not None and not plate.f0_uncertainty,
             "cutoff of the filter": stated is not None and not stated.cutoff_uncertainty,
             "mass": config.mass is not None and config.mass_uncertainty is None,
             "drop height": config.height is not None and config.height_uncertainty is None,

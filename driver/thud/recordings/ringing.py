@@ -136,27 +136,23 @@ def is_in_record(recorded: Window, contact: Contact, plate: Plate) -> bool | Non
     force = recorded.force[slice(*contact.span)] - contact.removed
     raw = replace(contact, force=force)
     ringing = find_ringing(raw)
-    tolerance = max(MATCH, 3 * plate.frequency_uncertainty)
-    if ringing and abs(ringing.frequency / plate.frequency - 1) < tolerance:
+    tolerance = max(MATCH, 3 * (plate.f0_uncertainty or 0.0))
+    if ringing and abs(ringing.frequency / plate.f0 - 1) < tolerance:
         return True
-    edges = np.array(
-        [[max(1 - 0.5 / plate.quality, 0.9), min(1 + 0.5 / plate.quality, 1.1)], *SIDES]
-    )
-    edges *= plate.frequency
+    edges = np.array([[max(1 - 0.5 / plate.Q, 0.9), min(1 + 0.5 / plate.Q, 1.1)], *SIDES])
+    edges *= plate.f0
     if edges.max() > contact.sample_rate / 2:
         return None
     excess = []
     for pulse in (raw, contact):
-        length = max(
-            len(pulse.gated), int(8 * plate.quality * contact.sample_rate / plate.frequency)
-        )
+        length = max(len(pulse.gated), int(8 * plate.Q * contact.sample_rate / plate.f0))
         spectrum = np.abs(np.fft.rfft(pulse.gated, length) / contact.sample_rate) ** 2
         frequency = np.fft.rfftfreq(length, 1 / contact.sample_rate)
         energies = [
             spectrum[(frequency >= low) & (frequency <= high)].mean() for low, high in edges
         ]
         if pulse is raw:
-            noise = contact.background.density(plate.frequency)[0] / 2
+            noise = contact.background.density(plate.f0)[0] / 2
             noise *= len(pulse.gated) / contact.sample_rate
             if min(energies) < MIN_SIGNAL * noise:
                 return None
