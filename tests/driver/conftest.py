@@ -22,10 +22,12 @@ import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from types import ModuleType
 
     from matplotlib.figure import Figure
+
+    from thud.base.note import Note
 
     Run = Callable[..., subprocess.CompletedProcess[str]]
     CaseFile = Callable[..., Path]
@@ -76,6 +78,17 @@ def naming(*parts: object) -> str:
     """
     named = (rf"(?<!\w)(?<!\d\.){re.escape(str(part))}(?![\d_]|\.\d)" for part in parts)
     return NAMING + "".join(f"(?=.*{part})" for part in named)
+
+
+def codes(notes: Iterable[Note]) -> list[str]:
+    """Return the codes of notes."""
+    return [note.code for note in notes]
+
+
+def noted(notes: Iterable[Note], code: str) -> Note:
+    """Return the only note of a code."""
+    (note,) = (note for note in notes if note.code == code)
+    return note
 
 
 def quiet_fit(*arguments: Any, **options: Any) -> thud.Fit:  # noqa: ANN401 - of fit

@@ -160,9 +160,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         effective_mass=Estimate.unknown(),
         noise=Noise(deviation, "before and after", float(draws[0, 0])),
         bounces=(),
-        steps=(),
-        warnings=(),
-        level_effects={},
+        notes=(),
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force,
             (np.zeros(1), np.zeros(1)), gate, offset, (before, after),

@@ -30,6 +30,7 @@ from synthetic import half_sine
 import thud
 from thud import cli
 from thud.base._schema import FLOORS, MODELS
+from thud.base.note import Note
 from thud.case.case import check_case
 from thud.explorer import server
 from thud.explorer.answer import new_case
@@ -588,11 +589,12 @@ def test_headline_names_everything_that_is_not_known(client: TestClient) -> None
 def test_warnings_without_effect_on_the_verdict_stay_folded(
     effect: float, *, is_open: bool
 ) -> None:
+    note = Note("effective_mass", effect=effect)
     criteria = [
         Criterion(name, Estimate(value, 0.0, "dB"), 10.0, 14.0)
         for name, value in {"octave_500": 10.5, "octave_31_5": 12.0}.items()
     ]
-    assert decisive_warnings({"warning": effect}, criteria) == ["warning"] * is_open
+    assert decisive_warnings([note], criteria) == [note] * is_open
 
 
 def test_several_files_are_the_drops_of_one_measurement(client: TestClient) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import soundfile
-from conftest import naming
+from conftest import naming, noted
 from recording_files import half_sine as unit_pulse
 from scipy import stats
 from synthetic import half_sine, make_drop
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+
+    from thud.base.note import Note
 
 RATE = 16_000
 SHARES = (0.2, 0.32, 0.14, 0.34)
@@ -203,7 +205,8 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
     path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)
     found = thud.read_recording(path, channels="sum")
-    assert any("F1: 1 dropouts of 0.5 ms" in step for step in found.steps)
+    lost = noted(found.notes, "dropouts")
+    assert (lost.others["cell"], lost.value) == ("dropout.csv, F1", pytest.approx(0.5))
     expected = thud.read_recording(write_table(path, cells(), NAMES), channels="sum")
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=0.02)
 
@@ -218,18 +221,19 @@ def loads(**changed: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return list((dict(zip(NAMES, cells(), strict=True)) | changed).values())
 
 
-def cell_warnings(path: Path) -> str:
-    """Return the warnings that name a load cell."""
+def cell_notes(path: Path) -> list[Note]:
+    """Return the notes on a load cell of the first drop."""
     found = thud.read_recording(path, channels="sum")
-    messages = [*found.warnings, *(warning for drop in found.drops for warning in drop.warnings)]
-    return "\n".join(message for message in messages if re.search(r"F\d(:| \[)", message))
+    return [note for note in found.drops[0].notes if "cell" in note.others]
 
 
-@pytest.mark.parametrize(("delay", "shown"), [(0.0005, "0.5 ms later"), (-0.003, "3 ms earlier")])
-def test_late_load_cell_raises_a_warning(delay: float, shown: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("delay", "side"), [(0.0005, "later"), (-0.003, "earlier")])
+def test_late_load_cell_raises_a_warning(delay: float, side: str, tmp_path: Path) -> None:
     late = np.roll(cells()[1], round(delay * RATE))
     path = write_table(tmp_path / "late.csv", loads(F2=late), NAMES)
-    assert re.search(rf"F2: the force of this load cell is {shown} than", cell_warnings(path))
+    note = noted(cell_notes(path), "cell_delayed")
+    assert note.others == {"cell": "late.csv, F2", "side": side}
+    assert note.value == pytest.approx(1e3 * abs(delay), rel=0.02)
 
 
 def test_load_cells_with_other_shapes_are_not_late(tmp_path: Path) -> None:
@@ -241,19 +245,20 @@ def test_load_cells_with_other_shapes_are_not_late(tmp_path: Path) -> None:
     path = write_table(
         tmp_path / "shapes.csv", [first + tilt, second - tilt, third * ringing, fourth], NAMES
     )
-    assert not cell_warnings(path)
+    assert not cell_notes(path)
 
 
 def test_dead_load_cell_raises_a_warning(tmp_path: Path) -> None:
     path = write_table(tmp_path / "dead.csv", loads(F3=record(9, share=0.0)), NAMES)
-    assert re.search(r"F3: this load cell carries .* may be dead", cell_warnings(path))
+    assert noted(cell_notes(path), "cell_without_force").others["cell"] == "dead.csv, F3"
 
 
 def test_sum_with_another_calibration_raises_a_warning(tmp_path: Path) -> None:
     first, second, third, _ = cells()
     total = 1.1 * (first + second + third)
     path = write_table(tmp_path / "total.csv", loads(F4=total), NAMES)
-    assert re.search(r"F4: is 1\.1 times the sum of the other", cell_warnings(path))
+    note = noted(cell_notes(path), "cell_like_sum")
+    assert (note.others["cell"], note.value) == ("total.csv, F4", pytest.approx(1.1, rel=0.01))
 
 
 def test_load_cell_in_another_unit_is_named(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import codes, naming, noted
 
 import thud
 from thud.recordings.config import Config
@@ -76,7 +76,7 @@ def test_only_drops_are_drops(kind: str) -> None:
         landing = (window.bounces[0].start + window.bounces[0].contact[0]) / RATE
         assert landing == pytest.approx(begin + 0.72, abs=0.004)
     if kind in {"taps", "tap between bounces"}:
-        assert all(pulse.number is None for pulse in search.ignored)
+        assert {*codes(search.ignored)} == {"pulse_ignored"}
         assert search.ignored
 
 
@@ -101,7 +101,9 @@ def test_drops_are_chosen_by_number_and_time() -> None:
         recording = measured(**choice)
         assert [drop.onset for drop in recording.drops] == pytest.approx([onsets[k] for k in kept])
     left = measured(leave_out={"2": "touched"})
-    assert any("drop 2 at 8.50 s was left out: touched" in step for step in left.steps)
+    note = noted(left.notes, "drop_left_out")
+    assert (note.value, note.others["reason"]) == (2, "touched")
+    assert note.others["time"] == pytest.approx(8.5, abs=0.005)
 
 
 def test_small_drop_keeps_its_number_and_is_left_out_unless_it_is_chosen() -> None:
@@ -118,18 +120,19 @@ def test_small_drop_keeps_its_number_and_is_left_out_unless_it_is_chosen() -> No
     ):
         recording = thud.Recording.from_signals([signal], Config(**choice))  # type: ignore[arg-type]
         assert [round(drop.onset, 1) for drop in recording.drops] == onsets
-    steps = " ".join(thud.Recording.from_signals([signal], Config()).steps)
-    for number, instant in ((1, "3.00"), (5, "14.00")):
-        assert f"drop {number} at {instant} s was left out: its peak" in steps
+    notes = thud.Recording.from_signals([signal], Config()).notes
+    small = [note for note in notes if note.code == "drop_too_small"]
+    assert [note.value for note in small] == [1, 5]
+    assert [note.others["time"] for note in small] == pytest.approx([3.0, 14.0], abs=0.005)
 
 
 def test_bounce_is_no_drop_of_a_section_that_begins_before_it() -> None:
     # The first bounce of the drop at 5 s lands at 5.72 s.
     recording = measured(begin=5.4)
     assert [round(drop.onset, 1) for drop in recording.drops] == [8.5, 12.0]
-    steps = " ".join(recording.steps)
-    assert "searched for drops from 5.4 s to the end only" in steps
-    assert "a bounce of an earlier drop at 5.7" in steps
+    assert noted(recording.notes, "section_searched").low == 5.4
+    bounce = next(note for note in recording.notes if note.code == "bounce_ignored")
+    assert bounce.others["time"] == pytest.approx(5.72, abs=0.03)
 
 
 @pytest.mark.parametrize("instant", [2.0, 8.507])

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from conftest import codes, noted
 from scipy import stats
 from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
@@ -154,12 +155,11 @@ def test_drift_and_hum_are_told_from_three_deviations_on(drift: float, hum: floa
     gate = np.array(one.gate) / RATE
     under = (np.array([gate[0], gate[1] - 1 / RATE]), np.array([-2.0, 12.0]))
     known = SimpleNamespace(drift=(drift * 4, 4.0), hum=(60.0, hum * 0.5, 0.5))
-    steps = measured_drop._removed(replace(one, removed_means=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
-    told = " ".join(steps)
+    notes = measured_drop._removed(replace(one, removed_means=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
     # The mean of what lies under the contact.
-    assert "offset of 5 N" in told
-    assert ("drift" in told) == (abs(drift) > 3)
-    assert ("hum of 60 Hz" in told) == (hum > 3)
+    assert noted(notes, "offset_removed").value == pytest.approx(5.0)
+    assert ("drift_removed" in codes(notes)) == (abs(drift) > 3)
+    assert ("hum_removed" in codes(notes)) == (hum > 3)
 
 
 @pytest.mark.parametrize(("size", "rate"), [(0.05, 25600.0), (12.0, 25600.0), (30.0, 5000.0)])

@@ -291,10 +291,9 @@ def test_drops_that_differ_are_marked_and_kept() -> None:
     odd = make_drop(1.0, seed=6)
     found += measure_levels([replace(odd, force=1.05 * odd.force, name="odd")])
     average = average_levels(found)
-    assert {o.name for o in average.outliers} == {"odd"}
+    assert {note.subject for note in average.outliers} == {"odd"}
     assert "odd" in average.names
     assert len(average.drops) == 7
-    assert "standard deviations" in str(average.outliers[0])
     # Equal drops differ by rounding.
     same = measure_levels([make_drop() for _ in range(5)])
     assert average_levels(same).outliers == ()
@@ -312,10 +311,10 @@ def test_grubbs_critical_values_are_the_published_ones() -> None:
         values = np.zeros(count)
         values[0], values[1:] = 100.0, np.linspace(-1e-3, 1e-3, count - 1)
         (found,) = find_outliers(values, NAMES, "level")
-        assert found.critical == pytest.approx(critical, abs=1e-3)
-        assert found.critical == pytest.approx(grubbs(count, 0.05))
+        assert found.others["critical"] == pytest.approx(critical, abs=1e-3)
+        assert found.others["critical"] == pytest.approx(grubbs(count, 0.05))
         assert found.score == pytest.approx((100 - values.mean()) / values.std(ddof=1))
-        assert (found.name, found.value) == ("drop 1", 100.0)
+        assert (found.subject, found.value) == ("drop 1", 100.0)
 
 
 def test_outliers_begin_at_the_critical_value_and_beyond_their_own_uncertainty() -> None:
@@ -351,7 +350,7 @@ def test_outliers_of_many_bands_share_the_probability(bands: Any) -> None:  # no
     count = len(thud.get_bands(bands).nominal)
     assert len(average.outliers) == count
     for found in average.outliers:
-        assert found.critical == pytest.approx(grubbs(6, 0.05 / count))
+        assert found.others["critical"] == pytest.approx(grubbs(6, 0.05 / count))
 
 
 def test_drops_that_differ_share_the_probability_among_three_quantities() -> None:
@@ -369,8 +368,8 @@ def test_drops_that_differ_share_the_probability_among_three_quantities() -> Non
         (found,) = find_deviant(
             [*drops, replace(drops[0], name="odd", **{change: Estimate(value, 0)})]
         )
-        assert (found.name, found.value) == ("odd", pytest.approx(value / unit))
-        assert found.critical == pytest.approx(grubbs(7, 0.05 / 3))
+        assert (found.subject, found.value) == ("odd", pytest.approx(value / unit))
+        assert found.others["critical"] == pytest.approx(grubbs(7, 0.05 / 3))
         # A drop that is uncertain enough does not differ.
         doubtful = replace(drops[0], name="odd", **{change: Estimate(value, value)})
         assert find_deviant([*drops, doubtful]) == ()
@@ -388,7 +387,10 @@ def test_rate_of_false_outliers(count: int) -> None:
 
 def test_two_outliers_do_not_hide_each_other_and_noise_marks_none() -> None:
     values = [*np.random.default_rng(1).normal(size=13), 30.0, 31.0]
-    assert [o.name for o in find_outliers(values, NAMES, "level")] == ["drop 15", "drop 14"]
+    assert [note.subject for note in find_outliers(values, NAMES, "level")] == [
+        "drop 15",
+        "drop 14",
+    ]
     assert find_outliers(values, NAMES, "level", uncertainty=[20.0] * 15) == ()
     assert find_outliers([1.0, np.nan, 2.0], NAMES, "level") == ()
 
@@ -409,14 +411,13 @@ def through_plate(
 @pytest.mark.slow
 def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     time, measured = through_plate(half_sine, rate, plate)
-    corrected, sentence = correct_force(measured, rate, Chain((plate,))), plate.describe(rate)
+    corrected = correct_force(measured, rate, Chain((plate,)))
     before = np.abs(thud.force_exposure_levels(measured, rate) - HALF_SINE)
     after = np.abs(thud.force_exposure_levels(corrected, rate) - HALF_SINE)
     assert before.max() > 0.3
     # Aliases of what the plate measures fall by 24 dB per octave above its resonance.
     assert after.max() < 1e-3
     assert np.abs(corrected - half_sine(time)).max() < 0.01 * 1500
-    assert f"{plate.f0:.4g} Hz" in sentence
 
 
 def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import codes, noted
 from synthetic import half_sine
 
 import thud
@@ -130,12 +131,14 @@ def test_noise_that_covers_the_step_needs_no_budget() -> None:
     assert not len(drop.contact.quantization_errors)
     assert drop.contact.quantization_impulse == 0.0
     assert not band_noise([drop], thud.get_bands())[:, :, 2].any()
-    assert not any("steps of" in warning for warning in drop.warnings)
+    assert "coarse_steps" not in codes(drop.notes)
 
 
 def test_coarse_record_has_its_budget() -> None:
     recording = measured(record(15.625, 0.5, 4, count=3))
-    assert any("steps of 15.6 N" in warning for warning in recording.warnings)
+    assert noted(recording.drops[0].notes, "coarse_steps").others["step"] == pytest.approx(
+        15.6, abs=0.05
+    )
     for estimate in recording.level_estimates():
         part = next(part for part in estimate.contributions if part.name == "quantization")
         assert part.counted
@@ -168,7 +171,7 @@ def test_constant_background_next_to_a_steep_flank_is_no_dropout() -> None:
     force = np.rint(PEAK * np.sin(np.pi * x**0.8) / 15.625) * 15.625
     (window,) = search_drops(Signal.from_array(force, 8000.0)).windows
     drop = measure_window(window, Config())
-    assert not any("dropout" in text for text in (*drop.steps, *drop.warnings))
+    assert "dropouts" not in codes(drop.notes)
 
 
 def test_few_digits_are_coarser_at_the_peak() -> None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import codes, noted
 
 import thud
+
+if TYPE_CHECKING:
+    from thud.base.note import Note
 
 RATE = 48e3
 TIME = np.arange(round(0.8 * RATE)) / RATE
@@ -17,10 +20,10 @@ NOISE = np.random.default_rng(4).normal(0, 0.3, len(TIME))
 FORCE = 1500 * np.sin(np.pi * PHASE) ** 1.3 + NOISE
 
 
-def notes(force: np.ndarray) -> list[str]:
+def notes(force: np.ndarray) -> list[Note]:
     """Return the notes on tones of a recording."""
     (drop,) = thud.Recording.from_array(force, RATE).drops
-    return [step for step in drop.steps if "tone" in step]
+    return [note for note in drop.notes if note.code == "tone_removed"]
 
 
 @pytest.mark.parametrize(
@@ -32,10 +35,8 @@ def test_tones_are_removed(tones: dict[float, float]) -> None:
     found = notes(force)
     assert len(found) == len(tones)
     for note, (frequency, size) in zip(found, tones.items(), strict=True):
-        match = re.search(r"a tone of (.*) Hz with an amplitude of (.*) N was removed", note)
-        assert match
-        assert float(match[1]) == pytest.approx(frequency, abs=0.6)
-        assert float(match[2]) == pytest.approx(size, rel=0.02)
+        assert note.others["frequency"] == pytest.approx(frequency, abs=0.6)
+        assert note.value == pytest.approx(size, rel=0.02)
     expected = thud.Recording.from_array(FORCE, RATE)
     result = thud.Recording.from_array(force, RATE)
     np.testing.assert_allclose(result.levels(), expected.levels(), rtol=0, atol=0.03)
@@ -49,7 +50,7 @@ def test_levels_without_noise_and_tones_have_no_notes() -> None:
     time = np.arange(len(draws)) / 51.2e3
     pulse = 1500 * np.sin(np.pi * np.clip((time - 0.2) / 0.018, 0, 1))
     (drop,) = thud.Recording.from_array(pulse + draws, 51.2e3).drops
-    assert not any("tone" in step for step in drop.steps)
+    assert "tone_removed" not in codes(drop.notes)
 
 
 @pytest.mark.parametrize("frequency", [400.0, 1100.0])
@@ -85,5 +86,7 @@ def test_held_samples_are_found_beside_a_tone() -> None:
     force = FORCE + 3 * np.sin(2 * np.pi * 450 * TIME)
     force[14800:14820] = force[14800]
     (drop,) = thud.Recording.from_array(force, RATE).drops
-    assert any(re.search(naming("450 Hz", "3 N"), step) for step in drop.steps)
-    assert any("the force jumps by 13" in warning for warning in drop.warnings)
+    tone = noted(drop.notes, "tone_removed")
+    assert tone.others["frequency"] == pytest.approx(450, abs=0.5)
+    assert tone.value == pytest.approx(3, rel=0.05)
+    assert noted(drop.notes, "jump").value == pytest.approx(13.5, abs=0.5)

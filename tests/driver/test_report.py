@@ -24,19 +24,19 @@ from test_figure_look import assert_clean
 
 import thud
 from thud.base.errors import ReportWarning
+from thud.base.note import Note
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, ReportConfig, read_config
 from thud.recordings.dates import read_date
-from thud.recordings.outliers import Outlier
 from thud.recordings.picture import read_picture
 from thud.recordings.plate import Plate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.report.contents import FIELDS, missing_fields, report_data
 from thud.report.fonts import missing_characters
-from thud.report.notes import group_messages, shorten
+from thud.report.notes import group_notes, shorten
 from thud.report.page import _range_picture, report_page
 from thud.report.pdf import html_to_pdf
 from thud.report.recording_files import table, uncertainty_text
@@ -126,9 +126,10 @@ def crowded(one: Recording) -> Recording:
         replace(
             drop,
             name=f"a_long_name_of_a_file_{i}" + "z" * 200,
-            steps=tuple(f"step {chr(97 + k)}: {i} N were " + "moved " * 30 for k in range(9)),
-            warnings=tuple(
-                f"doubt {chr(97 + k)} of {i} N, " + "a long one " * 20 for k in range(20)
+            notes=tuple(
+                Note(code, value=i, others={"reason": chr(97 + k) + " a long one" * 20, "time": i})
+                for k in range(20)
+                for code in ("drop_left_out", "plate_requirement")
             ),
         )
         for i, drop in enumerate(base.drops)
@@ -411,7 +412,8 @@ def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
     line = "".join(filter(str.isprintable, HOSTILE))
     texts = dict.fromkeys(("laboratory", "ball", "serial"), line)
     recording = many(one, 2, **texts, instruments=(line, line))
-    drops = tuple(replace(d, name=HOSTILE + d.name, warnings=(HOSTILE,)) for d in recording.drops)
+    hostile = (Note("plate_requirement", others={"reason": HOSTILE}),)
+    drops = tuple(replace(d, name=HOSTILE + d.name, notes=hostile) for d in recording.drops)
     origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in recording.origins)
     write_report(replace(recording, drops=drops, origins=origins), tmp_path)
     page = (tmp_path / "report.html").read_text()
@@ -796,25 +798,17 @@ def test_dates_in_the_wrong_order_raise_a_warning(
 ) -> None:
     dates = {"received": "2024-05-03", "issued": "2024-05-03", **changes}
     recording = many(one, 3, date="2024-05-03", report=ReportConfig(**dates))
-    found = [text for text in recording.own_warnings if "received" in text or "issue" in text]
+    found = [str(note) for note in recording.notes if note.code == "dates_in_wrong_order"]
     assert found == ([warning] if warning else [])
     # Without a date of the measurement, those of receipt and issue are compared.
     undated = Config(report=ReportConfig(received="2024-05-04", issued="2024-05-02"))
-    assert undated.check_dates([]) == [
+    assert [str(note) for note in undated.check_dates([])] == [
         "the item was received on 2024-05-04, after the issue of the report on 2024-05-02"
     ]
 
 
 def test_risk_that_rounds_to_certainty_is_a_bound() -> None:
     assert [risk_text(p) for p in (0.0, 4e-4, 6e-4)] == ["> 99.9 %", "> 99.9 %", "99.9 %"]
-
-
-def test_score_of_an_outlier_differs_from_its_critical_value() -> None:
-    text = str(Outlier("drop", "contact time, ms,", 19.0, 1.49934, 1.49902))
-    assert (
-        "lies 1.4993 standard deviations from the mean of the drops (Grubbs, 5 %: 1.4990)" in text
-    )
-    assert "lies 2.31 standard" in str(Outlier("drop", "level, dB,", 19.0, 2.314, 1.715))
 
 
 def test_rules_and_standards_are_named(one: Recording) -> None:
@@ -836,7 +830,7 @@ def test_outliers_are_on_the_page_as_on_the_screen(one: Recording) -> None:
         assert str(outlier) in words
     assert "1 outlier (Grubbs, 5 %), marked but not excluded" in words
     rest = Recording(
-        "rest", tuple(d for d in recording.drops if d.name != recording.outliers[0].name),
+        "rest", tuple(d for d in recording.drops if d.name != recording.outliers[0].subject),
         recording.origins, recording.config,
     )  # fmt: skip
     other = data["without_outliers"]
@@ -908,24 +902,29 @@ def test_budgets_scroll_inside_a_narrow_page(one: Recording, tmp_path: Path) -> 
             assert_scrolls_inside(page, page.locator(".budget"), width)
 
 
-def test_sentences_that_differ_in_numbers_are_one() -> None:
-    said = [
-        ("a", "12 N at 50 Hz (IEC 61260-1)"),
-        ("b", "-3.5 N at 50 Hz (IEC 61260-1)"),
-        ("b", "x"),
+def test_notes_that_differ_in_numbers_are_one_sentence(one: Recording) -> None:
+    first, second, third = many(one, 3).drops
+    hum = [Note("hum_removed", value=x, unit="N", others={"frequency": 50.0}) for x in (12, -3.5)]
+    drops = [
+        replace(first, notes=(hum[0], Note("peaks_unknown"))),
+        replace(second, notes=(hum[1], Note("offset_removed", value=4.0, unit="N"))),
+        replace(third, notes=()),
     ]
-    assert group_messages(said, 9, "drops") == [
-        "-3.5 to 12 N at 50 Hz (IEC 61260-1) (2 of 9 drops)",
-        "x (b)",
+    assert group_notes(drops, "drops", is_warning=False) == [
+        "hum of 50 Hz with an amplitude of -3.5 to 12 N was removed (2 of 3 drops)",
+        f"an offset of 4 N was removed ({second.name})",
     ]
+    assert len(group_notes(drops, "drops", is_warning=True)) == 1
 
 
-def test_drops_that_were_left_out_are_listed() -> None:
-    said = [("a", f"drop {i} at {i / 2} s was left out: touched") for i in (2, 5, 6, 7)]
-    assert group_messages(said, 1, "files") == [
-        "drops 2, 5 to 7 at 1.0 to 3.5 s were left out: touched"
-    ]
-    assert group_messages(said[:1], 1, "files") == [said[0][1]]
+def test_drops_that_were_left_out_are_listed(one: Recording) -> None:
+    notes = tuple(
+        Note("drop_left_out", value=i, others={"time": i / 2, "reason": "touched"})
+        for i in (2, 5, 6, 7)
+    )
+    origin = replace(one.origins[0], notes=notes)
+    (text,) = group_notes([origin], "files", is_warning=False)
+    assert text == "left out: drop 2, 5 to 7 at 1.00 to 3.50 s, touched"
 
 
 def test_long_lists_are_shortened_with_their_count() -> None:

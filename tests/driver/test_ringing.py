@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import scipy.signal
-from conftest import REPOSITORY
+from conftest import REPOSITORY, codes
 from synthetic import coloured_noise, make_drop
 
 import thud
@@ -20,6 +19,7 @@ from thud.recordings.response import Chain
 from thud.recordings.ringing import find_ringing
 
 if TYPE_CHECKING:
+    from thud.base.note import Note
     from thud.recordings.contact import Contact
 
 RATE = 48_000.0
@@ -39,11 +39,11 @@ def force() -> np.ndarray:
     return impact.floor_force
 
 
-def said(force: np.ndarray, colour: str = "white", deviation: float = 2.0) -> tuple[str, ...]:
-    """Return what is said of ringing in a force with noise, N."""
+def said(force: np.ndarray, colour: str = "white", deviation: float = 2.0) -> tuple[Note, ...]:
+    """Return the notes on ringing in a force with noise, N."""
     noise = coloured_noise(len(force), RATE, deviation, colour, np.random.default_rng(1))
     (drop,) = thud.Recording.from_array(force + noise, RATE, height=1.0, mass=2.5).drops
-    return tuple(warning for warning in drop.warnings if "ring" in warning)
+    return tuple(note for note in drop.notes if note.code.startswith("plate_rings"))
 
 
 @pytest.mark.parametrize("colour", ["white", "pink", "brown"])
@@ -61,9 +61,8 @@ def test_plate_that_is_not_stated_raises_a_warning(
     force = np.pad(force, QUIET)
     felt = scipy.signal.lsim(plate, force, np.arange(len(force)) / RATE)[1]
     (told,) = said(felt)
-    found = float(told.split(" Hz")[0].rpartition(" ")[2])
-    assert found == pytest.approx(frequency, rel=0.005)
-    assert "[plate]" in told
+    assert told.code == "plate_rings"
+    assert told.others["frequency"] == pytest.approx(frequency, rel=0.005)
 
 
 def test_tone_of_the_quiet_is_no_ringing(force: np.ndarray) -> None:
@@ -78,9 +77,7 @@ def test_plate_that_is_stated_wrongly_rings_on() -> None:
     for stated, expected in ((1100.0, 0), (1600.0, 1)):
         changed = replace(config, plate=replace(config.plate, f0=stated))
         (drop,) = thud.read_recording(folder / "drop_1.wav", config=changed).drops
-        warnings = [warning for warning in drop.warnings if "ring" in warning]
-        assert len(warnings) == expected
-        assert all("[plate]" in warning for warning in warnings)
+        assert codes(drop.notes).count("plate_rings_differently") == expected
 
 
 def test_short_quiet_tells_nothing(force: np.ndarray) -> None:
@@ -114,8 +111,9 @@ def test_free_oscillation_is_told_by_frequency_and_amplitude(
 ) -> None:
     """Noise of 1 N makes an amplitude uncertain by sqrt(2/n) and a frequency by its own slope."""
     # One of the decays that are tried, 8 ms after a pause of a millisecond.
-    told = str(find_ringing(rung(20.0, frequency, 0.008), chain(plate)))
-    found, amplitude = map(float, re.findall(r"at (\S+) Hz with (\S+) N", told)[0])
+    ringing = find_ringing(rung(20.0, frequency, 0.008), chain(plate))
+    assert ringing is not None
+    found, amplitude = ringing.frequency, ringing.amplitude
     count = 0.008 * RATE / 2
     assert found == pytest.approx(frequency, abs=0.5 + 1 / 20 / 0.008 / np.sqrt(count))
     expected = 20 * np.exp(-1e-3 / 0.008)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from thud.base.sentences import PROCESSING, WARNINGS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 
 @dataclass(frozen=True, eq=True)
@@ -30,7 +30,7 @@ class Note:
         Effect on the octave of 500 Hz that its uncertainty does not include, dB; zero if there is
         none, infinite if it is unknown.
     others : mapping
-        Further values of the sentence, by name.
+        Further values of the sentence, by name. A ``"cell"`` is the load cell that it is about.
     """
 
     code: str
@@ -47,19 +47,31 @@ class Note:
         """Whether it states what may be wrong, not what was done."""
         return self.code in WARNINGS
 
+    @property
+    def message(self) -> str:
+        """The fact as a sentence, after its subject if it has one."""
+        return f"{self.subject}: {self}" if self.subject else str(self)
+
     def __str__(self) -> str:
         """Return the fact as a sentence, without its subject."""
         return sentence([self])
 
 
+def about(subject: str, notes: Iterable[Note]) -> tuple[Note, ...]:
+    """Return notes with a subject in place of none."""
+    return tuple(note if note.subject else replace(note, subject=subject) for note in notes)
+
+
 class _Range:
-    """Values of one number in several notes, shown as its range."""
+    """Values of one number in several notes, shown as its range, or with the format "list"."""
 
     def __init__(self, values: Sequence[float | str]) -> None:
         self.values = values
 
     def __format__(self, form: str) -> str:
         ordered = sorted(set(self.values), key=lambda value: (isinstance(value, str), value))
+        if form == "list":
+            return _listed([int(value) for value in ordered])
         texts = list(dict.fromkeys(format(value, form) for value in ordered))
         return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
 
@@ -76,4 +88,23 @@ def sentence(notes: Sequence[Note]) -> str:
     }
     values |= {name: _Range([note.others[name] for note in notes]) for name in notes[0].others}
     code = notes[0].code
-    return (WARNINGS.get(code) or PROCESSING[code]).format(**values)
+    cell = "{cell}: " if "cell" in values else ""
+    return (cell + (WARNINGS.get(code) or PROCESSING[code])).format(**values)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """Return ascending numbers as text, three or more in a row as a range.
+
+    >>> _listed([2, 3, 4, 7, 8])
+    '2 to 4, 7, 8'
+    """
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(
+        f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run))  # noqa: PLR2004
+        for run in runs
+    )

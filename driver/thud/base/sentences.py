@@ -21,6 +21,29 @@ PROCESSING = {
     "date_times_coarse": "the date-times are too coarse to show the sample rate",
     # Background.
     "offset_removed": "an offset of {value:.3g} {unit} was removed",
+    "drift_removed": "a drift of {value:.3g} {unit} was removed",
+    "hum_removed": ("hum of {frequency:g} Hz with an amplitude of {value:.3g} {unit} was removed"),
+    "tone_removed": (
+        "a tone of {frequency:.4g} Hz with an amplitude of {value:.3g} {unit} was removed"
+    ),
+    "noise_remains": "noise of {value:.3g} {unit} remains",
+    "plate_corrected": (
+        "force plate: resonance of {value:.5g} {unit}, quality {quality:g}, corrected up to "
+        "{high:.5g} {unit}; noise there times {gain:.2g}"
+    ),
+    "filter_corrected": (
+        "{kind} filter of order {order:g}, -3 dB at {value:.5g} {unit}, corrected up to "
+        "{high:.5g} {unit}"
+    ),
+    "section_searched": "searched for drops from {low:g} {unit} to {high:g} {unit} only",
+    "drop_left_out": "left out: drop {value:list} at {time:.2f} s, {reason}",
+    "drop_not_chosen": "left out: drop {value:list} at {time:.2f} s, only {chosen} were chosen",
+    "drop_too_small": (
+        "left out: drop {value:list} at {time:.2f} s, whose peak of {peak:.0f} N is below "
+        "{fraction:g} of the highest; choose its number (--drops, drops) if it is a drop"
+    ),
+    "bounce_ignored": "a bounce of an earlier drop at {time:.2f} s is no drop and has no number",
+    "pulse_ignored": "a pulse of {value:.0f} N at {time:.2f} s is no drop and has no number",
 }
 
 # What may be wrong.
@@ -36,4 +59,127 @@ WARNINGS = {
     "{channels}; if they are load cells, name all channels and state a calibration for each",
     "cell_sign": "the peak is {value:.4g} {unit} in a sum of {total:.4g} {unit}; the sign of this "
     "load cell may be wrong",
+    # Faults of the force.
+    "dropouts": (
+        "{count:g} dropouts of {value:.3g} {unit} in all were filled by linear interpolation"
+    ),
+    "spikes": "{count:g} spikes of {value:.3g} {unit} in all were filled by linear interpolation",
+    "constant_background": (
+        "the background is constant for {value:.3g} {unit} while the force in the contact is "
+        "noisy: small forces are missing, as behind a gate, or samples are lost; offset, levels "
+        "and contact time may be wrong"
+    ),
+    "jump": (
+        "the {what} jumps by {value:.3g} {unit} within the contact: packets or samples are lost, "
+        "filled or exchanged, or a contact is loose; levels and contact time may be wrong"
+    ),
+    "flat_top": (
+        "the force is flat within {fraction:.2g} % for {duration:.3g} ms at its maximum of "
+        "{value:.4g} {unit}: it may be clipped ahead of the recorder"
+    ),
+    "coarse_steps": (
+        "the record has steps of {step:.3g} {unit}, and the background lies within one of them: "
+        "the offset is uncertain by {value:.2g} {unit}; measure with a smaller range"
+    ),
+    "aliasing": (
+        "the force has content up to half the rate, {frequency:g} Hz: without a filter before "
+        "sampling, the octave of 500 Hz may be off by {value:.1f} {unit}"
+    ),
+    "short_background": "there are {value:.1f} {unit} of background {side} the contact",
+    "offset_step": (
+        "the offset changes by {value:.3g} {unit} during the contact; its effect is in the "
+        "uncertainty"
+    ),
+    "plate_rings": (
+        "the plate keeps ringing after the contact, at {frequency:.0f} Hz with {value:.2g} {unit}: "
+        "its resonance affects levels, peaks and contact time; state it in [plate]: "
+        "f0 = {frequency:.0f}, Q = {quality:.2g}"
+    ),
+    "plate_rings_differently": (
+        "the plate keeps ringing after the contact, at {frequency:.0f} Hz with {value:.2g} {unit}: "
+        "its resonance differs from that in [plate]; state it in [plate]: "
+        "f0 = {frequency:.0f}, Q = {quality:.2g}"
+    ),
+    # Load cells.
+    "cell_without_force": "this load cell carries {value:.1%} of the force; it may be dead",
+    "cell_delayed": (
+        "the force of this load cell is {value:.2g} {unit} {side} than that of the others"
+    ),
+    "cell_like_sum": (
+        "is {value:.3g} times the sum of the other channels; if it is their sum with another "
+        "calibration, it counts twice"
+    ),
+    # Drops and bounces.
+    "drop_like_bounce": (
+        "the pulse begins {value:.2f} {unit} after the one before it, as a bounce would, and has "
+        "{ratio:.2f} times its peak: if it is its bounce, the amplifier rounds the force off, and "
+        "all levels are wrong"
+    ),
+    "no_bounce": (
+        "the pulse {value:.0f} {unit} after the contact has {ratio:.2g} times its peak: it is no "
+        "bounce after a drop from {height:g} m"
+    ),
+    "restitution_second": (
+        "the restitution at the second impact is {value:.3f}; that at the first impact is unknown "
+        "without the drop height"
+    ),
+    # The recording as a whole.
+    "peaks_unknown": "the number of peaks is unknown: some may be noise or the plate",
+    "restitution_partly_known": ("the restitution is known of {value:g} of {high:g} drops only"),
+    "restitution_impossible": (
+        "the restitution is {value:.2f}, which is impossible: check mass, height, calibration and "
+        "sample rate"
+    ),
+    "restitutions_differ": (
+        "the restitution by impulse and by bounces differ by {value:.3f}, with an expanded "
+        "uncertainty of {high:.2g}; the effective mass is {mass:.3f} kg: check mass, height and "
+        "calibration"
+    ),
+    "effective_mass": "the mass is not stated: the effective mass is assessed",
+    "outlier": (
+        "{quantity} {value:.6g} lies {score:.4g} standard deviations from the mean of the drops "
+        "(Grubbs, 5 %: {critical:.4g})"
+    ),
+    "uncertainty_not_stated": "uncertainty not stated, and not included: {names}",
+    # Instruments.
+    "plate_assumed": (
+        "not stated, and assumed for levels and peak: the force plate is flat within {percent:g} % "
+        "up to {frequency:g} Hz ([plate]; up to {value:.2g} {unit} at {band:g} Hz)"
+    ),
+    "share_assumed": (
+        "not stated, and assumed for levels and peak: the resonance has the whole static response "
+        "of the plate, or half of it ([plate] share; up to {value:.2g} {unit} at {band:g} Hz)"
+    ),
+    "filter_assumed": (
+        "not stated, and assumed for levels and peak: the filter of the recorder is at a quarter "
+        "of the sample rate or above ([filter]; up to {value:.2g} {unit} at {band:g} Hz)"
+    ),
+    "noise_ends": (
+        "the noise of the background ends near {value:.2g} {unit}: the samples were smoothed, or "
+        "drawn up from a lower rate, which changes levels up to 500 Hz and the contact time; state "
+        "the filter in [filter], or record without it"
+    ),
+    "plate_not_flat": (
+        "force plate: it is flat up to {value:g} {unit}; the standard asks for {low:g} {unit}"
+    ),
+    "plate_requirement": "force plate: {reason}",
+    "plate_estimated": (
+        "the resonance of the force plate is not stated: its estimated effect, up to "
+        "{value:.2g} {unit} at {band:g} Hz, is in the uncertainty"
+    ),
+    "plate_not_recorded": (
+        "the record does not show the stated resonance of {frequency:.4g} Hz: its correction, up "
+        "to {value:.2g} {unit} at {band:g} Hz, is in the uncertainty; check [plate]"
+    ),
+    "plate_unclear": (
+        "the record neither shows nor excludes the stated resonance of {frequency:.4g} Hz: its "
+        "correction, {value:.2f} {unit} at 500 Hz, depends on [plate] alone"
+    ),
+    # Dates.
+    "calibration_overdue": "its calibration was due on {due}, before the measurement",
+    "dates_in_wrong_order": "{event} on {day}, after {other} on {limit}",
+    "date_unknown": (
+        "the date of the measurement cannot be read: whether a calibration was due before is not "
+        "known"
+    ),
 }

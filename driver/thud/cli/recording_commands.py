@@ -38,6 +38,7 @@ def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings.read_recording import read_recording
     from thud.report import recording_files
+    from thud.report.notes import processing, warnings
 
     figures = not options.no_figures
     files = results_of(
@@ -74,7 +75,7 @@ def measure(options: argparse.Namespace) -> int:
         if len(rows) > MAX_PRINTED + 1:
             print_path(f"and {len(rows) - MAX_PRINTED - 1} more drops", folder / "report.json")
         print_results(f"\n{format_rows(recording_files.table(recording))}\n")
-        for step in recording_files.messages(recording, "steps"):
+        for step in processing(recording):
             print_results(f"  {step}")
         print_results(f"  {recording_files.verdict_text(recording)}")
         excluded = recording_files.uncertainty_text(recording)
@@ -82,8 +83,7 @@ def measure(options: argparse.Namespace) -> int:
             print_results(f"  {excluded}")
         if figures:
             print_results(recording_files.missing_text(recording))
-    messages = recording_files.messages(recording, "warnings")
-    print_notes((*recording.own_warnings, *recording.outliers, *messages))
+    print_notes(warnings(recording))
     if not options.quiet:
         print_path("Results", folder)
     return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0

@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING
 from thud.base._schema import VERDICTS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
+    from thud.base.note import Note
     from thud.level.assessment import Criterion
 
 
-def decisive_warnings(effects: Mapping[str, float], criteria: Sequence[Criterion]) -> list[str]:
+def decisive_warnings(notes: Sequence[Note], criteria: Sequence[Criterion]) -> list[Note]:
     """Return the warnings that can change the verdict on a level.
 
-    `effects` are those of `thud.recordings.recording.Recording.level_effects`: a warning is
-    returned if its effect is unknown, or at least the distance of the level to another verdict.
+    These are those whose effect is unknown, or at least the distance of the level to another
+    verdict.
     """
     octave = next(entry for entry in criteria if entry.name == "octave_500")
     distance = _distance(octave)
-    return [text for text, size in effects.items() if 0 < size >= distance]
+    return [note for note in notes if note.is_warning and 0 < note.effect >= distance]
 
 
 def _distance(criterion: Criterion) -> float:

@@ -66,10 +66,15 @@ def answer_recording(
     answer["asks"] = _asks(recording, verdict)
     # The page shows the name of a single file next to its warnings.
     signals = [name for name in names if not _is_laboratory(name)]
-    prefix = f"{signals[0]}: " if len(signals) == 1 else ""
-    answer["warnings"] += [in_words(warning.removeprefix(prefix)) for warning in recording.warnings]
-    open_warnings = decisive_warnings(recording.level_effects, verdict.criteria)
-    answer["open_warnings"] = [in_words(text.removeprefix(prefix)) for text in open_warnings]
+    shown_name = signals[0] if len(signals) == 1 else ""
+    texts = {
+        "warnings": [note for note in recording.notes if note.is_warning],
+        "open_warnings": decisive_warnings(recording.notes, verdict.criteria),
+    }
+    for key, notes in texts.items():
+        answer[key] = [
+            in_words(str(note) if note.subject == shown_name else note.message) for note in notes
+        ]
     return answer
 
 

@@ -172,7 +172,7 @@ def _draw_drops(
 
 def _outliers(recording: Recording) -> NDArray[np.bool_]:
     """Return which drops are outliers, shape (n_drop,)."""
-    names = {outlier.name for outlier in recording.outliers}
+    names = {outlier.subject for outlier in recording.outliers}
     return np.array([drop.name in names for drop in recording.drops])
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import next_fast_len
 
+from thud.base.note import Note
 from thud.level.levels import get_bands, low_pass
 from thud.recordings.plate import TOLERANCE, Plate
 from thud.recordings.recorder_filter import assumed_filter
@@ -76,79 +77,51 @@ def assumed_contributions(
     return {name: values for name, values in contributions.items() if values.any()}
 
 
-def assumption_warnings(drops: Sequence[Drop], config: Config) -> dict[str, float]:
-    """Return a warning for each assumption on the instruments that matters.
-
-    Its value is its effect on the octave of 500 Hz that the uncertainty does not include, dB.
-    """
-    result = {}
+def check_assumptions(drops: Sequence[Drop], config: Config) -> list[Note]:
+    """Return a warning for each assumption on the instruments that matters."""
+    plate, limit = config.resonance, _flat_limit(config)
+    seen = [drop.plate_recorded for drop in drops]
     contributions = assumed_contributions(drops, config)
-
-    def size(name: str) -> str:
-        half_widths = math.sqrt(3) * contributions.get(name, np.zeros(1))
-        band = int(np.nanargmax(half_widths))
-        largest = half_widths[band]
-        text = f"up to {largest:.2f}" if largest >= 0.005 else "less than 0.01"  # noqa: PLR2004
-        return f"{text} dB at {get_bands('octave').nominal[band]:g} Hz"
-
-    plate = config.resonance
     rings = any(drop.ringing for drop in drops)
-    assumed = []
-    if plate is None and not rings and _flat_limit(config) is None:
-        assumed.append(
-            f"the force plate is flat within {100 * TOLERANCE:g} % up to {ASSUMED_FLAT:g} Hz "
-            f"([plate]; {size(ASSUMED_PLATE)})"
-        )
-    if ASSUMED_SHARE in contributions:
-        assumed.append(
-            "the resonance has the whole static response of the plate, or half of it ([plate] "
-            f"share; {size(ASSUMED_SHARE)})"
-        )
-    if config.filter is None:
-        assumed.append(
-            "the filter of the recorder is at a quarter of the sample rate or above "
-            f"([filter]; {size(ASSUMED_FILTER)})"
-        )
+    assumed = {
+        "plate_estimated": (ASSUMED_PLATE, plate is None and rings),
+        "plate_assumed": (ASSUMED_PLATE, plate is None and limit is None and not rings),
+        "share_assumed": (ASSUMED_SHARE, ASSUMED_SHARE in contributions),
+        "filter_assumed": (ASSUMED_FILTER, config.filter is None),
+        "plate_not_recorded": (ASSUMED_PLATE, bool(plate) and True not in seen and False in seen),
+    }
+    notes = [
+        _size_note(code, contributions.get(name), plate)
+        for code, (name, is_assumed) in assumed.items()
+        if is_assumed
+    ]
     slowest = min(drops, key=_effective_rate)
     if config.filter is None and _effective_rate(slowest) < slowest.sample_rate:
-        smooth = (
-            f"the noise of the background ends near {slowest.contact.noise_bandwidth:.2g} Hz: the "
-            "samples were smoothed, or drawn up from a lower rate, which changes levels up to 500 "
-            "Hz and the contact time; state the filter in [filter], or record without it"
-        )
-        result[smooth] = 0.0
-    if assumed:
-        result[f"not stated, and assumed for levels and peak: {'; '.join(assumed)}"] = 0.0
-    limit = _flat_limit(config)
+        bandwidth = slowest.contact.noise_bandwidth
+        notes.append(Note("noise_ends", value=bandwidth, unit="Hz", effect=0.0))
     if limit is not None and limit < ASSUMED_FLAT:
-        flat = f"force plate: it is flat up to {limit:g} Hz; the standard asks for "
-        result[f"{flat}{ASSUMED_FLAT:g} Hz"] = math.inf
-    if plate is None and rings:
-        estimated = "the resonance of the force plate is not stated: its estimated effect, "
-        result[f"{estimated}{size(ASSUMED_PLATE)}, is in the uncertainty"] = 0.0
-    if plate is not None:
-        result |= _plate_warnings(drops, plate, size(ASSUMED_PLATE))
-    return result
+        notes.append(Note("plate_not_flat", value=limit, low=ASSUMED_FLAT, unit="Hz"))
+    if plate is not None and not {True, False} & {*seen}:
+        changes = PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f)))
+        change = float(np.nanmax(np.abs(changes)))
+        others = {"frequency": plate.f0}
+        if change > MIN_WARNED:
+            notes.append(
+                Note("plate_unclear", value=change, unit="dB", effect=change, others=others)
+            )
+    return notes
 
 
-def _plate_warnings(drops: Sequence[Drop], plate: Plate, effect: str) -> dict[str, float]:
-    """Return a warning if a stated resonance is not, or not clearly, in the record."""
-    seen = [drop.plate_recorded for drop in drops]
-    if True in seen:
-        return {}
-    if False in seen:
-        absent = (
-            f"the record does not show the stated resonance of {plate.f0:.4g} Hz: its "
-            f"correction, {effect}, is in the uncertainty; check [plate]"
-        )
-        return {absent: 0.0}
-    changes = PulseSpectra(drops).level_change(lambda f: np.abs(plate.response(f)))
-    change = float(np.nanmax(np.abs(changes)))
-    unclear = (
-        f"the record neither shows nor excludes the stated resonance of {plate.f0:.4g} Hz: "
-        f"its correction, {change:.2f} dB at 500 Hz, depends on [plate] alone"
-    )
-    return {unclear: change} if change > MIN_WARNED else {}
+def _size_note(code: str, uncertainty: NDArray[np.float64] | None, plate: Plate | None) -> Note:
+    """Return a note with the largest half-width of a contribution, dB, shape (n_octave,)."""
+    half_widths = np.zeros(1) if uncertainty is None else math.sqrt(3) * uncertainty
+    band = int(np.nanargmax(half_widths))
+    others = {
+        "band": float(get_bands("octave").nominal[band]),
+        "percent": 100 * TOLERANCE,
+        "frequency": plate.f0 if plate else ASSUMED_FLAT,
+    }
+    return Note(code, value=float(half_widths[band]), unit="dB", effect=0.0, others=others)
 
 
 def with_assumptions(drop: Drop, config: Config) -> Drop:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base.note import Note
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
 from thud.recordings.assumptions import ASSUMED
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
-    from thud.recordings.outliers import Outlier
     from thud.recordings.recorded_levels import AverageLevels
 
 # Change of a level per relative change of a force, dB.
@@ -155,7 +155,7 @@ def drop_estimates(
     }
 
 
-def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tuple[str, ...]:
+def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tuple[Note, ...]:
     """Return a warning if the restitution is impossible, or impulse and bounces differ by more.
 
     They may differ by the expanded uncertainty of their difference.
@@ -163,20 +163,14 @@ def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tupl
     mean, difference = average_restitution(drops, conditions)
     outside = max(-mean.value, mean.value - 1)
     if outside > 0 and outside > mean.expanded:
-        impossible = (
-            f"the restitution is {mean.value:.2f}, which is impossible: check mass, height, "
-            "calibration and sample rate"
-        )
-        return (impossible,)
+        return (Note("restitution_impossible", value=mean.value, low=0, high=1, effect=0.0),)
     if not abs(difference.value) > difference.expanded:
         return ()
-    mass = average_mass(drops, conditions)
-    warning = (
-        f"the restitution by impulse and by bounces differ by {difference.value:.3f}, with an "
-        f"expanded uncertainty of {difference.expanded:.2g}; the effective mass is "
-        f"{mass.value:.3f} kg: check mass, height and calibration"
-    )
-    return (warning,)
+    note = Note(
+        "restitutions_differ", value=difference.value, high=difference.expanded, effect=0.0,
+        others={"mass": average_mass(drops, conditions).value},
+    )  # fmt: skip
+    return (note,)
 
 
 def average_restitution(
@@ -252,10 +246,10 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     )
 
 
-def find_deviant(drops: Sequence[Drop]) -> tuple[Outlier, ...]:
+def find_deviant(drops: Sequence[Drop]) -> tuple[Note, ...]:
     """Return outliers in contact time, restitution or peak force, at 5 % for all three together."""
     names = [drop.name for drop in drops]
-    outliers: list[Outlier] = []
+    outliers: list[Note] = []
     for attribute, title, unit in SEARCHED:
         estimates = [getattr(drop, attribute) for drop in drops]
         outliers += find_outliers(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.recordings.config_values import parse_numbers
-from thud.recordings.drops import LeftOut
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,28 +17,29 @@ if TYPE_CHECKING:
 
 def choose(
     windows: Sequence[Window], first: int, drops: str | None, leave_out: Mapping[str, str]
-) -> tuple[list[Window], tuple[LeftOut, ...]]:
-    """Return the chosen windows, and those that are left out.
+) -> tuple[list[Window], tuple[Note, ...]]:
+    """Return the chosen windows, and notes on those that are left out.
 
     The windows have the numbers from `first` on. `drops` are the numbers of those to be measured,
     all but those whose windows say why not if None; `leave_out` are numbers of others, with the
     reason.
     """
     chosen: list[Window] = []
-    notes: list[LeftOut] = []
+    notes: list[Note] = []
     excluded = [(parse_numbers(text, "leave_out"), why) for text, why in leave_out.items()]
     included = None if drops is None else parse_numbers(drops, "drops")
     for number, window in enumerate(windows, start=first):
         reason = next((why for ranges, why in excluded if _holds(ranges, number)), "")
-        if not reason and included is None:
-            reason = window.left_out
-        elif not reason and included and not _holds(included, number):
-            reason = f"only {drops} were chosen"
-        if not reason:
+        note = window.left_out if included is None else None
+        if reason:
+            note = Note("drop_left_out", others={"reason": reason})
+        elif included is not None and not _holds(included, number):
+            note = Note("drop_not_chosen", others={"chosen": drops or ""})
+        if note is None:
             chosen.append(window)
             continue
         time = (window.start + window.contact[0]) / window.sample_rate
-        notes.append(LeftOut(number, time, reason))
+        notes.append(replace(note, value=number, others={**note.others, "time": time}))
     return chosen, tuple(notes)
 
 

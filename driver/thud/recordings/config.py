@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from thud.base.checks import refuse_unknown
 from thud.base.errors import InputError
 from thud.base.files import read_toml
+from thud.base.note import Note
 from thud.level.levels import SOURCES
 from thud.recordings import dates
 from thud.recordings.channel import shown_path
@@ -200,7 +201,7 @@ class Config(Table):
             self.height_uncertainty or 0.0,
         )
 
-    def check_dates(self, file_dates: Iterable[str]) -> list[str]:
+    def check_dates(self, file_dates: Iterable[str]) -> list[Note]:
         """Return a warning for each date that contradicts another one.
 
         These are calibrations that were due before the measurement, and dates of receipt and issue
@@ -218,21 +219,21 @@ class Config(Table):
         )
         result = [
             *(
-                f"{item.name}: its calibration was due on {item.due}, before the measurement"
+                Note("calibration_overdue", item.name, others={"due": item.due})
                 for item in self.instruments
                 if isinstance(item, Instrument) and item.due and item.due < last
             ),
             *(
-                f"{event} on {day}, after {other} on {limit}"
+                Note(
+                    "dates_in_wrong_order",
+                    others={"event": event, "day": day, "other": other, "limit": limit},
+                )
                 for event, day, other, limit in pairs
                 if day and limit and day > limit
             ),
         ]
         if not last and any(isinstance(item, Instrument) and item.due for item in self.instruments):
-            result.append(
-                "the date of the measurement cannot be read: whether a calibration was due before "
-                "is not known"
-            )
+            result.append(Note("date_unknown"))
         return result
 
     @property

@@ -11,6 +11,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
@@ -83,21 +84,6 @@ class SecondPeak:
     time: float
 
 
-@dataclass(frozen=True)
-class LeftOut:
-    """A pulse that is not measured: its number if it is a drop, its time, s, and why."""
-
-    number: int | None
-    time: float
-    reason: str
-
-    def __str__(self) -> str:
-        """Return a sentence."""
-        if self.number is None:
-            return f"{self.reason} at {self.time:.2f} s is no drop and has no number"
-        return f"drop {self.number} at {self.time:.2f} s was left out: {self.reason}"
-
-
 @dataclass(frozen=True, eq=False)
 class Window:
     """Section of a signal around one drop.
@@ -114,12 +100,12 @@ class Window:
         First and stop index of the contact in the section, accurate to about 1 ms.
     bounces : tuple of Window
         Windows of the bounces after the drop.
-    warnings : tuple of str
+    notes : tuple of Note
         Possible faults of the pulse as a whole.
     second_peak : SecondPeak or None
         A second impact in the pulse.
-    left_out : str
-        Why the drop is measured only if it is chosen; empty if it is not.
+    left_out : Note or None
+        Why the drop is measured only if it is chosen.
     chain : Chain or None
         Instruments whose responses were corrected in the signal.
     quantization : Quantization
@@ -132,9 +118,9 @@ class Window:
     stop: int
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
-    warnings: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     second_peak: SecondPeak | None = None
-    left_out: str = ""
+    left_out: Note | None = None
     chain: Chain | None = None
     quantization: Quantization = field(default_factory=Quantization)
 
@@ -159,8 +145,8 @@ class _Pulse:
     is_step: bool
     second_peak: SecondPeak | None
     bounces: list[_Pulse] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    left_out: str = ""
+    notes: list[Note] = field(default_factory=list)
+    left_out: Note | None = None
 
 
 @dataclass(frozen=True)
@@ -168,7 +154,7 @@ class Search:
     """Windows of the drops in a signal, in order, and the pulses that are no drops."""
 
     windows: list[Window]
-    ignored: tuple[LeftOut, ...]
+    ignored: tuple[Note, ...]
 
 
 def search_drops(
@@ -206,7 +192,7 @@ def search_drops(
     drops, ignored = _assign_bounces(pulses, section, rate)
     before = [pulse for drop in drops if drop.start < section for pulse in (drop, *drop.bounces)]
     ignored += [
-        LeftOut(None, pulse.start / rate, "a bounce of an earlier drop")
+        Note("bounce_ignored", others={"time": pulse.start / rate})
         for pulse in before
         if section <= pulse.start
     ]
@@ -346,14 +332,14 @@ def _second_peak(envelope: NDArray[np.float64], time: float) -> SecondPeak | Non
 
 def _assign_bounces(
     pulses: list[_Pulse], section: int, rate: float
-) -> tuple[list[_Pulse], list[LeftOut]]:
+) -> tuple[list[_Pulse], list[Note]]:
     """Return the drops with their bounces, and the pulses that are neither.
 
     Drops below MIN_DROP times the highest pulse from the sample `section` on are left out, with
     their numbers.
     """
     drops: list[_Pulse] = []
-    ignored: list[LeftOut] = []
+    ignored: list[Note] = []
     flight = MAX_FLIGHT
     before: _Pulse | None = None
     highest = max((p.peak for p in pulses if not p.is_step and p.start >= section), default=0.0)
@@ -364,22 +350,20 @@ def _assign_bounces(
         bounced = in_flight and ratio < NEW_DROP
         lowest = MIN_BOUNCE * (before.peak if bounced and before else highest)
         if pulse.is_step or pulse.peak < lowest:
-            ignored.append(LeftOut(None, pulse.start / rate, f"a pulse of {pulse.peak:.0f} N"))
+            time = {"time": pulse.start / rate}
+            ignored.append(Note("pulse_ignored", value=pulse.peak, unit="N", others=time))
             continue
         if bounced:
             drops[-1].bounces.append(pulse)
             flight = gap
         else:
             if pulse.peak < MIN_DROP * highest:
-                pulse.left_out = (
-                    f"its peak of {pulse.peak:.0f} N is below {MIN_DROP:g} of the highest; choose "
-                    "its number (--drops, drops) if it is a drop"
-                )
+                size = {"peak": pulse.peak, "fraction": MIN_DROP}
+                pulse.left_out = Note("drop_too_small", others=size)
             elif before is not None and in_flight and not before.left_out:
-                pulse.warnings.append(
-                    f"the pulse begins {gap:.2f} s after the one before it, as a bounce would, and "
-                    f"has {ratio:.2f} times its peak: if it is its bounce, the amplifier rounds "
-                    "the force off, and all levels are wrong"
+                others = {"ratio": float(ratio)}
+                pulse.notes.append(
+                    Note("drop_like_bounce", value=float(gap), unit="s", others=others)
                 )
             drops.append(pulse)
             flight = MAX_FLIGHT
@@ -407,7 +391,7 @@ def _windows(
         low, high = min(low, pulse.start), max(high, min(pulse.stop, stop_sample))
         contact = (pulse.start - low, min(pulse.stop, stop_sample) - low)
         return Window(
-            name, signal, low, high, contact, (), tuple(pulse.warnings), pulse.second_peak,
+            name, signal, low, high, contact, (), tuple(pulse.notes), pulse.second_peak,
             pulse.left_out,
         )  # fmt: skip
 

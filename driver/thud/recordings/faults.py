@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,8 +88,8 @@ MIN_JUMP_RATIO = 3.0
 MIN_SIDE_RATIO = 6.0
 
 
-def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with its dropouts and spikes filled, notes, and warnings.
+def repair(window: Window) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    """Return the force with its dropouts and spikes filled, and notes.
 
     Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts or spikes.
     """
@@ -112,7 +113,7 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
     force = window.force
     if window.chain is not None:
         # The recorded force is repaired; its correction rings next to a fault.
-        return force, (), ()
+        return force, ()
     refuse_clipped(window, force)
     _refuse_missing_codes(window, force)
     return fill_dropouts(window, force)
@@ -187,10 +188,10 @@ def _refuse_missing_codes(window: Window, record: NDArray[np.float64]) -> None:
 
 def fill_dropouts(
     window: Window, force: NDArray[np.float64], peak: float | None = None
-) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
-    """Return the force with dropouts and spikes interpolated, notes, and warnings.
+) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
+    """Return the force with dropouts and spikes interpolated, and notes, on a flat top too.
 
-    A flat top raises a warning, too. A jump of a dropout is relative to the peak, N: that of the
+    A jump of a dropout is relative to the peak, N: that of the
     force, if None. Raise InputError if dropouts and spikes last too long.
     """
     rate = window.sample_rate
@@ -203,12 +204,14 @@ def fill_dropouts(
     filled = _interpolated(force, dropouts)
     spikes = _find_spikes(window, filled, peak)
     filled = _interpolated(filled, dropouts | spikes)
-    summaries = [
-        f"{len(np.flatnonzero(np.diff(bad, prepend=False)[bad]))} {name} of "
-        f"{1e3 * np.count_nonzero(bad) / rate:.3g} ms in all"
-        for name, bad in (("dropouts", dropouts), ("spikes", spikes))
+    notes = [
+        Note(
+            code, value=1e3 * np.count_nonzero(bad) / rate, high=1e3 * MAX_REPAIRED, unit="ms",
+            others={"count": len(np.flatnonzero(np.diff(bad, prepend=False)[bad]))},
+        )
+        for code, bad in (("dropouts", dropouts), ("spikes", spikes))
         if bad.any()
-    ]
+    ]  # fmt: skip
     margin = int(CONTACT_MARGIN * rate)
     near = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
     if np.count_nonzero((dropouts | spikes)[near]) > MAX_REPAIRED * rate:
@@ -219,22 +222,16 @@ def fill_dropouts(
                 f"{rate / group:g} Hz",
                 f"each sample once, at {rate / group:g} Hz",
             )
+        summaries = [f"{n.others['count']} {n.code} of {n.value:.3g} ms in all" for n in notes]
         refuse(
             f"{window.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
         )
-    return (
-        filled,
-        tuple(f"{summary} were filled by linear interpolation" for summary in summaries),
-        (
-            *(f"the record has {summary}" for summary in summaries),
-            *check_constant(window, force),
-            *_check_top(window, filled[slice(*window.contact)] - offset),
-        ),
-    )
+    top = _check_top(window, filled[slice(*window.contact)] - offset)
+    return filled, (*notes, *check_constant(window, force), *top)
 
 
-def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
+def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[Note, ...]:
     """Return a warning if the background is constant, at least in part, and the contact noisy.
 
     Raise InputError if the force is held over first touch or release.
@@ -259,15 +256,10 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[str, ...
             "contact while the samples around it are noisy",
             "a recording without lost samples",
         )
-    warning = (
-        f"the background is constant for {total:.3g} ms while the force in the contact is noisy: "
-        "small forces are missing, as behind a gate, or samples are lost; offset, levels and "
-        "contact time may be wrong"
-    )
-    return (warning,)
+    return (Note("constant_background", value=total, unit="ms"),)
 
 
-def check_jumps(contact: Contact) -> tuple[str, ...]:
+def check_jumps(contact: Contact) -> tuple[Note, ...]:
     """Return a warning if the force or its slope jumps within a contact, away from its ends.
 
     A jump is the distance between the lines through the samples before and after it, at the middle
@@ -284,26 +276,23 @@ def check_jumps(contact: Contact) -> tuple[str, ...]:
     first = max(int(contact.touch.value * rate + margin) - start, 0)
     stop = int(contact.release.value * rate - margin) - start
     least = max(MIN_SPIKE * contact.peak, MIN_STEPS * contact.background.quantization.step)
-    for name, before, after in (("", line, line[::-1]), ("slope of the ", slope, slope)):
+    for what, before, after in (
+        ("force", line, line[::-1]), ("slope of the force", slope, slope),
+    ):  # fmt: skip
         jump = np.abs(np.correlate(force, np.concatenate([before, -after]), mode="valid"))
         sides = _largest_beside(jump, count + 1, 3 * count)
         limit = MIN_JUMP_RATIO * sides.max(axis=0)
-        if not name:
+        if what == "force":
             limit = np.minimum(limit, MIN_SIDE_RATIO * sides.min(axis=0))
         limit = np.maximum(limit, least)
         found = (jump > limit)[first : max(stop, first)]
         if found.any():
             size = float(jump[first:stop][found].max())
-            warning = (
-                f"the {name}force jumps by {size:.3g} N within the contact: packets or samples "
-                "are lost, filled or exchanged, or a contact is loose; levels and contact time may "
-                "be wrong"
-            )
-            return (warning,)
+            return (Note("jump", value=size, unit="N", others={"what": what}),)
     return ()
 
 
-def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
+def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[Note, ...]:
     """Return a warning if the top of a force without offset, N, is flat."""
     rate = window.sample_rate
     width = max(1, round(SMOOTHING * rate))
@@ -318,11 +307,8 @@ def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[str, ...]:
     for fraction in lowest * 2.0 ** np.arange(math.log2(max(MAX_FLAT / lowest, 0.5)) + 1):
         inner, outer = (_count_above(smooth, (1 - k * fraction) * peak) for k in (1, 4))
         if outer < MAX_RATIO * inner and inner > MIN_TOP * rate:
-            warning = (
-                f"the force is flat within {100 * fraction:.2g} % for {1e3 * inner / rate:.3g} ms "
-                f"at its maximum of {peak:.4g} N: it may be clipped ahead of the recorder"
-            )
-            return (warning,)
+            size = {"fraction": 100 * float(fraction), "duration": 1e3 * inner / rate}
+            return (Note("flat_top", value=float(peak), unit="N", others=size),)
     return ()
 
 

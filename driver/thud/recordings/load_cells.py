@@ -131,8 +131,8 @@ def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.fl
     return total
 
 
-def repair_cells(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
-    """Return a window whose dropouts are filled in each load cell, notes, and warnings.
+def repair_cells(window: Window) -> tuple[Window, tuple[Note, ...]]:
+    """Return a window whose dropouts are filled in each load cell, and notes.
 
     Raise InputError if a cell is clipped or has long dropouts, or a cell is the sum of the others.
     """
@@ -140,34 +140,33 @@ def repair_cells(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ..
     forces = [cell.read(window.start, window.stop) for cell in cells]
     first, stop = window.contact
     peak = float(np.ptp(np.sum(forces, axis=0)[first:stop]))
-    steps, warnings = tuple[str, ...](), tuple[str, ...]()
+    notes: list[Note] = []
     filled = []
     for cell, force in zip(cells, forces, strict=True):
         section = replace(window, name=cell.name, signal=cell)
         refuse_clipped(section, force)
-        values, notes, cell_warnings = fill_dropouts(section, force, peak)
+        values, faults = fill_dropouts(section, force, peak)
         filled.append(values)
-        steps += tuple(f"{cell.name}: {note}" for note in notes)
-        warnings += tuple(f"{cell.name}: {warning}" for warning in cell_warnings)
-    warnings += _refuse_total(window, [force[first:stop] for force in filled])
-    warnings += _compare_cells(window, filled)
+        notes += (replace(note, others={**note.others, "cell": cell.name}) for note in faults)
+    notes += _refuse_total(window, [force[first:stop] for force in filled])
+    notes += _compare_cells(window, filled)
     repaired = partial(read_repaired, window.signal, window.start, np.sum(filled, axis=0))
     signal = replace(window.signal, samples=repaired, cells=())
-    return replace(window, signal=signal), steps, warnings
+    return replace(window, signal=signal), tuple(notes)
 
 
-def _compare_cells(window: Window, forces: Sequence[NDArray[np.float64]]) -> tuple[str, ...]:
+def _compare_cells(window: Window, forces: Sequence[NDArray[np.float64]]) -> list[Note]:
     """Return warnings on cells without a force, and on the cell that is late or early."""
     first, stop = window.contact
     levels = [force - np.median(np.append(force[:first], force[stop:])) for force in forces]
     total = np.sum(levels, axis=0)
     shares = [float(level[first:stop].sum() / total[first:stop].sum()) for level in levels]
     cells = window.signal.cells
-    warnings = tuple(
-        f"{cell.name}: this load cell carries {share:.1%} of the force; it may be dead"
+    notes = [
+        Note("cell_without_force", value=share, others={"cell": cell.name})
         for cell, share in zip(cells, shares, strict=True)
         if abs(share) < MIN_SHARE
-    )
+    ]
     margin = round(MAX_DELAY * window.sample_rate)
     around = slice(max(first - margin, 0), stop + margin)
     delays = [
@@ -177,10 +176,9 @@ def _compare_cells(window: Window, forces: Sequence[NDArray[np.float64]]) -> tup
     latest = int(np.argmax(np.abs(delays)))
     delay = delays[latest] / window.sample_rate
     if abs(delay) > MIN_DELAY:
-        side = "later" if delay > 0 else "earlier"
-        lag = f"{1e3 * abs(delay):.2g} ms {side} than that of the others"
-        warnings += (f"{cells[latest].name}: the force of this load cell is {lag}",)
-    return warnings
+        others = {"cell": cells[latest].name, "side": "later" if delay > 0 else "earlier"}
+        notes.append(Note("cell_delayed", value=1e3 * abs(delay), unit="ms", others=others))
+    return notes
 
 
 def _delay(level: NDArray[np.float64], others: NDArray[np.float64], maximum: int) -> float:
@@ -200,7 +198,7 @@ def _delay(level: NDArray[np.float64], others: NDArray[np.float64], maximum: int
     return float(best - maximum - 1 + (before - after) / (2 * (before - 2 * peak + after)))
 
 
-def _refuse_total(window: Window, forces: Sequence[NDArray[np.float64]]) -> tuple[str, ...]:
+def _refuse_total(window: Window, forces: Sequence[NDArray[np.float64]]) -> tuple[Note, ...]:
     """Raise InputError if a channel is the sum of the others, which would count twice.
 
     Return a warning if it may be their sum with another calibration.
@@ -223,9 +221,5 @@ def _refuse_total(window: Window, forces: Sequence[NDArray[np.float64]]) -> tupl
         is_similar = np.ptp(factor * others - force) < MAX_DEVIATION * np.ptp(others)
         # One of three cells may well carry half of the force.
         if len(forces) > 3 and is_similar and abs(factor - 1) < MAX_FACTOR_DEVIATION:  # noqa: PLR2004
-            message = (
-                f"{cell.name}: is {factor:.3g} times the sum of the other channels; if it is their "
-                "sum with another calibration, it counts twice"
-            )
-            return (message,)
+            return (Note("cell_like_sum", value=factor, others={"cell": cell.name}),)
     return ()

@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.base.note import Note, about
 from thud.recordings.assumptions import with_assumptions
 from thud.recordings.choice import choose, require_chosen
 from thud.recordings.drops import search_drops
@@ -37,7 +38,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Origin:
-    """Signal from which drops were measured: attributes of `Signal`, and the number of drops."""
+    """Signal from which drops were measured: attributes of `Signal`, and the number of drops.
+
+    Its notes are those of the signal, and on pulses that are not measured.
+    """
 
     name: str
     path: str
@@ -45,20 +49,16 @@ class Origin:
     date: str
     calibration: str
     sample_rate: float
-    steps: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notes: tuple[Note, ...]
     drops: int
 
     @classmethod
-    def of(cls, signal: Signal, drops: int, notes: tuple[str, ...]) -> Origin:
+    def of(cls, signal: Signal, drops: int, notes: Iterable[Note]) -> Origin:
         """Return the origin of a number of drops of a signal, with notes on others."""
         names = ("name", "path", "checksum", "date", "calibration", "sample_rate")
-        steps = (str(note) for note in signal.notes if not note.is_warning)
-        warnings = (f"{note.subject}: {note}" for note in signal.notes if note.is_warning)
         return cls(
             **{name: getattr(signal, name) for name in names},
-            steps=(*steps, *notes),
-            warnings=tuple(warnings),
+            notes=(*signal.notes, *about(signal.name, notes)),
             drops=drops,
         )
 
@@ -80,19 +80,14 @@ def measure_signals(
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     count = 0
-    section: tuple[str, ...] = ()
-    if not (config.begin is None and config.end is None):
-        end = "the end" if config.end is None else f"{config.end:g} s"
-        section = (f"searched for drops from {config.begin or 0:g} s to {end} only",)
+    begin, end = config.begin or 0.0, config.end or math.inf
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
         for signal in signals:
             if config.calibration_uncertainty is not None:
                 signal = replace(signal, calibration_uncertainty=config.calibration_uncertainty)  # noqa: PLW2901
             refuse_copy(signal, records)
-            search = search_drops(
-                signal, config.begin or 0.0, config.end or math.inf, progress=progress
-            )
+            search = search_drops(signal, begin, end, progress=progress)
             windows, left_out = choose(search.windows, count + 1, config.drops, config.leave_out)
             count += len(search.windows)
             # Small pulses may be what a channel picks up of another one.
@@ -101,7 +96,7 @@ def measure_signals(
             searched.append((signal.path, own))
             bar = tqdm(windows, unit="drop", desc=signal.name, disable=not progress, leave=False)
             measured = tuple(measure_window(window, config) for window in bar)
-            notes = (*section, *map(str, (*search.ignored, *left_out)))
+            notes = (*_section(signal, begin, end), *search.ignored, *left_out)
             records.append(Record(signal.name, signal.path, signal.checksum, measured))
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows), notes))
@@ -115,30 +110,40 @@ def measure_signals(
     return drops, tuple(origins), uncertainty
 
 
+def _section(signal: Signal, begin: float, end: float) -> tuple[Note, ...]:
+    """Return a note if a section of a signal is searched, not all of it."""
+    length = signal.n_sample / signal.sample_rate
+    if begin == 0 and end >= length:
+        return ()
+    return (Note("section_searched", low=begin, high=min(end, length), unit="s"),)
+
+
 def measure_window(window: Window, config: Config) -> Drop:
     """Return the drop in a window, after correction of the responses of the instruments."""
-    steps, warnings = tuple[str, ...](), tuple[str, ...]()
+    notes: list[Note] = []
     window = replace(window, quantization=find_quantization(window))
     if window.signal.cells:
-        window, steps, warnings = repair_cells(window)
-    window, notes, further = remove_tones(window)
-    steps, warnings = (*steps, *notes), (*warnings, *further)
+        window, faults = repair_cells(window)
+        notes += faults
+    window, removed = remove_tones(window)
+    notes += removed
     chain, plate, recorded = config.chain, config.resonance, window
     if chain is not None:
-        window, notes, further = correct_window(window, chain)
-        steps, warnings = (*steps, *notes), (*warnings, *further)
+        window, corrected = correct_window(window, chain)
+        notes += corrected
     drop = measure_drop(window, config.conditions(window.signal.calibration_uncertainty))
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(drop.contact, background=replace(drop.contact.background))
     ringing = find_ringing(contact, chain)
-    rings = {str(ringing): 0.0} if ringing else {}
+    notes += drop.notes
+    if ringing:
+        notes.append(ringing.note)
+    # A flat top stays flat without tones.
+    different = [note for k, note in enumerate(notes) if note not in notes[:k]]
     drop = replace(
         drop,
         contact=contact,
-        steps=(*steps, *drop.steps),
-        # A flat top stays flat without tones.
-        warnings=tuple(dict.fromkeys((*warnings, *drop.warnings, *rings))),
-        level_effects=drop.level_effects | rings,
+        notes=about(drop.name, different),
         ringing=ringing,
         plate_recorded=None if plate is None else is_in_record(recorded, contact, plate),
     )

@@ -15,6 +15,7 @@ from scipy.signal import resample
 
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable
+from thud.base.note import Note
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.contact import SAMPLE_ERROR, Contact, estimate_limits, find_contact
@@ -94,13 +95,10 @@ class Drop(Immutable):
     bounces : tuple of float
         Times at which the measured bounces begin, s since first touch: one bounce if the drop
         height is known, else up to two.
-    steps, warnings : tuple of str
-        Processing of the signal, and possible faults, a sentence each.
+    notes : tuple of Note
+        Processing of the signal, and possible faults.
     contact : Contact
         Times, background and gate of the contact.
-    level_effects : dict of str to float
-        Effects of those warnings of which it is known, on the octave of 500 Hz, dB: what its
-        uncertainty does not include; zero if there is none.
     offset_step : float
         Change of the offset during the contact, N; zero if there is none.
     ringing : Ringing or None
@@ -126,10 +124,8 @@ class Drop(Immutable):
     effective_mass: Estimate
     noise: Noise
     bounces: tuple[float, ...]
-    steps: tuple[str, ...]
-    warnings: tuple[str, ...]
+    notes: tuple[Note, ...]
     contact: Contact
-    level_effects: dict[str, float]
     offset_step: float = 0.0
     ringing: Ringing | None = None
     plate_recorded: bool | None = None
@@ -153,7 +149,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
 
     Raise InputError if the pulse is clipped, cut off or doubled, or has long dropouts.
     """
-    force, steps, warnings = repair(window)
+    force, faults = repair(window)
+    notes = [*window.notes, *faults]
     try:
         contact = find_contact(window, force)
     except np.linalg.LinAlgError as error:
@@ -164,7 +161,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         )
     for side, length in zip(("before", "after"), contact.background_lengths, strict=True):
         if length < SHORT_BACKGROUND:
-            warnings += (f"there are {1e3 * length:.1f} ms of background {side} the contact",)
+            note = Note("short_background", unit="ms", others={"side": side})
+            notes.append(replace(note, value=1e3 * length, low=1e3 * SHORT_BACKGROUND))
     contact_time = _between(contact.begin, contact.end)
     if not contact_time.value > MIN_CONTACT_RATIO * contact_time.uncertainty:
         refuse(
@@ -173,17 +171,11 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
             f"{1e3 * contact_time.uncertainty:.2g} ms",
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
-    level_effects: dict[str, float] = {}
     if window.chain is None:
-        warnings += check_jumps(contact)
+        notes += check_jumps(contact)
     offset_step = find_offset_step(contact)
     if offset_step:
-        changed = (
-            f"the offset changes by {offset_step:.3g} N during the contact; its effect is in the "
-            "uncertainty"
-        )
-        warnings += (changed,)
-        level_effects[changed] = 0.0
+        notes.append(Note("offset_step", value=offset_step, unit="N", effect=0.0))
     impulse, peak_force = _impulse(contact), _peak(contact)
     if offset_step:
         errors = step_errors(offset_step, len(contact.gated))
@@ -198,17 +190,15 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         expected = GRAVITY * flight / (2 * conditions.speed)
         if not peak / MAX_BOUNCE_RATIO < expected < peak * MAX_BOUNCE_RATIO:
             landings = []
-            no_bounce = (
-                f"the pulse {1e3 * flight:.0f} ms after the contact has {peak:.2g} times its peak: "
-                f"it is no bounce after a drop from {conditions.height:g} m"
+            others = {"ratio": peak, "height": conditions.height}
+            notes.append(
+                Note("no_bounce", value=1e3 * flight, unit="ms", effect=0.0, others=others)
             )
-            warnings += (no_bounce,)
-            level_effects[no_bounce] = 0.0
     ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     duration = _between(contact.touch, contact.release)
     methods, unknown = conditions.restitutions(impulse, duration, flights)
-    aliasing = _check_aliasing(contact, window.chain)
+    notes += (*_check_aliasing(contact, window.chain), *_check_step(window, contact), *unknown)
     restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
     rate, first = window.sample_rate, contact.span[0]
     return Drop(
@@ -229,16 +219,8 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         effective_mass=conditions.effective_mass(impulse, duration, methods.get(BOUNCES)),
         noise=_noise(contact),
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
-        steps=(*steps, *_removed(contact)),
-        warnings=(
-            *window.warnings,
-            *warnings,
-            *aliasing,
-            *_check_step(window, contact),
-            *unknown,
-        ),
+        notes=(*_removed(contact), *notes),
         contact=contact,
-        level_effects=level_effects | aliasing | dict.fromkeys(unknown, 0.0),
     )
 
 
@@ -330,33 +312,31 @@ def _noise(contact: Contact) -> Noise:
     return Noise(deviation, "before and after", white, pink, brown)
 
 
-def _removed(contact: Contact) -> tuple[str, ...]:
+def _removed(contact: Contact) -> tuple[Note, ...]:
+    """Return notes on what was removed with the background."""
     first, stop = (index - contact.span[0] for index in contact.gate)
     offset = float(contact.removed[first:stop].mean())
-    steps = [f"an offset of {offset:.3g} N was removed"]
+    notes = [Note("offset_removed", value=offset, unit="N")]
     drift, deviation = contact.background.drift
     if abs(drift) > MIN_DEVIATIONS * deviation:
-        steps.append(f"a drift of {drift:.3g} N/s was removed")
+        notes.append(Note("drift_removed", value=float(drift), unit="N/s"))
     frequency, amplitude, deviation = contact.background.hum
     if amplitude > MIN_DEVIATIONS * deviation:
-        steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
-    return tuple(steps)
+        hum = {"frequency": float(frequency)}
+        notes.append(Note("hum_removed", value=float(amplitude), unit="N", others=hum))
+    return tuple(notes)
 
 
-def _check_step(window: Window, contact: Contact) -> tuple[str, ...]:
+def _check_step(window: Window, contact: Contact) -> tuple[Note, ...]:
     """Return a warning if the background of a coarse record lies within a quantization step."""
     step, offset = window.quantization.step, contact.background.quantization.offset
     if offset < MAX_OFFSET * contact.peak:
         return ()
-    warning = (
-        f"the record has steps of {step:.3g} N, and the background lies within one of them: the "
-        f"offset is uncertain by {offset:.2g} N; measure with a smaller range"
-    )
-    return (warning,)
+    return (Note("coarse_steps", value=offset, unit="N", others={"step": step}),)
 
 
-def _check_aliasing(contact: Contact, chain: Chain | None) -> dict[str, float]:
-    """Return a warning and its size, dB, if content may alias into the octave of 500 Hz.
+def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[Note, ...]:
+    """Return a warning if content may alias into the octave of 500 Hz.
 
     This is content above half the rate. The amplitude of a pulse with kinks is assumed to fall as
     1/f**2 there; stated instruments reduce it further.
@@ -375,9 +355,6 @@ def _check_aliasing(contact: Contact, chain: Chain | None) -> dict[str, float]:
         folded *= abs(chain.response(np.array([rate - upper]))[0]) ** 2
     error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
     if error < MAX_ALIASING_ERROR:
-        return {}
-    warning = (
-        f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
-        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
-    )
-    return {warning: error}
+        return ()
+    others = {"frequency": rate / 2}
+    return (Note("aliasing", value=error, unit="dB", effect=error, others=others),)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import stdtrit
 
+from thud.base.note import Note
 from thud.level.estimate import NORMAL_FACTOR
 
 if TYPE_CHECKING:
@@ -22,40 +22,16 @@ SIGNIFICANCE = 0.05
 ROUNDING = 1e-9
 
 
-@dataclass(frozen=True)
-class Outlier:
-    """A drop that differs from the others by more than chance: marked, never excluded.
-
-    Attributes are the name of the drop, quantity and value, the deviation from the mean in standard
-    deviations, and its critical value.
-    """
-
-    name: str
-    quantity: str
-    value: float
-    score: float
-    critical: float
-
-    def __str__(self) -> str:
-        """Return a sentence, with the decimals that tell the score from its critical value."""
-        for decimals in range(2, 16):
-            score, critical = f"{self.score:.{decimals}f}", f"{self.critical:.{decimals}f}"
-            if score != critical:
-                break
-        return (
-            f"{self.name}: {self.quantity} {self.value:.6g} lies {score} standard "
-            f"deviations from the mean of the drops (Grubbs, 5 %: {critical})"
-        )
-
-
 def find_outliers(
     values: Sequence[float] | NDArray[np.float64],
     names: Sequence[str],
     quantity: str,
     uncertainty: Sequence[float] | NDArray[np.float64] | None = None,
     significance: float = SIGNIFICANCE,
-) -> tuple[Outlier, ...]:
-    """Return the drops whose value differs from those of the other drops.
+) -> tuple[Note, ...]:
+    """Return a note on each drop whose value differs from those of the other drops.
+
+    Such a drop is marked, never excluded.
 
     The test is Grubbs' two-sided one, exact for three and more normal values; from ten values on,
     Rosner's generalization allows one outlier in five values. The significance is the probability
@@ -66,7 +42,7 @@ def find_outliers(
     data = np.asarray(values, dtype=np.float64)
     uncertainties = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
     remaining = np.flatnonzero(np.isfinite(data))
-    removed: list[Outlier] = []
+    removed: list[Note] = []
     last = 0
     for step in range(max(1, len(remaining) // 5)):
         count = len(remaining)
@@ -80,7 +56,12 @@ def find_outliers(
         quantile = stdtrit(count - 2, 1 - significance / (2 * count))
         critical = (count - 1) / math.sqrt(count) * quantile / math.sqrt(count - 2 + quantile**2)
         score = distance / deviation
-        removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
+        size: dict[str, float | str] = {
+            "quantity": quantity,
+            "score": float(score),
+            "critical": float(critical),
+        }
+        removed.append(Note("outlier", names[worst], float(data[worst]), others=size))
         remaining = remaining[remaining != worst]
         # Rosner: outliers are all values up to the last one that exceeds its critical value.
         if score > critical and distance > NORMAL_FACTOR * uncertainties[worst]:

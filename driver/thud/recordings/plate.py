@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.base.units import frequency_text
 from thud.level.estimate import NORMAL_FACTOR
 from thud.level.levels import get_bands
@@ -85,15 +86,14 @@ class Plate(Table):
         """Duration of the ringing, s."""
         return RINGING * self.Q / self.f0
 
-    def describe(self, sample_rate: float) -> str:
-        """Describe the correction at a sample rate, Hz."""
+    def note(self, sample_rate: float) -> Note:
+        """Return a note on the correction at a sample rate, Hz."""
         highest = min(self.highest, sample_rate / 2)
         gain = 1 / abs(self.response(np.array([highest]))[0])
-        return (
-            f"force plate: resonance of {frequency_text(self.f0)}, "
-            f"quality {self.Q:g}, corrected up to {frequency_text(highest)}; "
-            f"noise there times {gain:.2g}"
-        )
+        return Note(
+            "plate_corrected", value=self.f0, high=highest, unit="Hz",
+            others={"quality": self.Q, "gain": gain},
+        )  # fmt: skip
 
     def require_above(self, edge: float) -> None:
         """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""

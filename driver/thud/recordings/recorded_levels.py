@@ -18,7 +18,7 @@ from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels
 from thud.recordings.offset_step import step_errors
-from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
+from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet
+    from thud.base.note import Note
     from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
@@ -99,7 +100,7 @@ class AverageLevels(Immutable):
         Standard uncertainties of the average, dB. The repeatability, with ``n_drop - 1`` degrees of
         freedom, includes the noise, which is independent between drops; `noise_exceeds` tells
         which of the two counts.
-    outliers : tuple of Outlier
+    outliers : tuple of Note
         Drops that differ from the others.
     """
 
@@ -113,7 +114,7 @@ class AverageLevels(Immutable):
     flag: NDArray[np.str_]
     spread: NDArray[np.float64]
     contributions: dict[str, NDArray[np.float64]]
-    outliers: tuple[Outlier, ...] = field(default=())
+    outliers: tuple[Note, ...] = field(default=())
 
 
 def measure_levels(
@@ -287,7 +288,7 @@ def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float
 
 def _level_outliers(
     estimates: Sequence[DropLevels], drops: NDArray[np.float64]
-) -> tuple[Outlier, ...]:
+) -> tuple[Note, ...]:
     """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
     nominal = get_bands(estimates[0].bands).nominal
     names = [e.name for e in estimates]

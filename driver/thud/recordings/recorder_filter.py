@@ -10,6 +10,7 @@ import numpy as np
 from scipy.signal import bessel, butter, freqs_zpk
 
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.base.units import frequency_text
 from thud.recordings.config_values import Choice, Number, Table, Whole, key
 
@@ -71,13 +72,13 @@ class RecorderFilter(Table):
         """Duration of the response to an impulse, s."""
         return DECAY / self.cutoff
 
-    def describe(self, sample_rate: float) -> str:
-        """Describe the correction at a sample rate, Hz."""
+    def note(self, sample_rate: float) -> Note:
+        """Return a note on the correction at a sample rate, Hz."""
         highest = min(self.highest, sample_rate / 2)
-        return (
-            f"{self.kind.capitalize()} filter of order {self.order}, "
-            f"-3 dB at {frequency_text(self.cutoff)}, corrected up to {frequency_text(highest)}"
-        )
+        return Note(
+            "filter_corrected", value=self.cutoff, high=highest, unit="Hz",
+            others={"kind": self.kind.capitalize(), "order": self.order or 0},
+        )  # fmt: skip
 
     def require_above(self, edge: float) -> None:
         """Raise InputError if the response is below 1/3 at the highest edge of bands, Hz."""

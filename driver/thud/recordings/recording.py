@@ -13,10 +13,11 @@ import numpy as np
 from thud.base.checks import require_kind, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
+from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
 from thud.level.impact_result import DropForce
-from thud.recordings.assumptions import assumed_contributions, assumption_warnings
+from thud.recordings.assumptions import assumed_contributions, check_assumptions
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
 from thud.recordings.config import Config
 from thud.recordings.measure_drops import measure_signals
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from thud.level.estimate import Estimate
     from thud.recordings.measure_drops import Origin
     from thud.recordings.measured_drop import Drop
-    from thud.recordings.outliers import Outlier
     from thud.recordings.recorded_levels import AverageLevels
 
 
@@ -227,53 +227,40 @@ class Recording(Displayed):
         return float(np.mean([drop.impulse.value for drop in self.drops]))
 
     @property
+    def notes(self) -> tuple[Note, ...]:
+        """Possible faults and processing of the recording, its files and its drops."""
+        of_files = (note for origin in self.origins for note in origin.notes)
+        return (*self.own_notes, *of_files, *(note for drop in self.drops for note in drop.notes))
+
+    @property
     def warnings(self) -> tuple[str, ...]:
-        """Possible faults of the recording, its files and drops, a sentence each."""
-        result = [*self.own_warnings, *map(str, self.outliers)]
-        result += [warning for origin in self.origins for warning in origin.warnings]
-        result += [f"{drop.name}: {warning}" for drop in self.drops for warning in drop.warnings]
-        return tuple(dict.fromkeys(result))
-
-    @property
-    def own_warnings(self) -> tuple[str, ...]:
-        """Possible faults of the recording as a whole, a sentence each."""
-        return tuple(self._own_effects)
-
-    @property
-    def level_effects(self) -> dict[str, float]:
-        """Effects of warnings on the octave of 500 Hz, dB: what its uncertainty does not include.
-
-        Zero without an effect, infinite if unknown.
-        """
-        of_drops = {
-            f"{drop.name}: {text}": effect
-            for drop in self.drops
-            for text, effect in drop.level_effects.items()
-        }
-        return dict.fromkeys(self.warnings, math.inf) | self._own_effects | of_drops
+        """Those of `notes` that are warnings, a sentence each."""
+        return tuple(note.message for note in self.notes if note.is_warning)
 
     @cached_property
-    def _own_effects(self) -> dict[str, float]:
-        """Warnings on the recording as a whole, with their effects as in `level_effects`."""
-        config, others, on_force = self.config, list[str](), list[str]()
+    def own_notes(self) -> tuple[Note, ...]:
+        """Possible faults of the recording as a whole, and its outliers."""
+        config, known = self.config, [d for d in self.drops if math.isfinite(d.restitution.value)]
+        notes: list[Note] = []
         if math.isnan(self.estimates["peaks"].value):
-            others.append("the number of peaks is unknown: some may be noise or the plate")
-        known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
-        if 0 < known < len(self.drops):
-            others.append(f"the restitution is known of {known} of {len(self.drops)} drops only")
-        others += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
+            notes.append(Note("peaks_unknown", effect=0.0))
+        if 0 < len(known) < len(self.drops):
+            note = Note("restitution_partly_known", effect=0.0)
+            notes.append(replace(note, value=len(known), high=len(self.drops)))
+        notes += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            others.append("the mass is not stated: the effective mass is assessed")
-        on_force += [
-            f"force plate: {check.reason}" for check in config.plate_checks if check.met is False
-        ]
-        on_force += config.check_dates(origin.date for origin in self.origins)
-        effects = dict.fromkeys(others, 0.0) | dict.fromkeys(on_force, math.inf)
-        effects |= assumption_warnings(self.drops, config)
+            notes.append(Note("effective_mass", effect=0.0))
+        notes += (
+            Note("plate_requirement", others={"reason": check.reason})
+            for check in config.plate_checks
+            if check.met is False
+        )
+        notes += config.check_dates(origin.date for origin in self.origins)
+        notes += check_assumptions(self.drops, config)
         if self.not_stated:
-            names = ", ".join(self.not_stated)
-            effects[f"uncertainty not stated, and not included: {names}"] = 0.0
-        return effects
+            names = {"names": ", ".join(self.not_stated)}
+            notes.append(Note("uncertainty_not_stated", effect=0.0, others=names))
+        return (*notes, *self.outliers)
 
     @property
     def not_stated(self) -> tuple[str, ...]:
@@ -288,13 +275,6 @@ class Recording(Displayed):
             "drop height": config.height is not None and config.height_uncertainty is None,
         }
         return tuple(name for name in missing if missing[name])
-
-    @property
-    def steps(self) -> tuple[str, ...]:
-        """Processing of the signals, a sentence each."""
-        result = [f"{origin.name}: {step}" for origin in self.origins for step in origin.steps]
-        result += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
-        return tuple(dict.fromkeys(result))
 
     def quantity(self, name: str) -> float:
         """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
@@ -350,7 +330,7 @@ class Recording(Displayed):
         )
 
     @cached_property
-    def outliers(self) -> tuple[Outlier, ...]:
+    def outliers(self) -> tuple[Note, ...]:
         """Drops that differ in a level, the contact time, the restitution or the peak force.
 
         They are not excluded. The significance is 5 % for all levels, and 5 % for all others.
@@ -419,5 +399,8 @@ class Recording(Displayed):
             origin=f"recording {measured.name}, {origin.calibration or 'calibration not known'}",
             checksum=origin.checksum,
             date=origin.date,
-            notes=(*measured.steps, f"noise of {measured.noise.deviation:.3g} N remains"),
+            notes=(
+                *(str(note) for note in measured.notes if not note.is_warning),
+                str(Note("noise_remains", value=measured.noise.deviation, unit="N")),
+            ),
         )

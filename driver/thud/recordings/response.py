@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
+    from thud.base.note import Note
     from thud.recordings.drops import Window
     from thud.recordings.signal import Signal
 
@@ -41,8 +42,8 @@ class Response(Protocol):
         """Return the ratio of measured and applied force, at frequencies in Hz."""
         ...
 
-    def describe(self, sample_rate: float) -> str:
-        """Describe the correction at a sample rate, Hz."""
+    def note(self, sample_rate: float) -> Note:
+        """Return a note on the correction at a sample rate, Hz."""
         ...
 
     def require_above(self, edge: float) -> None:
@@ -109,13 +110,13 @@ def correct_force(
     return corrected
 
 
-def correct_window(window: Window, chain: Chain) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
-    """Return a window of the applied force, the processing, and warnings.
+def correct_window(window: Window, chain: Chain) -> tuple[Window, tuple[Note, ...]]:
+    """Return a window of the applied force, and notes.
 
     Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
     """
     # Faults must be found in the recorded force; the correction would make a dropout ring.
-    force, steps, warnings = repair(window)
+    force, notes = repair(window)
     repaired = replace(
         window.signal, samples=partial(read_repaired, window.signal, window.start, force)
     )
@@ -123,8 +124,8 @@ def correct_window(window: Window, chain: Chain) -> tuple[Window, tuple[str, ...
         window.signal, samples=partial(_read_corrected, repaired, chain), full_scale=None
     )
     bounces = tuple(replace(bounce, signal=applied, chain=chain) for bounce in window.bounces)
-    steps += tuple(instrument.describe(window.sample_rate) for instrument in chain.instruments)
-    return replace(window, signal=applied, bounces=bounces, chain=chain), steps, warnings
+    notes += tuple(instrument.note(window.sample_rate) for instrument in chain.instruments)
+    return replace(window, signal=applied, bounces=bounces, chain=chain), notes
 
 
 def _read_corrected(signal: Signal, chain: Chain, start: int, stop: int) -> NDArray[np.float64]:

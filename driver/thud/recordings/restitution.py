@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import Drop
+from thud.base.note import Note
 from thud.level.estimate import Estimate
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ class DropConditions:
 
     def restitutions(
         self, impulse: Estimate, duration: Estimate, flights: Sequence[Estimate]
-    ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-        """Return the restitution by each method that can be applied, and warnings.
+    ) -> tuple[dict[str, Estimate], tuple[Note, ...]]:
+        """Return the restitution by each method that can be applied, and notes.
 
         The duration of the contact, and the flights, are those between first touch and release.
         """
@@ -81,11 +82,8 @@ class DropConditions:
             methods[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
         elif len(flights) > 1:
             first, second = flights[:2]
-            warning = (
-                f"the restitution at the second impact is {second.value / first.value:.3f}; that "
-                "at the first impact is unknown without the drop height"
-            )
-            return methods, (warning,)
+            ratio = second.value / first.value
+            return methods, (Note("restitution_second", value=ratio, effect=0.0),)
         return methods, ()
 
     def shared_effects(

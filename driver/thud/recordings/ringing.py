@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import least_squares
 
+from thud.base.note import Note
 from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, resonance
 
 if TYPE_CHECKING:
@@ -58,16 +59,12 @@ class Ringing:
     amplitude: float
     corrected: bool
 
-    def __str__(self) -> str:
-        """Return a warning."""
-        effect = "affects levels, peaks and contact time"
-        if self.corrected:
-            effect = "differs from that in [plate]"
-        return (
-            f"the plate keeps ringing after the contact, at {self.frequency:.0f} Hz with "
-            f"{self.amplitude:.2g} N: its resonance {effect}; state it in [plate]: "
-            f"f0 = {self.frequency:.0f}, Q = {self.quality:.2g}"
-        )
+    @property
+    def note(self) -> Note:
+        """Warning, whose effect is in the uncertainty."""
+        code = "plate_rings_differently" if self.corrected else "plate_rings"
+        others = {"frequency": self.frequency, "quality": self.quality}
+        return Note(code, value=self.amplitude, unit="N", effect=0.0, others=others)
 
 
 def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
 
+from thud.base.note import Note
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.faults import read_repaired, repair
 
@@ -41,8 +42,8 @@ MAX_TONES = 12
 MIN_NORMAL = 1e-30
 
 
-def remove_tones(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ...]]:
-    """Return a window without tones that last through the contact, the processing, and warnings.
+def remove_tones(window: Window) -> tuple[Window, tuple[Note, ...]]:
+    """Return a window without tones that last through the contact, and notes.
 
     Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
     """
@@ -52,12 +53,12 @@ def remove_tones(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ..
         window.contact[1] + math.ceil(MARGINS[1] * rate),
     )
     if min(first, len(force) - stop) < MIN_LENGTH * rate:
-        return window, (), ()
+        return window, ()
     found = _find_tones(force, first, stop, rate)
     if not found:
-        return window, (), ()
+        return window, ()
     # Equal samples, which show faults, differ without the tone.
-    force, steps, warnings = repair(window)
+    force, faults = repair(window)
     waves = np.vstack([_wave(frequency, len(force), rate) for frequency in found])
     sides = slice(0, first), slice(stop, None)
     offset = np.median(np.concatenate([force[side] for side in sides]))
@@ -68,7 +69,7 @@ def remove_tones(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ..
     # The averages of the search also show a tone near multiples of their rate.
     coefficients[amplitudes < np.array([*found.values()]) / 2] = 0.0
     notes = tuple(
-        f"a tone of {frequency:.4g} Hz with an amplitude of {amplitude:.3g} N was removed"
+        Note("tone_removed", value=float(amplitude), unit="N", others={"frequency": frequency})
         for frequency, amplitude in sorted(zip(found, amplitudes, strict=True))
         if amplitude > found[frequency] / 2
     )
@@ -76,7 +77,7 @@ def remove_tones(window: Window) -> tuple[Window, tuple[str, ...], tuple[str, ..
         read_repaired, window.signal, window.start, force - coefficients.ravel() @ waves
     )
     signal = replace(window.signal, samples=samples, full_scale=None)
-    return replace(window, signal=signal), (*steps, *notes), warnings
+    return replace(window, signal=signal), (*faults, *notes)
 
 
 def _wave(frequency: float, count: int, rate: float) -> NDArray[np.float64]:

@@ -16,12 +16,14 @@ from thud.recordings.config import Instrument
 from thud.recordings.dates import read_date
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import NOISE, REPEATABILITY
+from thud.report.notes import processing, warnings
 from thud.report.rows import SCATTER
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.base._schema import BandSet, LimitsSource
+    from thud.base.note import Note
     from thud.level.assessment import Criterion
     from thud.level.estimate import Estimate
     from thud.recordings.config import Config
@@ -92,8 +94,9 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         },
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [vars(check) for check in config.plate_checks],
-        "warnings": list(recording.own_warnings),
-        "outliers": [{**vars(outlier), "message": str(outlier)} for outlier in recording.outliers],
+        "processing": processing(recording),
+        "warnings": warnings(recording),
+        "notes": [_note(note) for note in recording.own_notes],
         "without_outliers": _without_outliers(recording),
         "files": [
             {
@@ -103,8 +106,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
                 "calibration": origin.calibration,
                 "sample_rate": origin.sample_rate,
                 "drops": origin.drops,
-                "steps": list(origin.steps),
-                "warnings": list(origin.warnings),
+                "notes": [_note(note) for note in origin.notes],
             }
             for origin in recording.origins
         ],
@@ -206,7 +208,7 @@ def missing_fields(config: Config, origins: Iterable[Origin]) -> list[str]:
 
 def _without_outliers(recording: Recording) -> dict[str, Any] | None:
     """Return the means over the drops that are no outliers; None if no drop is an outlier."""
-    names = {outlier.name for outlier in recording.outliers}
+    names = {outlier.subject for outlier in recording.outliers}
     kept = [i for i, drop in enumerate(recording.drops) if drop.name not in names]
     if not names or not kept:
         return None
@@ -246,9 +248,12 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "restitutions": {method: _estimate(value) for method, value in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
-        "steps": list(drop.steps),
-        "warnings": list(drop.warnings),
+        "notes": [_note(note) for note in drop.notes],
     }
+
+
+def _note(note: Note) -> dict[str, Any]:
+    return {**vars(note), "is_warning": note.is_warning, "message": note.message}
 
 
 def _estimate(estimate: Estimate) -> dict[str, float]:

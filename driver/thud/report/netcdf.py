@@ -90,22 +90,7 @@ def _variables(data: dict[str, Any]) -> dict[str, tuple[tuple[str, ...], NDArray
 
 def _attributes(data: dict[str, Any]) -> dict[str, Any]:
     known = {key: data[key] for key in PROVENANCE if data[key] not in (None, "")}
-    notes = {
-        kind: "\n".join(
-            dict.fromkeys(
-                [
-                    *(data["warnings"] if kind == "warnings" else ()),
-                    *(
-                        f"{entry['name']}: {message}"
-                        for key in ("files", "drops")
-                        for entry in data[key]
-                        for message in entry[kind]
-                    ),
-                ]
-            )
-        )
-        for kind in ("steps", "warnings")
-    }
+    notes = {kind: "\n".join(data[kind]) for kind in ("processing", "warnings")}
     instruments = "\n".join(", ".join(filter(None, item.values())) for item in data["instruments"])
     result = {**known, "instruments": instruments, **notes}
     return {k: _plain(value) if isinstance(value, str) else value for k, value in result.items()}

@@ -21,7 +21,7 @@ from thud.report.markup import (
     plain,
     symbols,
 )
-from thud.report.notes import group_by_kind, shorten
+from thud.report.notes import shorten
 from thud.report.rows import (
     COUNT,
     HEAD,
@@ -105,8 +105,8 @@ def report_page(
         budget_rule=escaped(_budget_rule(data)),
         drops=notes("Drops and methods", _drops_and_methods(data)),
         properties=notes("Properties of the ball, as stated", _properties(data["properties"])),
-        processing=notes("Signal processing", _grouped(data, "steps") or ["nothing"]),
-        warnings=notes("Warnings", _warnings(data) or ["none"]),
+        processing=notes("Signal processing", data["processing"] or ["nothing"]),
+        warnings=notes("Warnings", data["warnings"] or ["none"]),
         files=_files(data["files"]),
         statement=escaped(
             "The results relate only to the item tested. This report shall not be reproduced "
@@ -424,7 +424,8 @@ def _drops_and_methods(data: dict[str, Any]) -> list[str]:
 
 def _outliers(data: dict[str, Any]) -> list[str]:
     """Return how many drops are outliers, and the means with and without them."""
-    names = dict.fromkeys(outlier["name"] for outlier in data["outliers"])
+    outliers = [note for note in data["notes"] if note["code"] == "outlier"]
+    names = {note["subject"] for note in outliers}
     if not names:
         return ["no drop differs from the others by more than chance (Grubbs, 5 %)"]
     count = _count(len(names), "outlier")
@@ -444,17 +445,6 @@ def _outliers(data: dict[str, Any]) -> list[str]:
             f"{', '.join(parts)}"
         )
     return lines
-
-
-def _warnings(data: dict[str, Any]) -> list[str]:
-    outliers = [outlier["message"] for outlier in data["outliers"]]
-    return [*data["warnings"], *outliers, *_grouped(data, "warnings")]
-
-
-def _grouped(data: dict[str, Any], kind: str) -> list[str]:
-    return group_by_kind(
-        {key: [(entry["name"], entry[kind]) for entry in data[key]] for key in ("files", "drops")}
-    )
 
 
 def _signature(data: dict[str, Any]) -> str:

@@ -16,7 +16,6 @@ from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
 from thud.report import write
 from thud.report.contents import criteria_data, missing_fields, report_data
-from thud.report.notes import group_by_kind
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows, excluded_text
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
 
@@ -59,16 +58,6 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
         for i, drop in enumerate(recording.drops)
     ]
     return rows
-
-
-def messages(recording: Recording, kind: str) -> list[str]:
-    """Return the ``"steps"`` or ``"warnings"`` of files and drops, with similar ones merged."""
-    return group_by_kind(
-        {
-            "files": [(file.name, getattr(file, kind)) for file in recording.origins],
-            "drops": [(drop.name, getattr(drop, kind)) for drop in recording.drops],
-        }
-    )
 
 
 def table(recording: Recording) -> list[tuple[str, ...]]:
