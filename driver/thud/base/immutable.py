@@ -5,39 +5,52 @@ from __future__ import annotations
 import sys
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
-from weakref import WeakValueDictionary
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
-
 Array = TypeVar("Array", bound="NDArray[Any]")
-
-# Arrays that `freeze` has made read-only, by identity; others may change through another view.
-_FROZEN: WeakValueDictionary[int, NDArray[Any]] = WeakValueDictionary()
 
 
 class Immutable:
     """Base of frozen dataclasses, which are declared with ``eq=False``.
 
-    Arrays, also those in tuples, dictionaries and datasets, are read-only copies; lists become
-    tuples. Objects are equal if their class and fields are equal; NaN equals NaN. The hash is the
-    hash of the fields, so objects that hold an array or a dictionary have none.
+    Arrays, also those in tuples, dictionaries and datasets, are read-only: arrays that can be
+    changed are copied, read-only ones are shared. Lists become tuples. Objects are equal if their
+    class and fields are equal; NaN equals NaN. The hash is the hash of the fields, so objects that
+    hold an array or a dictionary have none.
     """
 
     def __post_init__(self) -> None:
-        """Copy the arrays."""
+        """Make the arrays read-only."""
         for name, value in vars(self).items():
-            object.__setattr__(self, name, _stored(value, self._store_array))
+            object.__setattr__(self, name, self._stored(value))
 
-    @staticmethod
-    def _store_array(array: NDArray[Any]) -> object:
-        """Return the stored form of an array."""
-        return array if _is_frozen(array) else freeze(array.copy())
+    def _stored(self, value: Any) -> Any:  # noqa: ANN401 - values of any kind
+        """Return the stored form of a value; columns of tables become arrays."""
+        if type(value) in {list, tuple}:
+            return tuple(map(self._stored, value))
+        if type(value) is dict:
+            return {key: self._stored(entry) for key, entry in value.items()}
+        # If xarray is not imported, no dataset exists.
+        if (xarray := sys.modules.get("xarray")) and isinstance(value, xarray.Dataset):
+            value = value.copy(deep=True)
+            for name in value.variables.keys() - value.indexes.keys():
+                freeze(value[name].values)
+        elif hasattr(value, "__array__") and not isinstance(value, np.generic):
+            return self._stored_array(np.asarray(value))
+        return value
+
+    def _stored_array(self, array: NDArray[Any]) -> object:
+        """Return an array, or a read-only copy if it, or an array that it views, can be changed."""
+        owner: object = array
+        while isinstance(owner, np.ndarray):
+            if owner.flags.writeable:
+                return freeze(array.copy())
+            owner = owner.base
+        return array
 
     def __setstate__(self, state: dict[str, object]) -> None:
         """Restore the fields of a copy or a pickle and make their arrays read-only again."""
@@ -48,72 +61,32 @@ class Immutable:
         """Return whether the other is of the same class and has equal fields."""
         if other.__class__ is not self.__class__:
             return NotImplemented
-        return all(map(_equal, _fields(self), _fields(other)))
+        return _equal(_fields(self), _fields(other))
 
     def __hash__(self) -> int:
         """Return the hash of the fields; raise TypeError if a field is not hashable."""
-        return hash((type(self), *map(_hashed, _fields(self))))
+        return hash((type(self), _hashed(_fields(self))))
 
 
 class Plain(Immutable):
     """Base of inputs: arrays become tuples of numbers, as in files."""
 
-    @staticmethod
-    def _store_array(array: NDArray[Any]) -> object:
-        return _stored(array.tolist(), freeze)
+    def _stored_array(self, array: NDArray[Any]) -> object:
+        return self._stored(array.tolist())
 
 
 def freeze(array: Array) -> Array:
-    """Make an array and the arrays that it views read-only, and return the array.
-
-    Immutable objects store a frozen array and its views without a copy.
-    """
+    """Make an array and the arrays that it views read-only, and return the array."""
     owner: object = array
     while isinstance(owner, np.ndarray):
         owner.setflags(write=False)
-        _FROZEN[id(owner)] = owner
         owner = owner.base
     return array
 
 
-def _is_frozen(array: NDArray[Any]) -> bool:
-    """Return whether `freeze` has made an array, or the array that it views, read-only."""
-    owner = array if array.base is None else array.base
-    return _FROZEN.get(id(owner)) is owner and not (array.flags.writeable or owner.flags.writeable)
-
-
-def _stored(value: object, store_array: Callable[[NDArray[Any]], object]) -> object:
-    """Return the stored form of a value."""
-    if isinstance(value, np.ndarray):
-        return store_array(value)
-    if type(value) is dict:
-        return {key: _stored(entry, store_array) for key, entry in value.items()}
-    if isinstance(value, tuple) and hasattr(value, "_make"):
-        return value._make(_stored(entry, store_array) for entry in value)
-    if type(value) in {list, tuple}:
-        return tuple(_stored(entry, store_array) for entry in value)  # type: ignore[attr-defined]
-    return _stored_table(value, store_array)
-
-
-def _stored_table(value: object, store_array: Callable[[NDArray[Any]], object]) -> object:
-    """Return a copy of a dataset, the stored array of an array-like object, or another value."""
-    # If xarray is not imported, no dataset exists.
-    xarray = sys.modules.get("xarray")
-    if xarray is not None and isinstance(value, xarray.Dataset):
-        dataset = value.copy(deep=True)
-        for name, variable in dataset.variables.items():
-            if name not in dataset.indexes:
-                freeze(variable.values)
-        return dataset
-    # Columns of tables, such as those of pandas.
-    if hasattr(value, "__array__") and not isinstance(value, np.generic):
-        return store_array(np.array(value))
-    return value
-
-
-def _fields(owner: object) -> list[object]:
+def _fields(owner: object) -> tuple[object, ...]:
     """Return the values of the fields that are compared."""
-    return [getattr(owner, field.name) for field in fields(owner) if field.compare]  # type: ignore[arg-type]
+    return tuple(getattr(owner, field.name) for field in fields(owner) if field.compare)  # type: ignore[arg-type]
 
 
 def _equal(value: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
