@@ -78,7 +78,7 @@ contains
             call model%get_loss_factors(case%ball, request%get_array('frequency'), loss_factors, error)
             if (.not. allocated(error)) call bundle%add_array('loss_factors', shape(loss_factors), loss_factors)
          class default
-            error = input_error('&model: name: this model has no material with a loss factor; allowed: finite_element')
+            error = input_error('this model has no material with a loss factor; allowed: finite_element', 'model')
          end select
       case ('samples')
          call answer_samples(case, request, bundle, error)

@@ -2,7 +2,7 @@
 !> hold named texts, numbers and arrays.
 !>
 !> `ask` stores the bundle in the library and returns its handle and sizes; `collect` hands it over and deallocates it.
-!> `status` is 0 or the error code; after an error the bundle holds only the text `message`.
+!> `status` is 0 or the error code; after an error the bundle holds that, see `store`.
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_answer, only: get_answer

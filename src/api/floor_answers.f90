@@ -52,7 +52,7 @@ contains
          call answer_room_level()
       case default
          if (.not. has_own_modes(state)) then
-            error = input_error('&floor: name: this floor has no modes; allowed: a rectangular floor')
+            error = input_error('this floor has no modes; allowed: a rectangular floor', 'floor')
          else if (question == 'floor_modes') then
             call answer_floor_modes()
          else

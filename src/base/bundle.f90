@@ -189,7 +189,8 @@ contains
 
    end subroutine copy_values
 
-   !> Stores a bundle for its caller to collect; after an error it holds only the message.
+   !> Stores a bundle for its caller to collect; after an error it holds the `message`, `group`, `key` and `problem` if it is
+   !> about one, and the `range` that a value is outside of: value, ends, and 1 for each end that is excluded.
    subroutine store(bundle, error, status, handle, n_byte, n_value)
       type(bundle_type), pointer, intent(inout) :: bundle
       !> Error of the computation, if any.
@@ -208,6 +209,13 @@ contains
          allocate (bundle)
          status = error%code
          call bundle%add_text('message', error%message)
+         if (allocated(error%group)) then
+            call bundle%add_text('group', error%group)
+            call bundle%add_text('key', error%key)
+            call bundle%add_text('problem', error%problem)
+         end if
+         if (error%low <= error%high) call bundle%add_array('range', [5], [error%value, error%low, error%high, &
+            merge(1.0_wp, 0.0_wp, error%low_open), merge(1.0_wp, 0.0_wp, error%high_open)])
       end if
       if (.not. allocated(bundle%header)) bundle%header = ''
       if (.not. allocated(bundle%text)) bundle%text = ''

@@ -1,10 +1,12 @@
 !> Errors as values: a procedure that can fail has an allocatable argument `error`, unallocated on success.
 module thud_error
+   use thud_constants, only: not_a_number
+   use thud_kinds, only: wp
    use thud_text, only: is_utf8
    implicit none (type, external)
    private
 
-   public :: error_type, bad_input, signal_base, numerical_failure, input_error, numerical_error
+   public :: error_type, bad_input, prefix_error, signal_base, numerical_failure, input_error, numerical_error
 
    !> Code of invalid input; also the exit code of the executable.
    integer, parameter :: bad_input = 1
@@ -21,6 +23,12 @@ module thud_error
       integer :: code = numerical_failure
       !> Message that names key or position, value and allowed range.
       character(len=:), allocatable :: message
+      !> Group and key that the message is about, and what it says of them; unallocated if it is about no group.
+      character(len=:), allocatable :: group, key, problem
+      !> Value outside its range, and the ends of the range, in the unit of the key; NaN if the message is about no range.
+      real(wp) :: value = not_a_number, low = not_a_number, high = not_a_number
+      !> The end of the range is excluded.
+      logical :: low_open = .false., high_open = .false.
       !> Whether the time steps are too long; shorter ones may succeed.
       logical :: has_coarse_steps = .false.
       !> Whether the record is clearly shorter than the contact, which may have no end, at any resolution.
@@ -30,30 +38,67 @@ module thud_error
 contains
 
    !> Error of the user's input.
-   pure function input_error(message) result(error)
-      !> The message for the user.
-      character(len=*), intent(in) :: message
+   pure function input_error(problem, group, key) result(error)
+      !> What is wrong; the message for the user if no group is given.
+      character(len=*), intent(in) :: problem
+      !> Group and key that are wrong, with which the message begins.
+      character(len=*), intent(in), optional :: group, key
       type(error_type) :: error
-      character(len=len(message)) :: text
-      integer :: i, max_code
 
-      text = message
-      ! Replace bytes of the input that cannot be shown: control characters, the zero byte, which would end the message,
-      ! and invalid UTF-8, which also arises when a shortened value ends within a character.
-      max_code = merge(255, 126, is_utf8(text))
-      do i = 1, len(text)
-         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > max_code) text(i:i) = '?'
-      end do
-      error = error_type(code=bad_input, message=text)
+      error%code = bad_input
+      call set_message(error, problem, group, key)
    end function input_error
 
    !> Error of a failed computation.
-   pure function numerical_error(message) result(error)
-      !> The message for the user.
-      character(len=*), intent(in) :: message
+   pure function numerical_error(problem, group, key) result(error)
+      !> What failed; the message for the user if no group is given.
+      character(len=*), intent(in) :: problem
+      !> Group and key that are the reason, with which the message begins.
+      character(len=*), intent(in), optional :: group, key
       type(error_type) :: error
 
-      error = error_type(code=numerical_failure, message=message)
+      error%code = numerical_failure
+      call set_message(error, problem, group, key)
    end function numerical_error
+
+   !> Sets the message about a group and a key.
+   pure subroutine set_message(error, problem, group, key)
+      type(error_type), intent(inout) :: error
+      !> What is wrong.
+      character(len=*), intent(in) :: problem
+      !> Group and key.
+      character(len=*), intent(in), optional :: group, key
+
+      error%message = shown(problem)
+      if (.not. present(group)) return
+      error%problem = error%message
+      error%group = shown(trim(group))
+      error%key = ''
+      if (present(key)) error%key = shown(trim(key))
+      error%message = '&'//error%group//': '//error%problem
+      if (error%key /= '') error%message = '&'//error%group//': '//error%key//' '//error%problem
+   end subroutine set_message
+
+   !> Puts a place, such as a path, in front of the message of an error.
+   pure subroutine prefix_error(error, place)
+      type(error_type), intent(inout) :: error
+      character(len=*), intent(in) :: place
+
+      error%message = shown(place)//': '//error%message
+   end subroutine prefix_error
+
+   !> Text without bytes of the input that cannot be shown: control characters, the zero byte, which would end the message,
+   !> and invalid UTF-8, which also arises when a shortened value ends within a character.
+   pure function shown(text)
+      character(len=*), intent(in) :: text
+      character(len=len(text)) :: shown
+      integer :: i, max_code
+
+      shown = text
+      max_code = merge(255, 126, is_utf8(text))
+      do i = 1, len(text)
+         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > max_code) shown(i:i) = '?'
+      end do
+   end function shown
 
 end module thud_error

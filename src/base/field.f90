@@ -359,8 +359,13 @@ contains
       ! Without the quotes.
       call get_suggestion(value(2:len(value) - 1), self%choices(:self%n_choice), suggestion)
       call self%get_allowed(allowed, interval)
-      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' is not allowed' &
-         //suggestion//'; allowed: '//allowed)
+      error = input_error('= '//shortened(value)//' is not allowed'//suggestion//'; allowed: '//allowed, self%group, self%key)
+      if (.not. present(interval)) return
+      error%value = self%get_number()
+      error%low = interval%lower
+      error%high = interval%upper
+      error%low_open = interval%lower_open
+      error%high_open = interval%upper_open
    end function get_error
 
    !> The value in namelist syntax.

@@ -299,8 +299,9 @@ contains
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%check(case%has_room, error)
          if (allocated(error) .or. .not. case%has_room) return
-         if (get_floor_number(case) < first_radiating) error = input_error('&floor: name = '//quoted(trim(case%floor)) &
-            //' has no plate that radiates into a room; allowed: no &room, or '//join_quoted(floor_names(first_radiating:)))
+         if (get_floor_number(case) < first_radiating) error = input_error('= '//quoted(trim(case%floor))//' has no plate ' &
+            //'that radiates into a room; allowed: no &room, or '//join_quoted(floor_names(first_radiating:)), 'floor', &
+            'name')
          select type (floor)
          class is (rectangular_floor_type)
             if (floor%subceiling%thickness > 0.0_wp) call check_below_subceiling(case%room, error)
@@ -323,12 +324,12 @@ contains
          .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name) &
          .and. index(devices, '/'//trim(lower_case(name(:index(name//'.', '.') - 1)))//'/') == 0
       if (name == '') then
-         error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
-            //' characters, without it the name of the file')
+         error = input_error('is empty; allowed: a name of 1 to '//to_text(name_length)//' characters, without it the ' &
+            //'name of the file', 'case', 'name')
       else if (.not. usable) then
-         error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory on ' &
-            //'any system, UTF-8 of up to '//to_text(name_length)//' characters without / \ : * ? " < > |, without a ' &
-            //'period at its end, and not that of a device of Windows, such as con')
+         error = input_error('= '//quoted(name)//' is not allowed; allowed: a name for a directory on any system, UTF-8 ' &
+            //'of up to '//to_text(name_length)//' characters without / \ : * ? " < > |, without a period at its end, and ' &
+            //'not that of a device of Windows, such as con', 'case', 'name')
       end if
    end subroutine check_name
 

@@ -13,6 +13,7 @@ module thud_compute
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
    use thud_memory, only: require_memory
+   use thud_note, only: note_type
    use thud_receiver, only: is_rigid
    use thud_refined_drop, only: solve_drop
    use thud_room, only: room_level_type
@@ -21,7 +22,6 @@ module thud_compute
    use thud_source_limits, only: combine_verdicts, conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_verdict, verdict_conforms
    use thud_system, only: is_forked
-   use thud_validity_limit, only: warning_length
    use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings
    implicit none (type, external)
    private
@@ -76,7 +76,7 @@ module thud_compute
       !> Quasi-static compression.
       type(compression_type) :: compression
       !> Warnings on implausible input or results: [n_warning].
-      character(len=warning_length), allocatable :: warning(:)
+      type(note_type), allocatable :: warning(:)
    end type results_type
 
 contains

@@ -66,15 +66,15 @@ contains
       integer :: i
 
       if (unknowns%key%count == 0) then
-         error = input_error('&unknowns: key is missing; allowed: names of keys of ball, drop and model, such as ' &
-            //"'youngs_modulus'")
+         error = input_error('is missing; allowed: names of keys of ball, drop and model, such as '//"'youngs_modulus'", &
+            'unknowns', 'key')
          return
       end if
       counts = [unknowns%low%count, unknowns%high%count, unknowns%reason%count, unknowns%standard_deviation%count]
       do i = 1, size(names)
          if (counts(i) == unknowns%key%count .or. names(i) == 'standard_deviation' .and. counts(i) == 0) cycle
-         error = input_error('&unknowns: '//trim(names(i))//' has '//to_text(counts(i))//' entries; allowed: ' &
-            //to_text(unknowns%key%count)//', one for each key')
+         error = input_error('has '//to_text(counts(i))//' entries; allowed: '//to_text(unknowns%key%count)//', one for ' &
+            //'each key', 'unknowns', trim(names(i)))
          return
       end do
    end subroutine check_counts
@@ -100,9 +100,9 @@ contains
             call get_suggestion(trim(key), known, suggestion)
             suggestion = ' is not allowed'//suggestion
             if (field > 0) suggestion = ' belongs to the computation, and its effect is the numerical error'
-            error = input_error('&unknowns: key = '//quoted(key)//suggestion//'; allowed: '//join_quoted(known))
+            error = input_error('= '//quoted(key)//suggestion//'; allowed: '//join_quoted(known), 'unknowns', 'key')
          else if (any(unknowns%key%values(:i - 1) == key)) then
-            error = input_error('&unknowns: key = '//quoted(key)//' is given twice; allowed: once')
+            error = input_error('= '//quoted(key)//' is given twice; allowed: once', 'unknowns', 'key')
          end if
          if (allocated(error)) return
          range = 'low = '//to_text(low)//' and high = '//to_text(high)
@@ -110,13 +110,13 @@ contains
          interval = get_interval(fields, field)
          call fields(field)%get_allowed(allowed, interval)
          if (.not. (interval%contains(low) .and. interval%contains(high) .and. low < high)) then
-            error = input_error('&unknowns: '//range//' of '//trim(key)//' are not allowed; allowed: low < high, '//allowed)
+            error = input_error(range//' of '//trim(key)//' are not allowed; allowed: low < high, '//allowed, 'unknowns')
          else if (fields(field)%derived_at_zero .and. .not. low > 0.0_wp) then
-            error = input_error('&unknowns: low = '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is ' &
-               //'derived from other keys; allowed: above 0')
+            error = input_error('= '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is derived from other ' &
+               //'keys; allowed: above 0', 'unknowns', 'low')
          else if (value < low .or. value > high) then
-            error = input_error('&unknowns: the value of the case, '//trim(key)//' = '//to_text(value)//', is outside ' &
-               //range//'; allowed: a range that holds it')
+            error = input_error('the value of the case, '//trim(key)//' = '//to_text(value)//', is outside '//range &
+               //'; allowed: a range that holds it', 'unknowns')
          end if
       end associate
    end subroutine check_unknown

@@ -8,12 +8,13 @@ module thud_warnings
    use thud_floor_model, only: floor_state_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_note, only: note_type
    use thud_refined_drop, only: finer_quantities, get_resolution, max_error
    use thud_registry, only: floor_names
    use thud_room, only: box_type, new_box, room_level_type
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
-   use thud_validity_limit, only: get_limit_message, validity_limit_type, warning_length
+   use thud_validity_limit, only: get_limit_note, validity_limit_type
    implicit none (type, external)
    private
 
@@ -38,8 +39,8 @@ contains
       type(floor_state_type), intent(in) :: state
       !> Force history; without samples if the case has no impact.
       type(force_history_type), intent(in) :: history
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(out) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(out) :: warnings(:)
       !> Force history on a mobile floor.
       type(force_history_type), intent(in), optional :: on_floor
       logical :: uses_wall
@@ -51,12 +52,13 @@ contains
       if (.not. case%has_impact) return
       call add_law_warning(case, warnings)
       if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
-         '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
+         'floor_at_rest', 'floor', 'name', '= '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
          //': its force is that on a rigid floor')
       if (case%has_floor) call add_floor_warnings(case, state, warnings)
       call add_limit_warnings([get_limits(case, history), get_error_limit('sampling', history)], warnings)
       if (case%sampling%verify .and. all(history%model_quantity_name /= finer_quantities(1))) call add(warnings, &
-         '&sampling: verify: the drop cannot be computed at a finer resolution, and is not verified')
+         'not_verified', 'sampling', 'verify', 'is set, but the drop cannot be computed at a finer resolution: it is not ' &
+         //'verified')
       if (present(on_floor)) call add_limit_warnings([get_limits(case, on_floor), get_error_limit('floor', on_floor)], &
          warnings)
    end subroutine get_warnings
@@ -74,8 +76,8 @@ contains
          limits = [ &
             ! If a force begins with a jump or a corner, aliasing changes the level of the 500 Hz octave by up to 0.2 dB at
             ! the limit, 2 dB at 2000 Hz.
-            validity_limit_type('sampling', 'sample_rate in Hz', case%sampling%sample_rate, lowest=8000.0_wp, &
-            reason='aliasing changes the level at 500 Hz by up to 2 dB', subject='levels hold'), &
+            validity_limit_type('sampling', 'in Hz', case%sampling%sample_rate, lowest=8000.0_wp, &
+            reason='aliasing changes the level at 500 Hz by up to 2 dB', subject='levels hold', key='sample_rate'), &
             model%get_validity_limits(case%ball, case%drop, history), &
             validity_limit_type('model', 'restitution minus 1', history%restitution - 1, highest=restitution_error, &
             reason='it gives energy to the source'), &
@@ -120,14 +122,16 @@ contains
    subroutine add_limit_warnings(limits, warnings)
       !> The limits: [n_limit].
       type(validity_limit_type), intent(in) :: limits(:)
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(inout) :: warnings(:)
+      type(note_type) :: note
       integer :: i
 
       do i = 1, size(limits)
-         if (get_limit_message(limits(i)) == '' .or. any(index(warnings, '&'//trim(limits(i)%group)//': ' &
-            //trim(limits(i)%quantity)//' is ') > 0)) cycle
-         call add(warnings, get_limit_message(limits(i)))
+         note = get_limit_note(limits(i))
+         if (note%code == '' .or. any(warnings%group == note%group .and. warnings%key == note%key &
+            .and. warnings%quantity == note%quantity)) cycle
+         warnings = [warnings, note]
       end do
    end subroutine add_limit_warnings
 
@@ -138,21 +142,22 @@ contains
       type(case_type), intent(in) :: case
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(inout) :: warnings(:)
       type(box_type) :: room
 
-      if (state%lowest_frequency > standard_band(1)) call add(warnings, '&'//trim(case%floor)//': below ' &
+      if (state%lowest_frequency > standard_band(1)) call add(warnings, 'outside_frequencies', case%floor, '', 'below ' &
          //fixed(state%lowest_frequency, 0)//' Hz '//trim(state%validity_reason))
-      if (state%highest_frequency < standard_band(2)) call add(warnings, '&'//trim(case%floor)//': above ' &
+      if (state%highest_frequency < standard_band(2)) call add(warnings, 'outside_frequencies', case%floor, '', 'above ' &
          //fixed(state%highest_frequency, 0)//' Hz '//trim(state%validity_reason))
       if (.not. case%has_room) return
       room = new_box(case%room, state%plate)
       call add_limit_warnings([validity_limit_type('room', 'height in m', room%sides(3), 2.0_wp, 6.0_wp, &
          'check volume, length and width', 'most rooms have')], warnings)
       associate (room_area => product(room%sides(:2)), area => state%plate%length*state%plate%width)
-         if (abs(room_area/area - 1) > same_area) call add(warnings, '&room: a room of '//fixed(room_area, 1) &
-            //' m2 below a floor of '//fixed(area, 1)//' m2: only the part of the floor above the room radiates into it')
+         if (abs(room_area/area - 1) > same_area) call add(warnings, 'room_area', 'room', '', 'a room of ' &
+            //fixed(room_area, 1)//' m2 below a floor of '//fixed(area, 1)//' m2: only the part of the floor above the ' &
+            //'room radiates into it')
       end associate
    end subroutine add_floor_warnings
 
@@ -160,8 +165,8 @@ contains
    subroutine add_source_warning(criteria, warnings)
       !> Criteria of the force on the floor, octave levels first: [n].
       type(criterion_type), intent(in) :: criteria(:)
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(inout) :: warnings(:)
       type(band_type) :: bands(octave_count)
       character(len=:), allocatable :: octaves
       integer :: i
@@ -172,21 +177,21 @@ contains
          if (.not. conforms(criteria(i))) octaves = octaves//', '//trim(get_band_name(bands(i)))//' Hz ' &
             //fixed(criteria(i)%value - (criteria(i)%lower + criteria(i)%upper)/2, 1)//' dB'
       end do
-      if (octaves /= '') call add(warnings, '&room: the source does not conform ('//octaves(3:) &
-         //' from the nominal levels): the level in the room is not that of a standard source')
+      if (octaves /= '') call add(warnings, 'source_not_conforming', 'room', '', 'the source does not conform (' &
+         //octaves(3:)//' from the nominal levels): the level in the room is not that of a standard source')
    end subroutine add_source_warning
 
    !> Adds a warning on bands below the crossover that are statistical: their modes are not resolved, or would take too long.
    subroutine add_modes_warning(prediction, warnings)
       type(room_level_type), intent(in) :: prediction
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(inout) :: warnings(:)
 
       associate (next => prediction%n_modal + 1)
          if (next > size(prediction%bands)) return
-         if (prediction%bands(next)%center <= prediction%box%crossover) call add(warnings, '&room: from ' &
-            //trim(get_band_name(prediction%bands(next)))//' Hz on the level is statistical, below the frequency at which ' &
-            //'three modes of the room overlap, '//fixed(prediction%box%crossover, 0)//' Hz')
+         if (prediction%bands(next)%center <= prediction%box%crossover) call add(warnings, 'statistical_bands', 'room', '', &
+            'from '//trim(get_band_name(prediction%bands(next)))//' Hz on the level is statistical, below the frequency ' &
+            //'at which three modes of the room overlap, '//fixed(prediction%box%crossover, 0)//' Hz')
       end associate
    end subroutine add_modes_warning
 
@@ -198,17 +203,17 @@ contains
 
       limits = [validity_limit_type('ball', 'density of the wall in kg/m3', get_density(ball), 800.0_wp, 2200.0_wp, &
          'check mass, outer_radius and wall_thickness', 'rubbers have'), &
-         validity_limit_type('ball', 'youngs_modulus in Pa', ball%youngs_modulus, 1.0e4_wp, 3.0e9_wp, 'check the unit', &
-         'rubbers have'), &
-         validity_limit_type('ball', 'poisson_ratio', ball%poisson_ratio, lowest=0.45_wp, &
-         reason='they hardly change their volume', subject='rubbers have')]
+         validity_limit_type('ball', 'in Pa', ball%youngs_modulus, 1.0e4_wp, 3.0e9_wp, 'check the unit', &
+         'rubbers have', 'youngs_modulus'), &
+         validity_limit_type('ball', '', ball%poisson_ratio, lowest=0.45_wp, &
+         reason='they hardly change their volume', subject='rubbers have', key='poisson_ratio')]
    end function get_rubber_limits
 
    !> Adds a warning on a loss factor that is not stated, with a damping law other than that of the standard ball.
    subroutine add_law_warning(case, warnings)
       type(case_type), intent(in), target :: case
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(inout) :: warnings(:)
       type(field_type), allocatable :: fields(:)
       character(len=key_length) :: law
       integer :: i
@@ -217,19 +222,20 @@ contains
       do i = 1, size(fields)
          if (fields(i)%key /= 'loss_factor') cycle
          law = fields(i)%get_needed_choice(get_active_fields(case))
-         if (law /= fields(i)%needs(2)) call add(warnings, &
-            '&'//trim(fields(i)%group)//': loss_factor = '//to_text(fields(i)%get_number())//' is that of the standard ' &
-            //'ball with '//trim(fields(i)%needs(1))//' = '//quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
+         if (law /= fields(i)%needs(2)) call add(warnings, 'law_of_standard_ball', fields(i)%group, 'loss_factor', '= ' &
+            //to_text(fields(i)%get_number())//' is that of the standard ball with '//trim(fields(i)%needs(1))//' = ' &
+            //quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
       end do
    end subroutine add_law_warning
 
-   !> Adds a warning.
-   pure subroutine add(warnings, message)
-      !> Messages: [n].
-      character(len=warning_length), allocatable, intent(inout) :: warnings(:)
-      character(len=*), intent(in) :: message
+   !> Adds a warning without a value.
+   pure subroutine add(warnings, code, group, key, text)
+      !> The warnings: [n].
+      type(note_type), allocatable, intent(inout) :: warnings(:)
+      !> See `note_type`.
+      character(len=*), intent(in) :: code, group, key, text
 
-      warnings = [character(len=warning_length) :: warnings, message]
+      warnings = [warnings, note_type(code, group, key, text=text)]
    end subroutine add
 
 end module thud_warnings

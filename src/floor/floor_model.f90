@@ -145,9 +145,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       integer :: i
 
-      if (self%point_x%count /= self%point_y%count) error = input_error('&'//group//': point_x has ' &
-         //to_text(self%point_x%count)//' values and point_y '//to_text(self%point_y%count)//'; allowed: the same number ' &
-         //'of both')
+      if (self%point_x%count /= self%point_y%count) error = input_error('has '//to_text(self%point_x%count)//' values and ' &
+         //'point_y '//to_text(self%point_y%count)//'; allowed: the same number of both', group, 'point_x')
       do i = 1, self%point_x%count
          if (.not. allocated(error)) call check_point(group, sides, self%point_x%values(i), self%point_y%values(i), error)
       end do
@@ -165,8 +164,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (min(x, y) >= 0.0_wp .and. x <= sides(1) .and. y <= sides(2)) return
-      error = input_error('&'//group//': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; ' &
-         //'allowed: 0 to '//to_text(sides(1))//' m and 0 to '//to_text(sides(2))//' m')
+      error = input_error('the point ('//to_text(x)//', '//to_text(y)//') m lies outside; allowed: 0 to ' &
+         //to_text(sides(1))//' m and 0 to '//to_text(sides(2))//' m', group)
    end subroutine check_point
 
    !> Whether the floor has modes that describe its motion under the source.
@@ -189,8 +188,8 @@ contains
       real(wp) :: sides(2)
 
       if (.not. has_own_modes(state)) then
-         error = input_error('&floor: name: this floor has no point except the one under the source; allowed: a ' &
-            //'rectangular floor')
+         error = input_error('this floor has no point except the one under the source; allowed: a rectangular floor', &
+            'floor')
          return
       end if
       sides = [state%modes%stack%length, state%modes%stack%width]
@@ -205,8 +204,8 @@ contains
       !> Set if the floor has no such plate.
       type(error_type), allocatable, intent(out) :: error
 
-      if (.not. state%plate%thickness > 0.0_wp) error = input_error('&floor: name: this floor has no plate that radiates ' &
-         //'into a room; allowed: one that has')
+      if (.not. state%plate%thickness > 0.0_wp) error = input_error('this floor has no plate that radiates into a room; ' &
+         //'allowed: one that has', 'floor')
    end subroutine check_radiator
 
    !> Conductance of the plate that radiates, the power into it per mean-square force: that of the infinite plate, or the

@@ -84,16 +84,16 @@ contains
       associate (n => self%pole_frequency%count, thickness => self%radiator%plate%thickness)
          if (n == 0 .or. any([self%damping_ratio%count, self%residue_real%count, self%residue_imaginary%count] &
             /= n)) then
-            error = input_error('&measured_mobility: pole_frequency has '//to_text(n)//' values, damping_ratio ' &
-               //to_text(self%damping_ratio%count)//', residue_real '//to_text(self%residue_real%count) &
-               //' and residue_imaginary '//to_text(self%residue_imaginary%count) &
-               //'; allowed: the same number of each, at least one')
+            error = input_error('has '//to_text(n)//' values, damping_ratio '//to_text(self%damping_ratio%count) &
+               //', residue_real '//to_text(self%residue_real%count)//' and residue_imaginary ' &
+               //to_text(self%residue_imaginary%count)//'; allowed: the same number of each, at least one', &
+               'measured_mobility', 'pole_frequency')
          else if (thickness > 0.0_wp .and. thickness < min_thickness) then
-            error = input_error('&measured_mobility: thickness = '//to_text(thickness)//' m; allowed: 0, or from ' &
-               //to_text(min_thickness)//' m on')
+            error = input_error('= '//to_text(thickness)//' m; allowed: 0, or from '//to_text(min_thickness)//' m on', &
+               'measured_mobility', 'thickness')
          else if (has_room .and. .not. thickness > 0.0_wp) then
-            error = input_error('&measured_mobility: a mobility alone does not radiate into a room; allowed: with the ' &
-               //'plate that it was measured on (thickness above 0)')
+            error = input_error('a mobility alone does not radiate into a room; allowed: with the plate that it was ' &
+               //'measured on (thickness above 0)', 'measured_mobility')
          end if
       end associate
       if (allocated(error)) return
@@ -102,12 +102,12 @@ contains
       call find_violations(receiver%pole, receiver%residue, receiver%direct + rounding*(receiver%direct &
          + sum(abs(receiver%residue/receiver%pole))), omega, failed)
       if (failed) then
-         error = numerical_error('&measured_mobility: the zeros of the real part were not found')
+         error = numerical_error('the zeros of the real part were not found', 'measured_mobility')
       else if (size(omega) > 0) then
          conductance = real(get_mobility(receiver, omega/(2*pi)), wp)
          i = minloc(conductance, dim=1)
-         error = input_error('&measured_mobility: the real part of the mobility is '//to_text(conductance(i)) &
-            //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
+         error = input_error('the real part of the mobility is '//to_text(conductance(i))//' m/(N s) at ' &
+            //to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`', 'measured_mobility')
       end if
    end subroutine check
 

@@ -67,9 +67,9 @@ contains
       if (allocated(error)) return
       highest = maxval(modes%omega)/(2*pi)
       if (.not. plate%thickness > 0.0_wp) then
-         if (has_room) error = input_error('&modal_floor: the level in a room needs the mass of the floor, and a plate in ' &
-            //'place of the modes above '//fixed(highest, 0)//' Hz; allowed: thickness (above 0), density and wave_speed ' &
-            //'of a plate like the floor')
+         if (has_room) error = input_error('the level in a room needs the mass of the floor, and a plate in place of the ' &
+            //'modes above '//fixed(highest, 0)//' Hz; allowed: thickness (above 0), density and wave_speed of a plate ' &
+            //'like the floor', 'modal_floor')
          return
       end if
       ! The integral of m'' w**2 is 1 kg times the squared unit of w: the mass per area follows, exactly where it is uniform.
@@ -81,13 +81,13 @@ contains
          expected = get_mode_density(plate)*highest - (plate%length + plate%width)*wave/(2*pi)
       end associate
       if (max(mass/get_surface_mass(plate), get_surface_mass(plate)/mass) > max_mass_ratio) then
-         error = input_error('&modal_floor: the modes of '//trim(self%file)//' have a mass per area of '//fixed(mass, 1) &
-            //' kg/m2, the plate has '//fixed(get_surface_mass(plate), 1)//' kg/m2; allowed: the same within a factor of ' &
-            //fixed(max_mass_ratio, 0)//', with shapes for a modal mass of 1 kg or a row modal_mass')
+         error = input_error('the modes of '//trim(self%file)//' have a mass per area of '//fixed(mass, 1)//' kg/m2, the ' &
+            //'plate has '//fixed(get_surface_mass(plate), 1)//' kg/m2; allowed: the same within a factor of ' &
+            //fixed(max_mass_ratio, 0)//', with shapes for a modal mass of 1 kg or a row modal_mass', 'modal_floor')
       else if (expected > max_count_ratio*size(modes%omega)) then
-         error = input_error('&modal_floor: '//trim(self%file)//' has '//to_text(size(modes%omega))//' modes up to ' &
-            //fixed(highest, 0)//' Hz, the plate about '//fixed(expected, 0)//'; allowed: all modes of the floor, and the ' &
-            //'thickness, density and wave_speed of a plate like it')
+         error = input_error(trim(self%file)//' has '//to_text(size(modes%omega))//' modes up to '//fixed(highest, 0) &
+            //' Hz, the plate about '//fixed(expected, 0)//'; allowed: all modes of the floor, and the thickness, density ' &
+            //'and wave_speed of a plate like it', 'modal_floor')
       end if
    end subroutine check
 
@@ -100,12 +100,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (self%file == '') then
-         error = input_error('&modal_floor: file is empty; allowed: the path of a table of modes')
+         error = input_error('is empty; allowed: the path of a table of modes', 'modal_floor', 'file')
          return
       end if
       call read_sampled_modes(trim(self%file), modes, error)
       if (allocated(error)) then
-         error = input_error('&modal_floor: '//error%message)
+         error = input_error(error%message, 'modal_floor')
          return
       end if
       plate = self%plate

@@ -117,11 +117,11 @@ contains
 
       state%source = [self%source_x, self%source_y]
       call self%get_bearing(state, bearing)
-      group = '&'//trim(state%group)//': '
+      group = trim(state%group)
       edge = get_edges(self)
       if (.not. min(bearing%along, bearing%across) > 0.0_wp) then
-         error = input_error(group//'cross_modulus = 0 Pa leaves a single layer without stiffness across it; allowed: a ' &
-            //'modulus above 0, or more layers')
+         error = input_error('= 0 Pa leaves a single layer without stiffness across it; allowed: a modulus above 0, or ' &
+            //'more layers', group, 'cross_modulus')
          return
       end if
       call check_springs(self%support_stiffness, 'support_stiffness')
@@ -132,18 +132,18 @@ contains
       end associate
       if (allocated(error)) return
       if (all(self%covering_improvement%count /= [0, octave_bands, third_bands])) then
-         error = input_error(group//'covering_improvement has '//to_text(self%covering_improvement%count)//' values; ' &
-            //'allowed: 4, one for each octave from 63 to 500 Hz, or 12, one for each one-third-octave band')
+         error = input_error('has '//to_text(self%covering_improvement%count)//' values; allowed: 4, one for each octave ' &
+            //'from 63 to 500 Hz, or 12, one for each one-third-octave band', group, 'covering_improvement')
       else if (self%covering_improvement%count > 0 .and. self%covering_stiffness > 0.0_wp) then
-         error = input_error(group//'covering_stiffness and covering_improvement describe the same covering twice; ' &
-            //'allowed: one of them')
+         error = input_error('and covering_improvement describe the same covering twice; allowed: one of them', group, &
+            'covering_stiffness')
       else if ((self%support == 'elastic') .neqv. (self%support_stiffness%count + self%support_rotation%count > 0)) then
-         error = input_error(group//'support = '//trim(self%support)//' with '//to_text(self%support_stiffness%count) &
-            //' values of support_stiffness and '//to_text(self%support_rotation%count)//' of support_rotation; ' &
-            //'allowed: some with support = elastic, none with others')
+         error = input_error('= '//trim(self%support)//' with '//to_text(self%support_stiffness%count)//' values of ' &
+            //'support_stiffness and '//to_text(self%support_rotation%count)//' of support_rotation; allowed: some with ' &
+            //'support = elastic, none with others', group, 'support')
       else if (all(edge%deflection <= 0.0_wp) .and. self%line_x%count + self%line_y%count == 0) then
-         error = input_error(group//'support = '//trim(self%support)//' without any stiffness needs supports at line_x or ' &
-            //'line_y; allowed: at least one')
+         error = input_error('= '//trim(self%support)//' without any stiffness needs supports at line_x or line_y; ' &
+            //'allowed: at least one', group, 'support')
       end if
       call check_sheet(self%screed%thickness, 'screed_thickness', '0.5')
       call check_sheet(self%subceiling%thickness, 'subceiling_thickness', '0.2')
@@ -156,7 +156,7 @@ contains
          character(len=*), intent(in) :: key
 
          if (allocated(error) .or. any(list%count == [0, 1, 4])) return
-         error = input_error(group//key//' has '//to_text(list%count)//' values; allowed: 1 or 4')
+         error = input_error('has '//to_text(list%count)//' values; allowed: 1 or 4', group, key)
       end subroutine check_springs
 
       !> Checks that lines lie between two edges, apart from each other and from the source.
@@ -171,14 +171,14 @@ contains
             if (allocated(error)) return
             associate (line => list%values(i))
                if (line >= side) then
-                  error = input_error(group//key//' = '//to_text(line)//' m lies outside the floor; allowed: below ' &
-                     //to_text(side)//' m')
+                  error = input_error('= '//to_text(line)//' m lies outside the floor; allowed: below '//to_text(side) &
+                     //' m', group, key)
                else if (any(abs(list%values(:i - 1) - line) < min_line_distance)) then
-                  error = input_error(group//key//' = '//to_text(line)//' m is stated twice, or within ' &
-                     //to_text(1000*min_line_distance)//' mm of another value; allowed: each line once')
+                  error = input_error('= '//to_text(line)//' m is stated twice, or within ' &
+                     //to_text(1000*min_line_distance)//' mm of another value; allowed: each line once', group, key)
                else if (abs(line - source) < min_distance) then
-                  error = input_error(group//'the source, at '//to_text(source)//' m, lies on a support of '//key &
-                     //'; allowed: sources at least '//to_text(min_distance)//' m from it')
+                  error = input_error('the source, at '//to_text(source)//' m, lies on a support of '//key//'; allowed: ' &
+                     //'sources at least '//to_text(min_distance)//' m from it', group)
                end if
             end associate
          end do
@@ -192,7 +192,7 @@ contains
          character(len=*), intent(in) :: key, highest
 
          if (allocated(error) .or. .not. thickness > 0.0_wp .or. thickness >= min_sheet) return
-         error = input_error(group//key//' = '//to_text(thickness)//' m; allowed: 0, or 0.0005 to '//highest//' m')
+         error = input_error('= '//to_text(thickness)//' m; allowed: 0, or 0.0005 to '//highest//' m', group, key)
       end subroutine check_sheet
    end subroutine check
 

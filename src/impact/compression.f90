@@ -55,11 +55,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (options%max_deflection >= 2*ball%outer_radius) then
-         error = input_error('&compression: max_deflection = '//to_text(options%max_deflection) &
-            //' m is not allowed; allowed: less than the diameter, '//to_text(2*ball%outer_radius)//' m')
+         error = input_error('= '//to_text(options%max_deflection)//' m is not allowed; allowed: less than the diameter, ' &
+            //to_text(2*ball%outer_radius)//' m', 'compression', 'max_deflection')
       else if (options%gas == 'vented' .and. ball%gauge_pressure > 0.0_wp) then
-         error = input_error("&compression: gas = 'vented' with gauge_pressure = "//to_text(ball%gauge_pressure) &
-            //" Pa is not allowed; allowed: 'isothermal', 'adiabatic', or no overpressure")
+         error = input_error("= 'vented' with gauge_pressure = "//to_text(ball%gauge_pressure)//" Pa is not allowed; " &
+            //"allowed: 'isothermal', 'adiabatic', or no overpressure", 'compression', 'gas')
       end if
    end subroutine check_compression
 

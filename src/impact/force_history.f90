@@ -132,11 +132,12 @@ contains
       sampled = sum(history%floor_force)/history%sample_rate
       associate (rate => history%sample_rate, contact_time => history%contact_time)
          if (.not. contact_time*rate >= min_contact_samples) then
-            error = input_error('&sampling: sample_rate = '//to_text(rate)//' Hz gives the contact of '//to_text( &
-               contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
+            error = input_error('= '//to_text(rate)//' Hz gives the contact of '//to_text(contact_time)//' s too few ' &
+               //'samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz', 'sampling', 'sample_rate')
          else if (.not. holds_impulse(sampled, history%impulse)) then
-            error = input_error('&sampling: sample_rate = '//to_text(rate)//' Hz misses the force: its samples hold an ' &
-               //'impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
+            error = input_error('= '//to_text(rate)//' Hz misses the force: its samples hold an impulse of ' &
+               //to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one', 'sampling', &
+               'sample_rate')
          end if
       end associate
    end subroutine check_samples

@@ -58,13 +58,12 @@ contains
 
       samples = get_sample_count(sampling)
       if (samples > max_samples) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s at sample_rate = ' &
-            //to_text(sampling%sample_rate)//' Hz makes '//to_text(samples)//' samples; allowed: up to ' &
-            //to_text(max_samples))
+         error = input_error('= '//to_text(sampling%duration)//' s at sample_rate = '//to_text(sampling%sample_rate) &
+            //' Hz makes '//to_text(samples)//' samples; allowed: up to '//to_text(max_samples), 'sampling', 'duration')
       else if (real(samples, wp)*sampling%substeps > max_steps) then
-         error = input_error('&sampling: substeps = '//to_text(sampling%substeps)//' with '//to_text(samples) &
-            //' samples makes '//to_text(real(samples, wp)*sampling%substeps)//' steps; allowed: up to ' &
-            //to_text(max_steps))
+         error = input_error('= '//to_text(sampling%substeps)//' with '//to_text(samples)//' samples makes ' &
+            //to_text(real(samples, wp)*sampling%substeps)//' steps; allowed: up to '//to_text(max_steps), 'sampling', &
+            'substeps')
       end if
    end subroutine check_sampling
 

@@ -107,7 +107,7 @@ contains
       !> The limits: [n_limit].
       type(validity_limit_type), allocatable :: limits(:)
 
-      limits = [get_gravity_limit(drop, history), validity_limit_type('drop', 'deflection over twice outer_radius', &
+      limits = [get_gravity_limit(drop, history), validity_limit_type('drop', 'deflection over twice outer radius', &
          history%max_deflection/(2*ball%outer_radius), highest=1.0_wp, reason='the source is no thicker')]
    end function get_validity_limits
 
@@ -146,7 +146,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       force = 0.0_wp
-      error = input_error('&model: name: this model has no static compression; allowed: one that has')
+      error = input_error('this model has no static compression; allowed: one that has', 'model')
    end subroutine compress
 
 end module thud_source_model

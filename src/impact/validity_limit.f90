@@ -6,20 +6,18 @@ module thud_validity_limit
    use thud_drop, only: drop_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_note, only: note_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: get_gravity_limit, get_limit_message, get_wall_limits, get_wave_limit, validity_limit_type, warning_length
-
-   !> Maximum length of a warning.
-   integer, parameter :: warning_length = 240
+   public :: get_gravity_limit, get_limit_note, get_wall_limits, get_wave_limit, validity_limit_type
 
    !> A validity limit.
    type :: validity_limit_type
       !> Namelist group of the keys that determine the quantity.
       character(len=24) :: group = ''
-      !> Name of the limited quantity, with its unit if it has one.
+      !> Name of the limited quantity, with its unit if it has one; of a key only what follows its name.
       character(len=72) :: quantity = ''
       !> Value of the quantity, and range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
@@ -27,24 +25,27 @@ module thud_validity_limit
       character(len=96) :: reason = ''
       !> What holds inside the range.
       character(len=16) :: subject = 'the theory holds'
+      !> Key that is the quantity; blank if it is none.
+      character(len=24) :: key = ''
    end type validity_limit_type
 
 contains
 
-   !> Message about a quantity outside the range; blank if it is inside.
-   pure function get_limit_message(limit) result(message)
+   !> Note on a quantity outside the range; without a code if it is inside.
+   pure function get_limit_note(limit) result(note)
       type(validity_limit_type), intent(in) :: limit
-      character(len=warning_length) :: message
+      type(note_type) :: note
       logical :: below
 
-      message = ''
       ! NaN is outside.
       if (limit%value >= limit%lowest .and. limit%value <= limit%highest) return
       below = limit%value < limit%lowest
-      message = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
-         //', '//trim(limit%subject)//' '//trim(merge('from ', 'up to', below))//' ' &
-         //trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
-   end function get_limit_message
+      note = note_type('outside_limits', limit%group, limit%key, limit%quantity, limit%value)
+      if (abs(limit%lowest) < huge(1.0_wp)) note%low = limit%lowest
+      if (abs(limit%highest) < huge(1.0_wp)) note%high = limit%highest
+      note%text = 'is '//trim(rounded(limit%value))//', '//trim(limit%subject)//' '//trim(merge('from ', 'up to', below)) &
+         //' '//trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
+   end function get_limit_note
 
    !> A number with three digits.
    pure function rounded(value) result(text)
@@ -81,7 +82,7 @@ contains
       real(wp), intent(in) :: highest
       type(validity_limit_type) :: limit
 
-      limit = validity_limit_type('drop', 'velocity at first touch over sqrt(youngs_modulus/density)', &
+      limit = validity_limit_type('drop', 'velocity at first touch over that of waves in the wall', &
          history%impact_velocity/sqrt(ball%youngs_modulus/get_density(ball)), highest=highest, &
          reason='it is the order of the strain of the wall')
    end function get_wave_limit
@@ -97,15 +98,15 @@ contains
 
       associate (radius => ball%outer_radius, wall => ball%wall_thickness)
          limits = [ &
-            validity_limit_type('drop', 'deflection over outer_radius', history%max_deflection/radius, highest=0.5_wp, &
+            validity_limit_type('drop', 'deflection over outer radius', history%max_deflection/radius, highest=0.5_wp, &
             reason='the wall outside the contact stays spherical'), &
-            validity_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, &
+            validity_limit_type('drop', 'deflection over wall thickness', history%max_deflection/wall, &
             highest=merge(huge(1.0_wp), 0.5_wp, wall >= thick_wall*radius), &
             reason='linear bending makes a thin wall too stiff: levels are up to 9 dB off those of finite elements'), &
-            validity_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, highest=2.0_wp, &
+            validity_limit_type('drop', 'deflection over wall thickness', history%max_deflection/wall, highest=2.0_wp, &
             reason='a wall that is pressed further buckles inwards'), &
             get_wave_limit(ball, history, 0.25_wp), &
-            validity_limit_type('ball', 'stress of the wall by gauge_pressure over youngs_modulus', &
+            validity_limit_type('ball', 'stress of the wall by gauge pressure over Young''s modulus', &
             ball%gauge_pressure*(radius - wall)/(2*wall*ball%youngs_modulus), highest=0.1_wp, &
             reason='the wall is free of stress before first touch')]
       end associate

@@ -5,8 +5,9 @@ module thud_run
    use thud_case_text, only: get_case_text, read_case
    use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type, input_error, prefix_error
    use thud_file, only: get_file_stem, read_text_file
+   use thud_note, only: get_sentence
    use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
    use thud_records, only: add_results
    use thud_result_directory, only: check_target, close_results, open_results, result_directory_type, write_file
@@ -85,7 +86,7 @@ contains
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
       if (.not. allocated(error)) then
-         outcome%warning = results%warning
+         outcome%warning = get_sentence(results%warning)
          if (case%has_impact) outcome%conforms = is_conforming(case, results%impact%assessment)
          call get_screen_tables(case, results, options%verbose, outcome%table)
          call add_results(records, case, results)
@@ -94,7 +95,7 @@ contains
          call write_results(case, records, options%write_all, directory, error)
          if (options%folder == '') call close_results(directory, error)
       end if
-      if (allocated(error)) error%message = path//': '//error%message
+      if (allocated(error)) call prefix_error(error, path)
    end subroutine run_case
 
    !> Writes the files of results.
@@ -154,7 +155,7 @@ contains
       end if
       if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked, &
          path(:index(path, '/', back=.true.)), room_alone)
-      if (allocated(error)) error = input_error(path//': '//error%message)
+      if (allocated(error)) call prefix_error(error, path)
    end subroutine load_case
 
 end module thud_run

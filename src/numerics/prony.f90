@@ -88,12 +88,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (frequency < series_from .or. frequency > series_to) then
-         error = input_error('&'//group//': loss_frequency = '//to_text(frequency) &
-            //' Hz is not allowed with a fractional law; allowed: '//to_text(series_from)//' to '//to_text(series_to))
+         error = input_error('= '//to_text(frequency)//' Hz is not allowed with a fractional law; allowed: ' &
+            //to_text(series_from)//' to '//to_text(series_to), group, 'loss_frequency')
       else if (loss_factor >= tan(pi/2*order)) then
          ! For order 1 the tangent is infinite; in floating point it is very large.
-         error = input_error('&'//group//': loss_factor = '//to_text(loss_factor)//' is more than a material of ' &
-            //'fractional_order = '//to_text(order)//' can have; allowed: below '//to_text(tan(pi/2*order)))
+         error = input_error('= '//to_text(loss_factor)//' is more than a material of fractional_order = '//to_text(order) &
+            //' can have; allowed: below '//to_text(tan(pi/2*order)), group, 'loss_factor')
       end if
    end subroutine check_fractional_loss
 

@@ -345,9 +345,9 @@ contains
          n_time = get_window_length(size(sweep%projections%window))
          allocate (force(n_row*n_time + line_length), stat=status, errmsg=message)
          if (status /= 0) then
-            thread_error = input_error('&sampling: duration = '//to_text(case%sampling%duration) &
-               //' s at sample_rate = '//to_text(case%sampling%sample_rate)//' Hz gives the forces of ' &
-               //to_text(block_size)//' samples no space in memory; allowed: shorter records, or fewer threads')
+            thread_error = input_error('= '//to_text(case%sampling%duration)//' s at sample_rate = ' &
+               //to_text(case%sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size)//' samples no space ' &
+               //'in memory; allowed: shorter records, or fewer threads', 'sampling', 'duration')
          else
             start = get_aligned_start(force)
          end if

@@ -69,7 +69,7 @@ contains
       if (.not. resolved > 0.0_wp) then
          error = get_unresolved(group, stack)
       else if (failed) then
-         error = input_error('&'//group//': no modes can be computed; allowed: stiffnesses and masses above zero')
+         error = input_error('no modes can be computed; allowed: stiffnesses and masses above zero', group)
       end if
       if (allocated(error)) return
       modes%sum_limit = 2*pi*resolved
@@ -77,7 +77,7 @@ contains
       do i = 1, size(modes%modes%block)
          call add_bearing_losses(modes%modes%block(i), bearing, air, modes%limit, failed)
          if (.not. failed) cycle
-         error = numerical_error('&'//group//': the losses of modes cannot be separated; allowed: other loss factors')
+         error = numerical_error('the losses of modes cannot be separated; allowed: other loss factors', group)
          return
       end do
       associate (block => modes%modes%block)
@@ -92,9 +92,9 @@ contains
       type(plate_stack_type), intent(in) :: stack
       type(error_type) :: error
 
-      error = input_error('&'//group//': length = '//to_text(stack%length)//' m and width = '//to_text(stack%width) &
-         //' m need too many functions to resolve the lowest mode; allowed: a smaller part of the floor, joists farther ' &
-         //'apart (spacing), stiffer plates, or support = simple')
+      error = input_error('= '//to_text(stack%length)//' m and width = '//to_text(stack%width)//' m need too many ' &
+         //'functions to resolve the lowest mode; allowed: a smaller part of the floor, joists farther apart (spacing), ' &
+         //'stiffer plates, or support = simple', group, 'length')
    end function get_unresolved
 
    !> Adds losses of the bearing plate, and mixes modes below a limit by their losses.
@@ -245,8 +245,8 @@ contains
       i = maxloc(loss_factor, dim=1)
       if (i > 0) then
          if (.not. loss_factor(i) < 2.0_wp) then
-            error = input_error('&'//group//': the total loss factor is '//to_text(loss_factor(i))//' at ' &
-               //fixed(omega(i)/(2*pi), 1)//' Hz; allowed: below 2')
+            error = input_error('the total loss factor is '//to_text(loss_factor(i))//' at '//fixed(omega(i)/(2*pi), 1) &
+               //' Hz; allowed: below 2', group)
             return
          end if
       end if

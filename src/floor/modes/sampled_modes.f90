@@ -8,7 +8,7 @@ module thud_sampled_modes
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_ascending, only: get_ascending_order
    use thud_constants, only: pi
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type, input_error, prefix_error
    use thud_floor_modes, only: floor_modes_type
    use thud_function_set, only: min_nodes, new_splines
    use thud_kinds, only: wp
@@ -74,7 +74,7 @@ contains
       if (.not. allocated(error)) call get_shapes(point, x, y, shape, error)
       if (.not. allocated(error)) call check_shapes(shape, rows(1)%value, error)
       if (allocated(error)) then
-         error = input_error(path//': '//error%message)
+         call prefix_error(error, path)
       else
          call get_sampled_modes(rows, x, y, shape, modes)
       end if

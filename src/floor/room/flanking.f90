@@ -80,8 +80,8 @@ contains
       if (walls%lengths%count == 0) return
       lists = [walls%thickness, walls%density, walls%wave_speed, walls%loss_factor, walls%index]
       i = findloc(lists%count /= 1 .and. lists%count /= walls%lengths%count, .true., dim=1)
-      if (i > 0) error = input_error('&room: '//trim(keys(i))//' has '//to_text(lists(i)%count)//' values; allowed: 1, or ' &
-         //'1 for each of the '//to_text(walls%lengths%count)//' wall_lengths')
+      if (i > 0) error = input_error('has '//to_text(lists(i)%count)//' values; allowed: 1, or 1 for each of the ' &
+         //to_text(walls%lengths%count)//' wall_lengths', 'room', trim(keys(i)))
    end subroutine check_walls
 
    !> The value of a wall in a list of one value for all or one for each.

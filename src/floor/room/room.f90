@@ -199,9 +199,9 @@ contains
 
       call check_walls(room%walls, error)
       if (allocated(error) .or. any(room%reverberation_time%count == time_counts)) return
-      error = input_error('&room: reverberation_time has '//to_text(room%reverberation_time%count)//' values; allowed: ' &
-         //'1, one for each of the 4 octaves from 63 to 500 Hz, or for each of the 12 one-third-octave bands from 50 to ' &
-         //'630 Hz')
+      error = input_error('has '//to_text(room%reverberation_time%count)//' values; allowed: 1, one for each of the 4 ' &
+         //'octaves from 63 to 500 Hz, or for each of the 12 one-third-octave bands from 50 to 630 Hz', 'room', &
+         'reverberation_time')
    end subroutine check_room
 
    !> The room below a floor as a box, without positions; sides that are not stated are those of the floor.
@@ -276,22 +276,22 @@ contains
 
       walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
       box = new_box(room, plate)
-      if (abs(product(box%sides) - box%volume) > volume_tolerance*box%volume) error = input_error( &
-         '&room: length, width and height, '//to_text(box%sides(1))//' x '//to_text(box%sides(2))//' x ' &
-         //to_text(box%sides(3))//' m (not stated: those of the floor), contradict the volume, '//to_text(box%volume) &
-         //' m3; allowed: a volume of '//to_text(product(box%sides))//' m3, or without volume or height')
+      if (abs(product(box%sides) - box%volume) > volume_tolerance*box%volume) error = input_error('length, width and ' &
+         //'height, '//to_text(box%sides(1))//' x '//to_text(box%sides(2))//' x '//to_text(box%sides(3))//' m (not ' &
+         //'stated: those of the floor), contradict the volume, '//to_text(box%volume)//' m3; allowed: a volume of ' &
+         //to_text(product(box%sides))//' m3, or without volume or height', 'room')
       call check_side('length', 'long', 'corner_x', room%corner_x, box%sides(1), plate%length)
       call check_side('width', 'wide', 'corner_y', room%corner_y, box%sides(2), plate%width)
       if (allocated(error)) return
       if (box%volume < min_volume) then
-         error = input_error('&room: the volume is '//to_text(box%volume)//' m3; allowed: at least ' &
-            //to_text(min_volume)//' m3')
+         error = input_error('the volume is '//to_text(box%volume)//' m3; allowed: at least '//to_text(min_volume)//' m3', &
+            'room')
       else if (walls > 2*(plate%length + plate%width)*(1 + rounding)) then
-         error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
-            //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
+         error = input_error('are '//to_text(walls)//' m together, longer than the edges of the floor; allowed: up to ' &
+            //to_text(2*(plate%length + plate%width))//' m', 'room', 'wall_lengths')
       else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > box%sides(3)) then
-         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than the height of the ' &
-            //'room; allowed: up to '//to_text(box%sides(3))//' m')
+         error = input_error('= '//to_text(room%ceiling%depth)//' m is more than the height of the room; allowed: up to ' &
+            //to_text(box%sides(3))//' m', 'room', 'ceiling_depth')
       end if
    contains
 
@@ -304,11 +304,11 @@ contains
 
          if (allocated(error) .or. corner + room_side <= floor_side*(1 + rounding)) return
          if (corner > 0.0_wp) then
-            error = input_error('&room: '//corner_key//' + '//key//' = '//to_text(corner + room_side)//' m lies beyond ' &
-               //'the floor; allowed: up to its '//key//', '//to_text(floor_side)//' m')
+            error = input_error('+ '//key//' = '//to_text(corner + room_side)//' m lies beyond the floor; allowed: up to ' &
+               //'its '//key//', '//to_text(floor_side)//' m', 'room', corner_key)
          else
-            error = input_error('&room: the room is '//to_text(room_side)//' m '//adjective//', the floor ' &
-               //to_text(floor_side)//' m: state '//key//' of the floor; allowed: at least '//to_text(room_side)//' m')
+            error = input_error('the room is '//to_text(room_side)//' m '//adjective//', the floor '//to_text(floor_side) &
+               //' m: state '//key//' of the floor; allowed: at least '//to_text(room_side)//' m', 'room')
          end if
       end subroutine check_side
    end subroutine check_below
@@ -320,11 +320,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (room%ceiling%mass > 0.0_wp) then
-         error = input_error('&room: ceiling_mass and subceiling_thickness of the floor describe the same ceiling twice; ' &
-            //'allowed: one of them')
+         error = input_error('and subceiling_thickness of the floor describe the same ceiling twice; allowed: one of them', &
+            'room', 'ceiling_mass')
       else if (room%radiation /= modal_radiation) then
-         error = input_error('&room: radiation = iso_12354 is that of free waves, and a subceiling follows the floor; ' &
-            //'allowed: modes')
+         error = input_error('= iso_12354 is that of free waves, and a subceiling follows the floor; allowed: modes', &
+            'room', 'radiation')
       end if
    end subroutine check_below_subceiling
 

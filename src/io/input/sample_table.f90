@@ -2,7 +2,7 @@
 module thud_sample_table
    use thud_case, only: case_type, get_active_fields
    use thud_column, only: column_type, find_columns
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type, input_error, prefix_error
    use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
@@ -51,7 +51,7 @@ contains
          if (allocated(error)) error = row_error(table%reader, error%message)
       end if
       if (allocated(error)) then
-         error = input_error(path//': '//error%message)
+         call prefix_error(error, path)
       else
          allocate (fields, source=get_active_fields(case))
          table%fields = fields(table%columns%field)
@@ -84,7 +84,7 @@ contains
          end do
          if (allocated(error)) exit
       end do
-      if (allocated(error)) error = input_error(trim(table%path)//': '//error%message)
+      if (allocated(error)) call prefix_error(error, trim(table%path))
    end subroutine read_samples
 
    !> Reads one value of a sample.

@@ -14,6 +14,7 @@ module thud_records
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
+   use thud_note, only: get_subject, note_type
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_rating, only: get_class, get_rounded, rating_names, rating_titles
    use thud_room, only: room_level_type
@@ -21,7 +22,6 @@ module thud_records
    use thud_source_limits, only: combine_verdicts, criterion_type, get_verdict, verdict_conforms, verdict_fails, &
       verdict_names
    use thud_text, only: to_text
-   use thud_validity_limit, only: warning_length
    use thud_warnings, only: add_floor_warnings, add_modes_warning
    implicit none (type, external)
    private
@@ -58,11 +58,18 @@ contains
    subroutine add_warnings(bundle, group, warnings)
       type(bundle_type), intent(inout) :: bundle
       character(len=*), intent(in) :: group
-      !> Messages: [n].
-      character(len=*), intent(in) :: warnings(:)
+      !> The warnings: [n].
+      type(note_type), intent(in) :: warnings(:)
+      integer :: i
 
       bundle%group = group
-      if (size(warnings) > 0) call bundle%add_texts('warning', warnings)
+      if (size(warnings) == 0) return
+      call bundle%add_texts('code', warnings%code)
+      call bundle%add_texts('subject', get_subject(warnings))
+      call bundle%add_texts('text', [(adjustl(trim(warnings(i)%quantity)//' '//warnings(i)%text), i=1, size(warnings))])
+      call bundle%add_array('value', shape(warnings), warnings%value)
+      call bundle%add_array('low', shape(warnings), warnings%low)
+      call bundle%add_array('high', shape(warnings), warnings%high)
    end subroutine add_warnings
 
    !> Adds a force history: its quantities, those of the model, the columns against time, and snapshots.
@@ -269,7 +276,7 @@ contains
       !> The floor, prepared.
       type(floor_state_type), intent(in) :: state
       type(room_level_type), intent(in) :: room
-      character(len=warning_length), allocatable :: warnings(:)
+      type(note_type), allocatable :: warnings(:)
       integer :: n(1)
       integer :: i
 

@@ -141,8 +141,8 @@ contains
       call check_mesh(self%mesh, error)
       if (allocated(error)) return
       if (sampling%sample_rate < min_rate) then
-         error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate) &
-            //' Hz is not allowed with finite_element; allowed: from '//to_text(min_rate)//' Hz')
+         error = input_error('= '//to_text(sampling%sample_rate)//' Hz is not allowed with finite_element; allowed: from ' &
+            //to_text(min_rate)//' Hz', 'sampling', 'sample_rate')
          return
       end if
       largest = get_element_counts(ball, self%mesh)
@@ -152,9 +152,9 @@ contains
       end if
       ! Positions and velocities of each node.
       bytes = 32.0_wp*(largest%radial_elements + 1)*(largest%polar_elements + 1)*get_frame_count(self, sampling)
-      if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
-         //to_text(self%snapshot_interval)//' s makes '//to_text(get_frame_count(self, sampling)) &
-         //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
+      if (bytes > max_motion_bytes) error = input_error('= '//to_text(self%snapshot_interval)//' s makes ' &
+         //to_text(get_frame_count(self, sampling))//' snapshots, more than the memory is meant to hold; allowed: a ' &
+         //'longer interval, or 0 for none', 'output', 'snapshot_interval')
    end subroutine check
 
    !> The model at a level of resolution: at level 0 elements of twice the size, without snapshots; above level 1 smaller
@@ -383,22 +383,23 @@ contains
       speed = impact_velocity - drop%gravity*self%flight_before
       gap = speed*self%flight_before + drop%gravity*self%flight_before**2/2
       if (speed < 0.0_wp) then
-         error = input_error('&finite_element: flight_before = '//to_text(self%flight_before) &
-            //' s is longer than the fall; allowed: up to '//to_text(impact_velocity/drop%gravity)//' s')
+         error = input_error('= '//to_text(self%flight_before)//' s is longer than the fall; allowed: up to ' &
+            //to_text(impact_velocity/drop%gravity)//' s', 'finite_element', 'flight_before')
          return
       end if
       call new_material(self%material, ball, material, error)
       if (allocated(error)) return
       contacts%settling_time = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
       if (contacts%settling_time > huge(1.0_wp)) then
-         error = input_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low to compute with; ' &
-            //'allowed: a higher one')
+         error = input_error('= '//to_text(ball%youngs_modulus)//' Pa is too low to compute with; allowed: a higher one', &
+            'ball', 'youngs_modulus')
          return
       end if
       if (sampling%duration <= self%flight_before + contacts%settling_time) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
-            //'after '//significant(contacts%settling_time, 3)//' s without touch, in which shear waves cross the ball; ' &
-            //'allowed: at least '//significant(rounded_up*(self%flight_before + contacts%settling_time), 3)//' s')
+         error = input_error('= '//to_text(sampling%duration)//' s is too short: a contact is over after ' &
+            //significant(contacts%settling_time, 3)//' s without touch, in which shear waves cross the ball; allowed: at ' &
+            //'least '//significant(rounded_up*(self%flight_before + contacts%settling_time), 3)//' s', 'sampling', &
+            'duration')
          return
       end if
       run = new_impact_run(ball, new_mesh(ball, self%mesh), material, self%contact, drop%gravity, gap, speed, receiver)
@@ -434,9 +435,9 @@ contains
       step = interval/n_step
       associate (n_node => size(run%body%mass), n_sample => size(history%floor_force))
          if (n_step > max_steps .or. real(n_step, wp)*n_sample*n_node > max_work) then
-            error = numerical_error('&finite_element: stability asks for steps below '//to_text(step)//' s, too many for ' &
-               //to_text(sampling%duration)//' s of '//to_text(n_node) &
-               //' nodes; allowed: a shorter duration, fewer elements, a lower bulk_ratio, less viscosity')
+            error = numerical_error('stability asks for steps below '//to_text(step)//' s, too many for ' &
+               //to_text(sampling%duration)//' s of '//to_text(n_node)//' nodes; allowed: a shorter duration, fewer ' &
+               //'elements, a lower bulk_ratio, less viscosity', 'finite_element')
             return
          end if
       end associate
@@ -479,8 +480,8 @@ contains
          if (time > contacts%latest + max(contacts%settling_time, self%flight_after)) exit samples
       end do samples
       if (run%floor%moves .and. run%impulse > 0.0_wp) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the' &
-            //' mobile floor; allowed: longer than the contact, which never ends on a floor too light for the ball')
+         error = input_error('= '//to_text(sampling%duration)//' s ends while the ball is on the mobile floor; allowed: ' &
+            //'longer than the contact, which never ends on a floor too light for the ball', 'sampling', 'duration')
       else if (contacts%n_over < self%bounces) then
          error = get_duration_error(run, contacts, self%bounces, sampling%duration)
       end if

@@ -162,12 +162,12 @@ contains
       gain = run%total_mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
       if (.not. history%impulse_residual <= max_impulse_residual) then
-         error = numerical_error('&finite_element: the balance of momentum misses by ' &
-            //to_text(history%impulse_residual)//'; allowed: up to '//to_text(max_impulse_residual))
+         error = numerical_error('the balance of momentum misses by '//to_text(history%impulse_residual)//'; allowed: up ' &
+            //'to '//to_text(max_impulse_residual), 'finite_element')
       else if (.not. history%energy_residual <= max_energy_residual) then
-         error = numerical_error('&finite_element: the balance of energy misses by ' &
-            //to_text(history%energy_residual)//' of the energy at first touch; allowed: up to ' &
-            //to_text(max_energy_residual)//', a smaller step_safety helps')
+         error = numerical_error('the balance of energy misses by '//to_text(history%energy_residual)//' of the energy at ' &
+            //'first touch; allowed: up to '//to_text(max_energy_residual)//', a smaller step_safety helps', &
+            'finite_element')
       end if
    end subroutine finish_record
 
@@ -213,11 +213,11 @@ contains
       type(error_type) :: error
       real(wp) :: required
 
-      error = input_error('&sampling: duration = '//to_text(duration)//' s ends before contact '//to_text(bounces) &
-         //' is over')
+      error = input_error('= '//to_text(duration)//' s ends before contact '//to_text(bounces)//' is over', 'sampling', &
+         'duration')
       if (run%floor%moves .and. run%time > contacts%latest + contacts%settling_time) then
-         error = input_error('&sampling: duration = '//to_text(duration) &
-            //' s ends while the floor may strike the ball again; allowed: longer')
+         error = input_error('= '//to_text(duration)//' s ends while the floor may strike the ball again; allowed: longer', &
+            'sampling', 'duration')
          error%has_short_record = .true.
       else if (contacts%active .and. contacts%n_over + 1 == bounces) then
          required = contacts%latest + contacts%settling_time
@@ -255,9 +255,9 @@ contains
             //'); allowed: a lower height, a stiffer ball, more polar_elements'
       else if (run%contact%layer_stiffness > 0.0_wp &
          .and. run%penetration > max_penetration*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
-         error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
-            //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to ' &
-            //to_text(max_penetration)//' of the wall, by a higher layer_stiffness')
+         error = numerical_error('= '//to_text(run%contact%layer_stiffness)//' N/m3 lets the surface sink ' &
+            //to_text(1.0e3_wp*run%penetration)//' mm into the layer; allowed: up to '//to_text(max_penetration)//' of ' &
+            //'the wall, by a higher layer_stiffness', 'contact', 'layer_stiffness')
       else if (run%dissipated + run%contact_loss + run%friction_loss > energy) then
          rests = .true.
          cause = 'the ball has lost the energy of the drop and stays on the floor; allowed: less viscosity, or a higher drop'
@@ -270,7 +270,7 @@ contains
             //' of that at first touch); allowed: a smaller step_safety'
       end if
       if (.not. allocated(cause)) return
-      error = numerical_error('&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start '//cause)
+      error = numerical_error(to_text(1.0e3_wp*time)//' ms after the start '//cause, 'finite_element')
       error%has_short_record = rests
    end subroutine check_run
 

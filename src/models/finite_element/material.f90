@@ -99,17 +99,17 @@ contains
       n_share = options%prony_share%count
       n_time = options%prony_time%count
       if (options%viscosity == 'prony' .and. (n_share == 0 .or. n_share /= n_time .or. n_share > max_branches)) then
-         error = input_error('&material: prony_share has '//to_text(n_share)//' entries and prony_time '//to_text(n_time) &
-            //'; allowed: the same number of both, 1 to '//to_text(max_branches))
+         error = input_error('has '//to_text(n_share)//' entries and prony_time '//to_text(n_time)//'; allowed: the same ' &
+            //'number of both, 1 to '//to_text(max_branches), 'material', 'prony_share')
       else if (options%viscosity /= 'prony' .and. n_share + n_time > 0) then
-         error = input_error("&material: prony_share and prony_time do nothing with viscosity = '" &
-            //trim(options%viscosity)//"'; allowed: viscosity = 'prony'")
+         error = input_error("and prony_time do nothing with viscosity = '"//trim(options%viscosity)//"'; allowed: " &
+            //"viscosity = 'prony'", 'material', 'prony_share')
       else if (ball%gauge_pressure > 0.0_wp) then
-         error = input_error('&ball: gauge_pressure = '//to_text(ball%gauge_pressure) &
-            //' Pa is not allowed with finite_element, whose wall starts without stress; allowed: 0')
+         error = input_error('= '//to_text(ball%gauge_pressure)//' Pa is not allowed with finite_element, whose wall ' &
+            //'starts without stress; allowed: 0', 'ball', 'gauge_pressure')
       else if (ball%poisson_ratio < 0.0_wp) then
-         error = input_error('&ball: poisson_ratio = '//to_text(ball%poisson_ratio) &
-            //' is not allowed with finite_element; allowed: 0 to 0.5')
+         error = input_error('= '//to_text(ball%poisson_ratio)//' is not allowed with finite_element; allowed: 0 to 0.5', &
+            'ball', 'poisson_ratio')
       else if (options%viscosity == 'fractional') then
          call check_fractional_loss('material', options%fractional_order, options%loss_factor, &
             options%loss_frequency, error)
@@ -146,8 +146,8 @@ contains
       case ('constant_loss')
          call fit_constant_loss(options%loss_factor, relative_modulus, material%branch_time, failed)
          if (failed) then
-            error = input_error('&material: no Prony series has loss_factor = '//to_text(options%loss_factor) &
-               //' from 10 to 1000 Hz; allowed: up to about 0.9')
+            error = input_error('no Prony series has loss_factor = '//to_text(options%loss_factor)//' from 10 to 1000 Hz; ' &
+               //'allowed: up to about 0.9', 'material')
             return
          end if
       case ('prony')

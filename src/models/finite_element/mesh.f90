@@ -74,11 +74,11 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (options%polar_elements > 0 .and. options%polar_elements < min_polar) then
-         error = input_error('&mesh: polar_elements = '//to_text(options%polar_elements)//' is not allowed; allowed: from ' &
-            //to_text(min_polar)//', or 0 for automatic')
+         error = input_error('= '//to_text(options%polar_elements)//' is not allowed; allowed: from '//to_text(min_polar) &
+            //', or 0 for automatic', 'mesh', 'polar_elements')
       else if (options%radial_elements > 0 .and. options%radial_elements < min_radial) then
-         error = input_error('&mesh: radial_elements = '//to_text(options%radial_elements) &
-            //' is not allowed with finite_element; allowed: from '//to_text(min_radial)//', or 0 for automatic')
+         error = input_error('= '//to_text(options%radial_elements)//' is not allowed with finite_element; allowed: from ' &
+            //to_text(min_radial)//', or 0 for automatic', 'mesh', 'radial_elements')
       end if
    end subroutine check_mesh
 

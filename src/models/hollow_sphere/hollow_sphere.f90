@@ -92,7 +92,7 @@ contains
       type(force_history_type), intent(in) :: history
       type(validity_limit_type), allocatable :: limits(:)
 
-      limits = [validity_limit_type('ball', 'wall_thickness over outer_radius', ball%wall_thickness/ball%outer_radius, &
+      limits = [validity_limit_type('ball', 'wall thickness over outer radius', ball%wall_thickness/ball%outer_radius, &
          highest=0.4_wp, reason="shells are thin; the paper's ball has 0.36"), &
          get_wall_limits(ball, history), get_gravity_limit(drop, history)]
    end function get_validity_limits
@@ -110,8 +110,8 @@ contains
       force = 0.0_wp
       shell = new_shell(ball, 0.0_wp, 0.0_wp)
       if (deflection(size(deflection)) >= shell%closing_deflection) then
-         error = numerical_error('&compression: max_deflection = '//to_text(deflection(size(deflection))) &
-            //' m: the cavity collapses; allowed: less than its height, '//to_text(shell%closing_deflection)//' m')
+         error = numerical_error('= '//to_text(deflection(size(deflection)))//' m: the cavity collapses; allowed: less ' &
+            //'than its height, '//to_text(shell%closing_deflection)//' m', 'compression', 'max_deflection')
          return
       end if
       force = [(shell%stiffness*deflection(i)/2 + get_gas_force(shell, deflection(i)/2, caps=2), i=1, size(deflection))]
@@ -234,9 +234,9 @@ contains
          error = coarse_step_error('a step ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses ' &
-         //fixed(1.0e3_wp*time, 3)//' ms after first touch; allowed: a deflection of less than its height, ' &
-         //fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
+      error = numerical_error('= '//to_text(drop%height)//' m: the cavity collapses '//fixed(1.0e3_wp*time, 3)//' ms ' &
+         //'after first touch; allowed: a deflection of less than its height, '//fixed(1.0e3_wp*self%closing_deflection, &
+         2)//' mm', 'drop', 'height')
    end function get_failure
 
    !> Force history of one drop.

@@ -97,9 +97,9 @@ contains
       real(wp), intent(in) :: state(:)
       type(error_type) :: error
 
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the source leaves the domain of its ' &
-         //'equations '//fixed(1.0e3_wp*time, 3)//' ms after first touch, at a deflection of '//to_text(state(1)) &
-         //' m; allowed: a lower height')
+      error = numerical_error('= '//to_text(drop%height)//' m: the source leaves the domain of its equations ' &
+         //fixed(1.0e3_wp*time, 3)//' ms after first touch, at a deflection of '//to_text(state(1))//' m; allowed: a ' &
+         //'lower height', 'drop', 'height')
    end function get_failure
 
    !> Maximum displacement of the first mass below the center of mass in flight, m.
@@ -121,8 +121,8 @@ contains
 
       shown = finding
       if (index(finding, 'NaN') + index(finding, 'Infinity') > 0) shown = 'the motion grows without bound'
-      error = numerical_error('&sampling: substeps is too low for this source: '//shown &
-         //'; allowed: more substeps, a higher sample_rate, or a softer or heavier source')
+      error = numerical_error('is too low for this source: '//shown//'; allowed: more substeps, a higher sample_rate, or ' &
+         //'a softer or heavier source', 'sampling', 'substeps')
       error%has_coarse_steps = .true.
    end function coarse_step_error
 

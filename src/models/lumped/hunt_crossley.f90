@@ -79,14 +79,14 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (self%stiffness > 0.0_wp .eqv. self%contact_time > 0.0_wp) then
-         error = input_error('&hunt_crossley: stiffness = '//to_text(self%stiffness)//' with contact_time = ' &
-            //to_text(self%contact_time)//' s is not allowed; allowed: exactly one of them above 0')
+         error = input_error('= '//to_text(self%stiffness)//' with contact_time = '//to_text(self%contact_time)//' s is ' &
+            //'not allowed; allowed: exactly one of them above 0', 'hunt_crossley', 'stiffness')
       else if (self%damping > 0.0_wp .and. self%restitution > 0.0_wp) then
-         error = input_error('&hunt_crossley: damping = '//to_text(self%damping)//' s/m with restitution = ' &
-            //to_text(self%restitution)//' is not allowed; allowed: at most one of them above 0')
+         error = input_error('= '//to_text(self%damping)//' s/m with restitution = '//to_text(self%restitution)//' is not ' &
+            //'allowed; allowed: at most one of them above 0', 'hunt_crossley', 'damping')
       else if (self%restitution > 0.0_wp .and. self%restitution < 0.01_wp) then
-         error = input_error('&hunt_crossley: restitution = '//to_text(self%restitution) &
-            //' is not allowed; allowed: 0 (not given) or 0.01 <= restitution <= 1')
+         error = input_error('= '//to_text(self%restitution)//' is not allowed; allowed: 0 (not given) or 0.01 <= ' &
+            //'restitution <= 1', 'hunt_crossley', 'restitution')
       end if
    end subroutine check
 
@@ -214,9 +214,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       force = self%stiffness*(deflection/2)**self%exponent
-      if (.not. self%stiffness > 0.0_wp) error = input_error('&hunt_crossley: stiffness = 0 is not allowed with ' &
-         //'&compression, because contact_time gives a stiffness for a drop only; allowed: stiffness above 0, without ' &
-         //'contact_time')
+      if (.not. self%stiffness > 0.0_wp) error = input_error('= 0 is not allowed with &compression, because contact_time ' &
+         //'gives a stiffness for a drop only; allowed: stiffness above 0, without contact_time', 'hunt_crossley', &
+         'stiffness')
    end subroutine compress
 
    !> Force history of one drop.
@@ -240,8 +240,8 @@ contains
       end if
       if (allocated(error)) then
          if (error%code >= signal_base) return
-         error = input_error('&hunt_crossley: damping = '//to_text(damping)//' s/m at '//to_text(v0) &
-            //' m/s gives no contact time; allowed: lower damping')
+         error = input_error('= '//to_text(damping)//' s/m at '//to_text(v0)//' m/s gives no contact time; allowed: lower ' &
+            //'damping', 'hunt_crossley', 'damping')
          return
       end if
       spring = new_spring(ball%mass, stiffness, self%exponent, damping)

@@ -153,8 +153,8 @@ contains
       if (has_left(impact)) then
          call finish(impact, history, error)
       else
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the source touches the ' &
-            //'floor or may touch it again; allowed: longer')
+         error = input_error('= '//to_text(sampling%duration)//' s ends while the source touches the floor or may touch ' &
+            //'it again; allowed: longer', 'sampling', 'duration')
       end if
    end subroutine march
 
@@ -320,8 +320,8 @@ contains
          end do
          ! Written so that NaN fails too.
          if (.not. (valid .and. abs(change) <= tolerance*abs(coupled%force))) then
-            error = numerical_error('&drop: '//fixed(1.0e3_wp*impact%time, 3)//' ms after first touch the first force of ' &
-               //'a contact does not converge; allowed: a lower height, or a floor of lower mobility')
+            error = numerical_error(fixed(1.0e3_wp*impact%time, 3)//' ms after first touch the first force of a contact ' &
+               //'does not converge; allowed: a lower height, or a floor of lower mobility', 'drop')
             return
          end if
          coupled%acceleration = rate(2:2*source%n_mass:2)

@@ -79,16 +79,16 @@ contains
 
       associate (n => self%frequency%count)
          if (n == 0) then
-            error = input_error('&measured_modes: frequency has no value; allowed: one frequency per mode, Hz')
+            error = input_error('has no value; allowed: one frequency per mode, Hz', 'measured_modes', 'frequency')
          else if (self%damping_ratio%count /= n .or. self%effective_mass%count /= n) then
-            error = input_error('&measured_modes: frequency has '//to_text(n)//' values, damping_ratio ' &
-               //to_text(self%damping_ratio%count)//' and effective_mass '//to_text(self%effective_mass%count) &
-               //'; allowed: as many of each')
+            error = input_error('has '//to_text(n)//' values, damping_ratio '//to_text(self%damping_ratio%count)//' and ' &
+               //'effective_mass '//to_text(self%effective_mass%count)//'; allowed: as many of each', 'measured_modes', &
+               'frequency')
          else
             total = sum(self%effective_mass%values(:n))
             if (abs(total - ball%mass) > mass_tolerance*ball%mass .and. .not. self%allow_mass_mismatch) then
-               error = input_error('&measured_modes: effective_mass adds up to '//to_text(total) &
-                  //' kg; allowed: the mass of the ball, '//to_text(ball%mass)//' kg, or allow_mass_mismatch = .true.')
+               error = input_error('adds up to '//to_text(total)//' kg; allowed: the mass of the ball, ' &
+                  //to_text(ball%mass)//' kg, or allow_mass_mismatch = .true.', 'measured_modes', 'effective_mass')
             end if
          end if
       end associate
@@ -131,8 +131,8 @@ contains
          end do
       end do march
       if (.not. released) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends after ' &
-            //fixed(1.0e3_wp*time, 1)//' ms of contact; allowed: longer than the contact')
+         error = input_error('= '//to_text(sampling%duration)//' s ends after '//fixed(1.0e3_wp*time, 1)//' ms of ' &
+            //'contact; allowed: longer than the contact', 'sampling', 'duration')
          return
       end if
       ! Dashpots make the force jump at first touch: the first sample is the mean of both sides.
@@ -146,8 +146,9 @@ contains
       end do
       call finish(modes, bracket%get_middle(), history, error)
       if (allocated(error)) return
-      if (history%restitution < 0.0_wp) error = input_error('&measured_modes: frequency and effective_mass let the force ' &
-         //'end after '//to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
+      if (history%restitution < 0.0_wp) error = input_error('and effective_mass let the force end after ' &
+         //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not', 'measured_modes', &
+         'frequency')
    end subroutine solve
 
    !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t), F = sum M_n (w^2 d_n + 2 zeta w d_n').

@@ -111,12 +111,12 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. self%belt_mass < ball%mass) then
-         error = input_error('&two_mass: belt_mass = '//to_text(self%belt_mass)//' kg leaves no rim; allowed: below ' &
-            //'&ball mass = '//to_text(ball%mass)//' kg')
+         error = input_error('= '//to_text(self%belt_mass)//' kg leaves no rim; allowed: below &ball mass = ' &
+            //to_text(ball%mass)//' kg', 'two_mass', 'belt_mass')
       else if (.not. self%inflation_pressure*self%contact_width + self%carcass_stiffness > 0.0_wp) then
-         error = input_error('&two_mass: carcass_stiffness = '//to_text(self%carcass_stiffness) &
-            //' N/m with inflation_pressure = '//to_text(self%inflation_pressure)//' Pa and contact_width = ' &
-            //to_text(self%contact_width)//' m bears no load; allowed: a carcass or an inflated patch')
+         error = input_error('= '//to_text(self%carcass_stiffness)//' N/m with inflation_pressure = ' &
+            //to_text(self%inflation_pressure)//' Pa and contact_width = '//to_text(self%contact_width)//' m bears no ' &
+            //'load; allowed: a carcass or an inflated patch', 'two_mass', 'carcass_stiffness')
       end if
    end subroutine check
 
@@ -138,9 +138,9 @@ contains
       refinement = get_fastest_rate(tyre, get_impact_velocity(drop)) &
          /(merge(step_angle, coupled_angle, is_rigid(receiver))*sampling%sample_rate)
       if (refinement > max_refinement) then
-         error = input_error('&two_mass: belt_mass = '//to_text(self%belt_mass)//' kg with the stiffness of patch and ' &
-            //'sidewall needs '//to_text(refinement)//' steps per step of the input; allowed: up to ' &
-            //to_text(max_refinement))
+         error = input_error('= '//to_text(self%belt_mass)//' kg with the stiffness of patch and sidewall needs ' &
+            //to_text(refinement)//' steps per step of the input; allowed: up to '//to_text(max_refinement), 'two_mass', &
+            'belt_mass')
          return
       end if
       finer%substeps = sampling%substeps*ceiling(refinement)

@@ -80,9 +80,9 @@ contains
       type(ball_type), intent(in) :: ball
       type(error_type), allocatable, intent(out) :: error
 
-      if (ball%wall_thickness < min_wall*ball%outer_radius) error = input_error('&ball: wall_thickness = ' &
-         //to_text(ball%wall_thickness)//' m is not allowed with &modes; allowed: from ' &
-         //to_text(min_wall*ball%outer_radius)//' m, '//to_text(min_wall)//' of outer_radius')
+      if (ball%wall_thickness < min_wall*ball%outer_radius) error = input_error('= '//to_text(ball%wall_thickness)//' m ' &
+         //'is not allowed with &modes; allowed: from '//to_text(min_wall*ball%outer_radius)//' m, '//to_text(min_wall) &
+         //' of outer_radius', 'ball', 'wall_thickness')
    end subroutine check_modes
 
    !> The lowest elastic modes of a ball.
@@ -108,8 +108,8 @@ contains
          highest_omega = 1.5_wp*highest_omega
       end do
       call restore_blas_threads()
-      if (pass > max_passes) error = numerical_error('&modes: count = '//to_text(count) &
-         //' needs too many polynomials; allowed: fewer modes')
+      if (pass > max_passes) error = numerical_error('= '//to_text(count)//' needs too many polynomials; allowed: fewer ' &
+         //'modes', 'modes', 'count')
       if (.not. allocated(error)) call describe(ball, basis, lowest, modes)
    end subroutine get_free_modes
 

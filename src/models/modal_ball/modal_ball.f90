@@ -142,10 +142,10 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (self%rings == 1) then
-         error = input_error('&modal_ball: rings = 1 cannot carry a pressure; allowed: from 2, or 0 for automatic')
+         error = input_error('= 1 cannot carry a pressure; allowed: from 2, or 0 for automatic', 'modal_ball', 'rings')
       else if (self%highest_frequency > 0.0_wp .and. self%highest_frequency < lowest_frequency) then
-         error = input_error('&modal_ball: highest_frequency = '//to_text(self%highest_frequency) &
-            //' Hz is not allowed; allowed: from '//to_text(lowest_frequency)//' to 20000 Hz, or 0 for automatic')
+         error = input_error('= '//to_text(self%highest_frequency)//' Hz is not allowed; allowed: from ' &
+            //to_text(lowest_frequency)//' to 20000 Hz, or 0 for automatic', 'modal_ball', 'highest_frequency')
       else if (self%damping_law == 'fractional') then
          call check_fractional_loss('modal_ball', self%fractional_order, self%loss_factor, self%loss_frequency, &
             error)

@@ -59,8 +59,8 @@ contains
          end do
          before = deflection(i)
          if (contact%outermost == size(rings%radius)) then
-            error = numerical_error('&compression: max_deflection: at '//to_text(deflection(i)) &
-               //' m the ball lies on its outermost ring; allowed: less')
+            error = numerical_error('is too large: at '//to_text(deflection(i))//' m the ball lies on its outermost ring; ' &
+               //'allowed: less', 'compression', 'max_deflection')
             return
          end if
          force(i) = sum(contact%force(::rings%n_dof))

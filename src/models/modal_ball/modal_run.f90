@@ -144,11 +144,10 @@ contains
                history%exact_contact_time = (n_step - 0.5_wp - clearance/(clearance - last_clearance))*run%interval
             end if
             if (run%contact%outermost == size(run%rings%radius)) then
-               error = numerical_error('&ball: youngs_modulus = '//to_text(run%ball%youngs_modulus)//' Pa is too low for ' &
-                  //'this drop: '//significant(1.0e3_wp*n_step*run%interval, 3)//' ms after first touch the ball lies ' &
-                  //'on its outermost ring, its center lowered by ' &
-                  //significant(1.0e3_wp*(run%ball%outer_radius - run%height), 3)//' mm; allowed: a stiffer ball, or a ' &
-                  //'lower height')
+               error = numerical_error('= '//to_text(run%ball%youngs_modulus)//' Pa is too low for this drop: ' &
+                  //significant(1.0e3_wp*n_step*run%interval, 3)//' ms after first touch the ball lies on its outermost ' &
+                  //'ring, its center lowered by '//significant(1.0e3_wp*(run%ball%outer_radius - run%height), 3)//' mm; ' &
+                  //'allowed: a stiffer ball, or a lower height', 'ball', 'youngs_modulus')
                return
             end if
             if (run%floor_moves) call add_to_means(run%floor_motion%displacement - before, 1/sampling%sample_rate, i, &
@@ -276,12 +275,12 @@ contains
       if (run%floor_moves) cause = ', probably because the floor is so soft that the ball sinks into it instead of ' &
          //'rebounding; allowed: a stiffer floor, covering or floating plate, or a longer duration'
       if (.not. has_separated) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //fixed(1.0e3_wp*settling_time, 1)//' ms after the last contact'//cause)
+         error = input_error('= '//to_text(sampling%duration)//' s ends less than '//fixed(1.0e3_wp*settling_time, 1) &
+            //' ms after the last contact'//cause, 'sampling', 'duration')
       else if (run%floor_moves) then
-         if (can_strike(run%floor, run%floor_motion, minval(run%gap(::run%contact%n_dof)), run%velocity)) error = &
-            input_error('&sampling: duration = '//to_text(sampling%duration) &
-            //' s ends while the floor may strike the ball again; allowed: longer')
+         if (can_strike(run%floor, run%floor_motion, minval(run%gap(::run%contact%n_dof)), &
+            run%velocity)) error = input_error('= '//to_text(sampling%duration)//' s ends while the floor may strike the ' &
+            //'ball again; allowed: longer', 'sampling', 'duration')
       end if
    end subroutine check_end
 
@@ -313,8 +312,9 @@ contains
          + run%loss + run%contact_loss + run%floor_work
       history%energy_residual = abs(energy - initial)/initial
       ! Written so that NaN fails too.
-      if (.not. history%energy_residual <= max_residual) error = numerical_error('&sampling: substeps is too low: the ' &
-         //'balance of energy misses by '//to_text(history%energy_residual)//'; allowed: up to '//to_text(max_residual))
+      if (.not. history%energy_residual <= max_residual) error = numerical_error('is too low: the balance of energy ' &
+         //'misses by '//to_text(history%energy_residual)//'; allowed: up to '//to_text(max_residual), 'sampling', &
+         'substeps')
    end subroutine finish
 
    !> Writes motion and energies of one sample into the history.

@@ -67,8 +67,8 @@ contains
       factor = response
       call dpotrf('L', n, factor, n, info)
       if (info /= 0) then
-         error = numerical_error('&modal_ball: rings = '//to_text(n/n_dof)//' cannot be distinguished; allowed: fewer ' &
-            //'rings, or more substeps')
+         error = numerical_error('= '//to_text(n/n_dof)//' cannot be distinguished; allowed: fewer rings, or more ' &
+            //'substeps', 'modal_ball', 'rings')
          return
       end if
       do i = 1, n
@@ -106,8 +106,8 @@ contains
             contact%touches(first_wrong) = .not. contact%touches(first_wrong)
          end if
       end do
-      error = numerical_error('&modal_ball: rings: the rings that touch were not found in '//to_text(max_rounds) &
-         //' rounds; allowed: fewer rings, or more substeps')
+      error = numerical_error('the rings that touch were not found in '//to_text(max_rounds)//' rounds; allowed: fewer ' &
+         //'rings, or more substeps', 'modal_ball')
    end subroutine solve_contact
 
    !> Makes the rings that touch at the end of a step stick there.

@@ -222,8 +222,8 @@ contains
 
       wavenumber = highest_omega*sqrt(get_density(ball)*2*(1 + ball%poisson_ratio)/ball%youngs_modulus)
       if (.not. wavenumber*ball%outer_radius <= max_waves) then
-         error = numerical_error('&modal_ball: the ball has too many modes up to '//fixed(highest_omega/(2*pi), 0) &
-            //' Hz; allowed: a stiffer or smaller ball, or a lower highest_frequency')
+         error = numerical_error('the ball has too many modes up to '//fixed(highest_omega/(2*pi), 0)//' Hz; allowed: a ' &
+            //'stiffer or smaller ball, or a lower highest_frequency', 'modal_ball')
          return
       end if
       ! Surface waves of this frequency; bending waves of thin walls are slower.
@@ -381,8 +381,8 @@ contains
       integer, intent(in) :: harmonic
       type(error_type) :: error
 
-      error = numerical_error('&ball: the '//quantity//' of harmonic '//to_text(harmonic)//' cannot be computed in double ' &
-         //'precision; allowed: less extreme values of wall_thickness and poisson_ratio, fewer modes or rings')
+      error = numerical_error('the '//quantity//' of harmonic '//to_text(harmonic)//' cannot be computed in double ' &
+         //'precision; allowed: less extreme values of wall_thickness and poisson_ratio, fewer modes or rings', 'ball')
    end function harmonic_error
 
    !> Stiffness and mass of one harmonic in the basis. For n = 1 its first function, U = 1 and W = 0, is the rigid mode; the
