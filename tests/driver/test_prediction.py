@@ -17,6 +17,7 @@ import thud
 from thud import plot
 from thud.base import _schema, bridge
 from thud.base.errors import ReportWarning
+from thud.base.note import Note
 from thud.case.case import tables_case
 from thud.cli import main
 from thud.floors.prediction import _force_change
@@ -55,7 +56,7 @@ def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -
     assert summary["level"] == pytest.approx([entry.level for entry in ratings])
     assert summary["uncertainty"] == pytest.approx(found.rating.uncertainty)
     assert str(found.rating) in " ".join(done.stdout.split())
-    assert f"&room: {found.source_warnings[0]}" in done.stderr
+    assert f"&room: {found.source_notes[0]}" in done.stderr
 
 
 @pytest.mark.parametrize(("thickness", "told"), [(0.02, True), (0.2, False)])
@@ -341,17 +342,17 @@ def test_share_that_is_radiated_is_that_of_one_side() -> None:
 
 def test_force_that_is_not_that_on_the_floor_raises_a_warning(shell: thud.Impact) -> None:
     found = thud.predict_level(shell, thud.Plate(), thud.Room())
-    enough = replace(found, source_warnings=())
+    enough = replace(found, source_notes=())
     assert enough.warnings == ()
     # The force that is used is the right one, or its change is stated.
-    for force, change, words in (
-        ("blocked", -0.1, ["at most 0.1 dB"]), ("blocked", -0.11, ["by about -0.1 dB"]),
-        ("blocked", 0.11, ["by about 0.1 dB"]), ("contact", -3.0, []),
+    for force, change, codes in (
+        ("blocked", -0.1, ["blocked_model"]), ("blocked", -0.11, ["blocked_force"]),
+        ("blocked", 0.11, ["blocked_force"]), ("contact", -3.0, []),
     ):  # fmt: skip
         one = replace(enough, force=force, force_change=change)  # type: ignore[arg-type]
-        assert len(one.warnings) == len(words)
-        assert all(word in text for word, text in zip(words, one.warnings, strict=True))
-    assert replace(enough, floor_warnings=("a", "b")).warnings == ("a", "b")
+        assert [(note.code, note.value) for note in one.notes] == [(code, change) for code in codes]
+    notes = Note("a", others={"name": "&a", "text": "b"}), Note("blocked_force", value=1.0)
+    assert replace(enough, floor_notes=notes).notes == notes
 
 
 def test_single_numbers_are_those_of_the_levels(shell: thud.Impact) -> None:
@@ -431,21 +432,20 @@ def test_reverberation_time_holds_the_losses_that_its_room_has(
 
 
 def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
-    (text,) = [
-        w for w in thud.predict_level(shell, thud.Plate(), thud.Room()).warnings if "source" in w
-    ]
+    (note,) = thud.predict_level(shell, thud.Plate(), thud.Room()).source_notes
+    text = str(note)
     impact = thud.solve(replace(shell.case, floor=thud.Plate(), room=thud.Room()))
-    assert thud.predict_level(impact.on_floor).source_warnings == (text,)  # type: ignore[arg-type]
+    assert thud.predict_level(impact.on_floor).source_notes == (note,)  # type: ignore[arg-type]
     lower, upper = octave_limits("rubber_ball")
     for band, level, low, high in zip(
         ("31.5", "63", "125", "250", "500"), shell.levels(force="floor"), lower, upper, strict=True
     ):
         shown = f"{band} Hz {level - (low + high) / 2:.1f} dB"
         assert (shown in text) == (not low <= level <= high)
-    assert "does not conform" in text
+    assert note.code == "source_off_nominal"
     viscous = thud.read_case(REPOSITORY / "inputs/rubber_ball_fe_viscous.nml")
     conforming = thud.predict_level(thud.solve(viscous), thud.Plate(), thud.Room())
-    assert conforming.source_warnings == ()
+    assert conforming.source_notes == ()
 
 
 def test_modal_bands_that_take_too_long_are_named(
@@ -509,7 +509,7 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     assert impact.on_floor is not None
     assert impact.on_floor.assess()
     found = thud.predict_level(floor=floor)
-    assert not found.source_warnings
+    assert not found.source_notes
     assert impact.room_level is not None
     assert found.level == pytest.approx(impact.room_level.level, abs=1e-12)
     tables = {"floor": {"name": "plate"}, "room": {}}

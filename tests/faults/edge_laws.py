@@ -107,10 +107,10 @@ def _outside(impact: thud.Impact) -> dict[str, bool]:
             [shown.numerical_error.level for shown in (impact, on_floor) if shown is not None]
         ) <= 0.2,
         "gravity times contact time": not free and fall > 0.201,
-        "wall_thickness over outer_radius": isinstance(case.model, thud.HollowSphere)
+        "wall thickness over outer radius": isinstance(case.model, thud.HollowSphere)
         and ball.wall_thickness > 0.401 * radius,
-        "deflection over outer_radius": linear and deep > 0.502 * radius,
-        "deflection over wall_thickness": linear
+        "deflection over outer radius": linear and deep > 0.502 * radius,
+        "deflection over wall thickness": linear
         and deep > (0.505 if ball.wall_thickness < 0.3 * radius else 2.01) * ball.wall_thickness,
         "check the units of the input": not 3.9 < total < 92.1,
         "smallest fraction of the energy in an octave": lowest < total - 120.1,

@@ -15,6 +15,7 @@ import numpy as np
 
 from thud import _core
 from thud.base.errors import InputError, NumericalError
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -89,8 +90,24 @@ def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
             items[name] = chunk.reshape(extents, order="F") if extents else float(chunk[0])
             at["values"] += length
     if status:
-        raise _ERRORS.get(status, NumericalError)(text(answer["message"]))
+        kind = _ERRORS.get(status, NumericalError)
+        raise kind(text(answer["message"]), _refused(answer) if "group" in answer else None)
     return answer
+
+
+def _refused(answer: Bundle) -> Note:
+    """Return what an error of the library is about."""
+    subject = ".".join(text(answer[name]) for name in ("group", "key") if answer[name])
+    value, low, high, low_open, high_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
+    others = {"name": _name(subject), "text": text(answer["problem"])}
+    others |= {"low_open": low_open, "high_open": high_open}
+    return Note("refused", subject, value, low, high, others=others)
+
+
+def _name(subject: str) -> str:
+    """Return how messages of the library call a group, or a group and a key."""
+    group, _, key = subject.partition(".")
+    return f"&{group}: {key}".rstrip()
 
 
 @lru_cache(maxsize=64)
@@ -113,9 +130,20 @@ def text(value: bytes) -> str:
     return value.decode(errors="surrogateescape")
 
 
-def texts(group: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the warnings in a group of an answer."""
-    return tuple(text(group["warning"]).split("\n")) if group else ()
+def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
+    """Return the warnings in a group of an answer, if there are any."""
+    if not group:
+        return ()
+    words = (text(group[name]).split("\n") for name in ("code", "subject", "text"))
+    # Equal notes have the same NaN.
+    numbers = (
+        [math.nan if math.isnan(value) else float(value) for value in group[name]]
+        for name in ("value", "low", "high")
+    )
+    return tuple(
+        Note(code, subject, value, low, high, others={"name": _name(subject), "text": said})
+        for code, subject, said, value, low, high in zip(*words, *numbers, strict=True)
+    )
 
 
 def without_units(columns: Mapping[str, Any]) -> dict[str, Any]:

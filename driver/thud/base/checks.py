@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NoReturn, get_args
 
 import numpy as np
 
 from thud.base.errors import InputError
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Container, Iterable
@@ -23,15 +25,37 @@ MAX_NUMBER = 10**300
 MAX_SEED = 2**32 - 1
 
 
-def refuse(problem: str, allowed: str, cause: Exception | None = None) -> NoReturn:
-    """Raise InputError with a message that states the problem and what is allowed."""
+def refuse(
+    problem: str, allowed: str, cause: Exception | None = None, *, subject: str = ""
+) -> NoReturn:
+    """Raise InputError with a message that states the problem and what is allowed.
+
+    The subject is the key that would mend it, if there is one.
+    """
     message = f"{problem}; allowed: {allowed}"
-    raise InputError(message) from cause
+    note = Note("refused", subject, others={"name": "", "text": message}) if subject else None
+    raise InputError(message, note) from cause
 
 
-def refuse_value(name: str, value: object, allowed: str) -> NoReturn:
-    """Raise InputError for a value that is not allowed."""
-    refuse(f"{name} = {shown(value)} is not allowed", allowed)
+def refuse_value(  # noqa: PLR0913 - the fields of a note
+    name: str,
+    value: object,
+    allowed: str,
+    *,
+    subject: str = "",
+    low: float = math.nan,
+    high: float = math.nan,
+    problem: str = "not allowed",
+) -> NoReturn:
+    """Raise InputError for a value that is not allowed, or not within a range.
+
+    The subject is by default the name.
+    """
+    text = f"= {shown(value)} is {problem}; allowed: {allowed}"
+    number = float(value) if isinstance(value, int | float) and not math.isnan(low) else math.nan
+    others = {"name": name, "text": text}
+    note = Note("refused", subject or name, number, low, high, others=others)
+    raise InputError(str(note), note)
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
@@ -46,8 +70,8 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
 def require_choice(name: str, value: object, allowed: Collection[str]) -> None:
     """Raise InputError if a value is not one of the allowed words."""
     if not isinstance(value, str) or value not in allowed:
-        unknown = f"{name} = {shown(value)} is not known{suggestion(value, allowed)}"
-        refuse(unknown, ", ".join(map(repr, allowed)))
+        unknown = f"not known{suggestion(value, allowed)}"
+        refuse_value(name, value, ", ".join(map(repr, allowed)), problem=unknown)
 
 
 def require_mapping(name: str, value: object, entries: str) -> None:

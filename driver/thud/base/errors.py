@@ -1,4 +1,13 @@
-"""Errors of the library as Python exceptions."""
+"""Errors of the library as Python exceptions, and warnings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from thud.base.note import Note
 
 
 class ThudError(Exception):
@@ -8,9 +17,21 @@ class ThudError(Exception):
     ----------
     exit_code : int
         Exit code that the commands use for this error.
+    note : Note or None
+        What the error is about, if that is a key or an argument: its name is the subject,
+        ``"group.key"`` for a key of the library, with the value that is not allowed and its range;
+        the message is the text ``"name"`` and, behind a blank, the text ``"text"``.
     """
 
     exit_code = 2
+
+    def __init__(self, message: object = "", note: Note | None = None) -> None:
+        super().__init__(message)
+        self.note = note
+
+    def within(self, place: object) -> Self:
+        """Return the error with a place, such as a path, in front of its message."""
+        return type(self)(f"{place}: {self}", self.note)
 
 
 class FitWarning(UserWarning):
@@ -18,7 +39,7 @@ class FitWarning(UserWarning):
 
 
 class PlausibilityWarning(UserWarning):
-    """A result is possible but implausible."""
+    """A result is possible but implausible; its argument is a `Note` or a sentence."""
 
 
 class ReportWarning(UserWarning):

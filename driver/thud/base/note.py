@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from thud.base.sentences import PROCESSING, WARNINGS
+from thud.base.sentences import LIBRARY, PROCESSING, WARNINGS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -40,12 +40,12 @@ class Note:
     high: float = math.nan
     unit: str = ""
     effect: float = math.inf
-    others: Mapping[str, float | str] = field(default_factory=dict)
+    others: Mapping[str, float | str] = field(default_factory=dict, hash=False)
 
     @property
     def is_warning(self) -> bool:
         """Whether it states what may be wrong, not what was done."""
-        return self.code in WARNINGS
+        return self.code not in PROCESSING
 
     @property
     def message(self) -> str:
@@ -89,7 +89,7 @@ def sentence(notes: Sequence[Note]) -> str:
     values |= {name: _Range([note.others[name] for note in notes]) for name in notes[0].others}
     code = notes[0].code
     cell = "{cell}: " if "cell" in values else ""
-    return (cell + (WARNINGS.get(code) or PROCESSING[code])).format(**values)
+    return (cell + (WARNINGS.get(code) or PROCESSING.get(code) or LIBRARY)).format(**values)
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -1,5 +1,9 @@
 """The words of all notes: one sentence for each code, with the values of `thud.base.note.Note`."""
 
+# Of refusals and of notes of the library, whose words are made where they arise
+# (src/case/warnings.f90): the name of an argument, or of group and key, and what is said of it.
+LIBRARY = "{name} {text}"
+
 # What was done with a signal.
 PROCESSING = {
     # Reading of files.
@@ -181,5 +185,21 @@ WARNINGS = {
     "date_unknown": (
         "the date of the measurement cannot be read: whether a calibration was due before is not "
         "known"
+    # Level in a room.
+    "level_below_paths": (
+        "the rating is below {high:g} {unit}: in a building, flanking paths, gaps and bridges that "
+        "are not in the prediction are expected to be louder"
+    ),
+    "blocked_force": (
+        "the floor is not rigid: its motion would change the peak force by about {value:.1f} "
+        "{unit}, but the force on a rigid floor is used"
+    ),
+    "blocked_model": (
+        "the model {model} has no force on a mobile floor: that on a rigid floor is used, whose "
+        "peak the floor would change by at most {high:g} {unit}"
+    ),
+    "source_off_nominal": (
+        "the source does not conform ({octaves} from the nominal levels): the level in the room is "
+        "not that of a standard source"
     ),
 }

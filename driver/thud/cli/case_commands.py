@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.base._schema import VERDICTS
-from thud.base.bridge import ask, text, texts
+from thud.base.bridge import ask, notes, text
 from thud.base.checks import refuse
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
@@ -97,7 +97,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
             "run", path=os.fsencode(path), folder=os.fsencode(folder), all=options.all,
             verbose=options.verbose, progress=not options.quiet,
         )  # fmt: skip
-        print_notes(f"{path}: {value}" for value in texts(answer.get("warnings", {})))
+        print_notes(f"{path}: {value}" for value in notes(answer.get("warnings", {})))
         results.write_into(folder, _figures(answer, options))
     if not options.quiet:
         print_results(text(answer["table"]).removesuffix("\n"))

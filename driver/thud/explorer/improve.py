@@ -134,7 +134,7 @@ def _improve_floor(case: Case) -> Work:
     if required.verdict == VERDICTS[0]:
         return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
     if not required.conforms:
-        reason = " ".join(prediction.source_warnings)
+        reason = " ".join(map(str, prediction.source_notes))
         none = f"No floor meets the requirement with this source: {reason}. Choose another source."
         return {"changes": [], "none": none, "note": ""}
     names = [name for name in LAYERS if _has_layer(case.floor, name)]

@@ -13,6 +13,7 @@ from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
+from thud.base.note import Note
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 from thud.floors.survey import RoomLevels
@@ -63,8 +64,8 @@ class RoomPrediction(RoomLevel, Displayed):
     force_change : float
         Change of the peak force by the floor, dB. If the force is blocked: the change for a linear
         source with the mass and the contact time of the impact.
-    source_warnings : tuple of str
-        Sentences on a source that does not conform to the standards.
+    source_notes : tuple of Note
+        Warning on a source that does not conform to the standards.
     """
 
     floor: FloorOptions
@@ -72,7 +73,7 @@ class RoomPrediction(RoomLevel, Displayed):
     source: ImpactResult
     force: Literal["contact", "blocked"]
     force_change: float
-    source_warnings: tuple[str, ...]
+    source_notes: tuple[Note, ...]
 
     @property
     def rating(self) -> PredictedRating:
@@ -91,12 +92,12 @@ class RoomPrediction(RoomLevel, Displayed):
     @property
     def source_note(self) -> str:
         """``"the source does not conform"``, which belongs beside each rating, or empty."""
-        return "the source does not conform" if self.source_warnings else ""
+        return "the source does not conform" if self.source_notes else ""
 
     @property
     def class_text(self) -> str:
         """Class of the rating of octaves (KS F 2863-2); empty unless for a ball that conforms."""
-        if not self.is_ball or self.source_warnings:
+        if not self.is_ball or self.source_notes:
             return ""
         return class_text(class_of(self.ratings["octaves"].level))
 
@@ -126,7 +127,7 @@ class RoomPrediction(RoomLevel, Displayed):
         """Verdict on the requirement of the room (its key `required`); None without one."""
         if not self.room.required:
             return None
-        return Requirement(self.room.required, self.rating, not self.source_warnings)
+        return Requirement(self.room.required, self.rating, not self.source_notes)
 
     @property
     def sentence(self) -> str:
@@ -139,25 +140,26 @@ class RoomPrediction(RoomLevel, Displayed):
         return standardized_level(self.level, self.reverberation_time, self.volume)
 
     @property
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings on the validity of the prediction."""
+        result = [*self.floor_notes]
+        level = self.ratings["thirds"].level
+        if level < MIN_PLAUSIBLE:
+            result.append(Note("level_below_paths", "room", level, high=MIN_PLAUSIBLE, unit="dB"))
+        change, model = self.force_change, self.source.case.model
+        if self.force == "blocked" and abs(change) > MAX_CHANGE:
+            result.append(Note("blocked_force", "floor", change, high=MAX_CHANGE, unit="dB"))
+        elif self.force == "blocked" and model is not None:
+            others = {"model": model.name}
+            result.append(
+                Note("blocked_model", "floor", change, high=MAX_CHANGE, unit="dB", others=others)
+            )
+        return (*result, *self.source_notes)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on the validity of the prediction."""
-        result = [*self.floor_warnings]
-        if self.ratings["thirds"].level < MIN_PLAUSIBLE:
-            result.append(
-                f"the rating is below {MIN_PLAUSIBLE:g} dB: in a building, flanking paths, gaps "
-                "and bridges that are not in the prediction are expected to be louder"
-            )
-        if self.force == "blocked" and abs(self.force_change) > MAX_CHANGE:
-            result.append(
-                f"the floor is not rigid: its motion would change the peak force by about "
-                f"{self.force_change:.1f} dB, but the force on a rigid floor is used"
-            )
-        elif self.force == "blocked" and (model := self.source.case.model) is not None:
-            result.append(
-                f"the model {model.name} has no force on a mobile floor: that on a rigid floor is "
-                f"used, whose peak the floor would change by at most {MAX_CHANGE:g} dB"
-            )
-        return (*result, *self.source_warnings)
+        """Sentences of `notes`."""
+        return tuple(map(str, self.notes))
 
     def difference(self, measured: RoomLevels) -> Array:
         """Return measured − predicted level, dB, shape (12,), without standardization.
@@ -264,12 +266,12 @@ def predict_level(
         source=impact or source,
         force="contact" if impact else "blocked",
         force_change=change,
-        source_warnings=_source_warnings(source),
+        source_notes=_source_notes(source),
     )
 
 
-def _source_warnings(source: ImpactResult) -> tuple[str, ...]:
-    """Return a warning if octave levels of the force on a rigid floor do not conform."""
+def _source_notes(source: ImpactResult) -> tuple[Note, ...]:
+    """Return a note if octave levels of the force on a rigid floor do not conform."""
     levels = (
         force_exposure_levels(source.blocked_force, source.sample_rate)
         if isinstance(source, FloorImpact)
@@ -283,11 +285,7 @@ def _source_warnings(source: ImpactResult) -> tuple[str, ...]:
     ]
     if not outside:
         return ()
-    warning = (
-        f"the source does not conform ({', '.join(outside)} from the nominal levels): the level in "
-        "the room is not that of a standard source"
-    )
-    return (warning,)
+    return (Note("source_off_nominal", "room", others={"octaves": ", ".join(outside)}),)
 
 
 def _on_floor(source: ImpactResult, case: Case) -> tuple[FloorImpact | None, RoomLevel | None]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from thud.base.bridge import ask, texts
+from thud.base.bridge import ask, notes
 from thud.base.checks import refuse, require_kind
 from thud.case.case import Case, case_text, impact_only
 from thud.impact.floor_impact import new_floor_impact
@@ -28,7 +28,7 @@ def new_impact(case: Case, answer: Bundle) -> Impact:
     common = impact_fields(case, answer)
     return Impact(
         **common,
-        warnings=texts(answer.get("warnings", {})),
+        notes=notes(answer.get("warnings", {})),
         on_floor=new_floor_impact(case, answer, common["floor_force"]),
         room_level=new_room_level(answer),
     )

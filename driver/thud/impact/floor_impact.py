@@ -171,7 +171,7 @@ def new_floor_impact(
     velocities = [values for name, values in columns.items() if name.startswith("point_")]
     impact = FloorImpact(
         **impact_fields(case, answer, "floor_"),
-        warnings=(),
+        notes=(),
         blocked_force=blocked_force,
         floor_displacement=columns["floor_displacement"],
         floor_velocity=columns["floor_velocity"],

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.arguments import check_arguments
-from thud.base.bridge import ask, texts, without_units
+from thud.base.bridge import ask, notes, without_units
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.bridge import Bundle
+    from thud.base.note import Note
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +49,8 @@ class FreeModes(Displayed):
         Positions of the nodes relative to the center of the ball, m.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of the nodes; the maximum length is 1, and the lowest point moves upwards.
-    warnings : tuple of str
-        Sentences on implausible input.
+    notes : tuple of Note
+        Warnings on implausible input.
     """
 
     ball: Ball
@@ -58,7 +59,7 @@ class FreeModes(Displayed):
     participation: NDArray[np.float64]
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
-    warnings: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     def __repr__(self) -> str:
         """Return the frequencies, without the shapes."""
@@ -119,7 +120,7 @@ def free_modes(
     Warns
     -----
     PlausibilityWarning
-        For each entry of `FreeModes.warnings`.
+        For each entry of `FreeModes.notes`.
     """
     case = Case(
         ball=Ball() if ball is None else ball,
@@ -127,8 +128,8 @@ def free_modes(
         modes=Modes(count),
     )
     modes = new_modes(case.ball, ask("solve", case=case_text(case)))
-    for warning in modes.warnings:
-        warnings.warn(warning, PlausibilityWarning, stacklevel=3)
+    for note in modes.notes:
+        warnings.warn(PlausibilityWarning(note), stacklevel=3)
     return modes
 
 
@@ -142,7 +143,7 @@ def new_modes(ball: Ball, answer: Bundle) -> FreeModes:
         modes["pole_participation"],
         np.stack((shapes["r"], shapes["z"]), axis=-1),
         np.moveaxis(shapes["shape"], (-1, 0), (0, -1)),
-        texts(answer.get("warnings", {})),
+        notes(answer.get("warnings", {})),
     )
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
     from thud.base.bridge import Bundle
+    from thud.base.note import Note
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
     from thud.impact.room_level import RoomLevel
@@ -90,8 +91,8 @@ class Impact(ImpactQuantities, Displayed):
         Other histories of the model, such as the contact radius; the names end with units.
     model_quantities : dict of str to float
         Other scalars of the model, such as the bulk modulus; SI units.
-    warnings : tuple of str
-        Sentences on implausible input, such as a density of the wall that no rubber has.
+    notes : tuple of Note
+        Warnings on implausible input, such as a density of the wall that no rubber has.
     motion : Motion or None
         Snapshots of the deformed ball; None if the model has none.
     on_floor : FloorImpact or None
@@ -110,7 +111,7 @@ class Impact(ImpactQuantities, Displayed):
     components: dict[str, NDArray[np.float64]]
     model_histories: dict[str, NDArray[np.float64]]
     model_quantities: dict[str, float]
-    warnings: tuple[str, ...]
+    notes: tuple[Note, ...]
     motion: Motion | None
     on_floor: FloorImpact | None = None
     room_level: RoomLevel | None = None
@@ -176,6 +177,11 @@ class Impact(ImpactQuantities, Displayed):
             f"<Impact, {model}: contact {1e3 * self.contact_time:.2f} ms, "
             f"e {self.restitution:.3f}, peak {self.peak():.0f} N>"
         )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences of `notes`."""
+        return tuple(map(str, self.notes))
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""

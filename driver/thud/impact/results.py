@@ -16,6 +16,8 @@ from thud.case.case import Case
 from thud.impact.compute import new_impact
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from thud.impact.impact import Impact
@@ -91,15 +93,26 @@ def _new_impact(files: _Files) -> Impact:
     """Return the impact of a result directory, whose files are the groups of the library."""
     answer: dict[str, Any] = dict(f90nml.reads(files["summary.nml"]))
     if "warnings" in answer:
-        # f90nml returns a single text as a string, not as a list.
-        messages = answer["warnings"]["warning"]
-        messages = messages if isinstance(messages, list) else [messages]
-        answer["warnings"] = {"warning": "\n".join(messages).encode()}
+        answer["warnings"] = _warnings(answer["warnings"])
     required = ("force", "floor_force") if "floor_summary" in answer else ("force",)
     for name in _TABLES:
         if name in required or f"{name}.csv" in files:
             answer[name] = _table(files[f"{name}.csv"])
     return new_impact(Case.from_text(files["effective.nml"]), answer)
+
+
+def _warnings(group: Mapping[str, Any]) -> dict[str, bytes | NDArray[np.float64]]:
+    """Return the warnings of a summary as the library sends them."""
+    # f90nml returns a single entry without a list, and drops unknown numbers at the end of one.
+    lists = {name: entry if isinstance(entry, list) else [entry] for name, entry in group.items()}
+    count = len(lists["code"])
+    result: dict[str, bytes | NDArray[np.float64]] = {
+        name: "\n".join(lists[name]).encode() for name in ("code", "subject", "text")
+    }
+    for name in ("value", "low", "high"):
+        entries = [*lists.get(name, ()), *[None] * count]
+        result[name] = np.array(entries[:count], dtype=np.float64)
+    return result
 
 
 def _table(text: str) -> dict[str, NDArray[np.float64]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import RATINGS
-from thud.base.bridge import text, texts, without_units
+from thud.base.bridge import notes, text, without_units
 from thud.base.errors import NumericalError
 from thud.base.immutable import Immutable
 from thud.level.rating import PredictedRating
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import RoomRating
     from thud.base.bridge import Bundle
+    from thud.base.note import Note
 
     Array = NDArray[np.float64]
 
@@ -66,8 +67,8 @@ class RoomLevel(Immutable):
         Frequency at which three modes of the room overlap, Hz.
     ratings : mapping of str to PredictedRating
         Single-number ratings: ``"octaves"``, ``"thirds"`` and ``"standardized"``.
-    floor_warnings : tuple of str
-        Sentences on conditions in which the model of the floor is not valid.
+    floor_notes : tuple of Note
+        Warnings on conditions in which the model of the floor is not valid.
     """
 
     frequency: Array
@@ -88,7 +89,7 @@ class RoomLevel(Immutable):
     n_modal: int
     crossover: float
     ratings: Mapping[RoomRating, PredictedRating]
-    floor_warnings: tuple[str, ...]
+    floor_notes: tuple[Note, ...]
 
     @property
     def has_edges(self) -> bool:
@@ -129,5 +130,5 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
             name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
             for name, level in zip(RATINGS, summary["level"], strict=True)
         },
-        floor_warnings=texts(answer.get("room_warnings", {})),
+        floor_notes=notes(answer.get("room_warnings", {})),
     )

@@ -77,7 +77,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Warns
     -----
     PlausibilityWarning
-        For each entry of `Impact.warnings`.
+        For each entry of `Impact.notes`.
     """
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     settings = {name: value for name, value in sampling.items() if value is not None}
@@ -97,6 +97,6 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         )
         case = with_floor(case, floor)
     impact = compute(case)
-    for warning in impact.warnings:
-        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
+    for note in impact.notes:
+        warnings.warn(PlausibilityWarning(note), stacklevel=2)
     return impact

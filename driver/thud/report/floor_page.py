@@ -259,7 +259,7 @@ def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
         "contact": "on the mobile floor",
         "blocked": "on a rigid floor",
     }
-    conforms = not prediction.source_warnings
+    conforms = not prediction.source_notes
     pairs = [
         ("Room", f"{sides} m, {number_text(prediction.volume)} m³"),
         ("Reverberation", f"T = {time} s, of the {humanize(room.reverberation_of)} room"),
