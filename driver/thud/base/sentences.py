@@ -185,6 +185,7 @@ WARNINGS = {
     "date_unknown": (
         "the date of the measurement cannot be read: whether a calibration was due before is not "
         "known"
+    ),
     # Level in a room.
     "level_below_paths": (
         "the rating is below {high:g} {unit}: in a building, flanking paths, gaps and bridges that "
