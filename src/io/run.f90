@@ -6,7 +6,7 @@ module thud_run
    use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
    use thud_error, only: error_type, input_error, prefix_error
-   use thud_file, only: get_file_stem, read_text_file
+   use thud_file, only: read_text_file
    use thud_note, only: get_sentence
    use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
    use thud_records, only: add_results
@@ -144,17 +144,20 @@ contains
       ! Endings of recordings and studies, which the driver reads.
       character(len=*), parameter :: other_endings = '.wav.flac.tdms.h5.hdf5.mat.uff.unv.csv.lvm.toml.'
       character(len=:), allocatable :: text
-      integer :: dot
+      integer :: dot, slash
 
-      dot = max(1, index(path, '.', back=.true.))
-      if (path(dot:dot) == '.' .and. index(other_endings, lower_case(path(dot:))//'.') > 0) then
+      slash = index(path, '/', back=.true.)
+      dot = index(path, '.', back=.true.)
+      ! A name that begins with its only point has no ending.
+      if (dot <= slash + 1) dot = len(path) + 1
+      if (dot <= len(path) .and. index(other_endings, lower_case(path(dot:))//'.') > 0) then
          error = input_error('this is no namelist file; allowed: a namelist file; thud-driver measure reads recordings,'// &
             ' thud-driver fit, sweep and other studies read TOML')
       else
          call read_text_file(path, text, error)
       end if
-      if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked, &
-         path(:index(path, '/', back=.true.)), room_alone)
+      if (.not. allocated(error)) call read_case(text, path(slash + 1:dot - 1), case, error, unchecked, path(:slash), &
+         room_alone)
       if (allocated(error)) call prefix_error(error, path)
    end subroutine load_case
 

@@ -7,7 +7,7 @@ module thud_file
    implicit none (type, external)
    private
 
-   public :: get_file_stem, read_text_file
+   public :: read_text_file
 
    !> Maximum size of an input file, bytes.
    integer(int64), parameter :: max_input_size = 65536_int64
@@ -48,17 +48,5 @@ contains
       if (status /= 0) error = input_error('the file cannot be read ('//trim(reason)//'); allowed: a readable namelist file')
       if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
-
-   !> Name of a file without directory and extension.
-   pure function get_file_stem(path) result(stem)
-      character(len=*), intent(in) :: path
-      !> The stem: `ball` for `inputs/ball.nml`.
-      character(len=:), allocatable :: stem
-      integer :: dot
-
-      stem = trim(path(index(path, '/', back=.true.) + 1:))
-      dot = index(stem, '.', back=.true.)
-      if (dot > 1) stem = stem(:dot - 1)
-   end function get_file_stem
 
 end module thud_file
