@@ -90,7 +90,7 @@ module thud_field
       procedure :: get_allowed
       procedure :: get_needed_choice
       procedure :: has_effect
-      procedure, private :: get_error
+      procedure :: get_error
    end type field_type
 
 contains

@@ -5,10 +5,9 @@ module thud_sample_table
    use thud_error, only: error_type, input_error, prefix_error
    use thud_field, only: field_type
    use thud_kinds, only: wp
-   use thud_suggestion, only: get_suggestion
    use thud_system, only: path_length
    use thud_table_reader, only: cell_length, open_table, read_number, read_row, row_error, table_reader_type
-   use thud_text, only: join_quoted, lower_case, quoted, to_text
+   use thud_text, only: lower_case, quoted, to_text
    implicit none (type, external)
    private
 
@@ -97,7 +96,6 @@ contains
       real(wp), intent(out) :: value
       !> Set if the key cannot have this value.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: suggestion, wanted
       logical :: valid
 
       associate (field => table%fields(column))
@@ -105,18 +103,16 @@ contains
          case ('choice')
             value = real(findloc(field%choices(:field%n_choice) == lower_case(word), .true., dim=1), wp)
             valid = value > 0.0_wp
-            call get_suggestion(word, field%choices(:field%n_choice), suggestion)
-            wanted = 'allowed'//suggestion//'; allowed: '//join_quoted(field%choices(:field%n_choice))
          case ('flag')
             valid = any(lower_case(word) == [character(len=7) :: 'true', '.true.', '1', 'false', '.false.', '0'])
             value = merge(1.0_wp, 0.0_wp, scan(word, 'tT1') > 0)
-            wanted = 'allowed; allowed: true, false'
          case default
             call read_number(word, value, valid)
-            wanted = 'a number; allowed: a number in SI units'
          end select
+         if (valid) return
+         error = field%get_error(quoted(word))
+         error = row_error(table%reader, error%message)
       end associate
-      if (.not. valid) error = row_error(table%reader, trim(table%names(column))//' = '//quoted(word)//' is not '//wanted)
    end subroutine read_value
 
 end module thud_sample_table
