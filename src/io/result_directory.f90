@@ -55,7 +55,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: present_names(:), listed(:)
       character(len=:), allocatable :: command, subject, path, holds
-      logical :: exists
+      logical :: exists, is_page, may_go
       integer :: i, j
 
       if (.not. directory_exists(self%path)) then
@@ -88,16 +88,13 @@ contains
                //'replaced; allowed: another directory')
          end do
          if (allocated(error)) return
-         if (present_names(i) == identity .and. (command /= '' .or. self%replace) .and. .not. directory_exists(path)) cycle
-         if (.not. directory_exists(path)) then
-            if (any(names == present_names(i))) cycle
-            ! A page, which only a command that writes it anew removes.
-            if (index(trim(present_names(i))//'|', '.html|') + index(trim(present_names(i))//'|', '.pdf|') > 0) then
-               if (size(names) == 0) cycle
-            else if (any(listed == present_names(i)) .or. (size(names) == 0 .and. self%replace)) then
-               cycle
-            end if
-         end if
+         associate (name => present_names(i))
+            is_page = index(trim(name)//'|', '.html|') + index(trim(name)//'|', '.pdf|') > 0
+            ! Only a command that writes a page anew removes it.
+            may_go = any(names == name) .or. merge(size(names) == 0, any(listed == name) .or. (size(names) == 0 &
+               .and. self%replace), is_page) .or. (name == identity .and. (command /= '' .or. self%replace))
+         end associate
+         if (may_go .and. .not. directory_exists(path)) cycle
          error = input_error(path//' is in the way: this command does not write it; allowed: another directory, or ' &
             //'remove it first')
          return
