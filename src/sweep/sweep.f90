@@ -40,11 +40,9 @@ module thud_sweep
 
    !> Results of many samples; a sample without results has NaN and does not conform.
    type :: sweep_type
-      !> Bands of the levels, octaves first: [n_band].
-      type(band_type), allocatable :: bands(:)
       !> Levels and verdicts are wanted.
       logical :: levels = .true.
-      !> Matrices of the levels, reused by later calls.
+      !> Bands and matrices of the levels, reused by later calls.
       type(projections_type) :: projections
       !> 0, or the error code: [n_sample].
       integer, allocatable :: status(:)
@@ -82,13 +80,14 @@ contains
       logical, intent(in) :: levels
       !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
       type(sweep_type), intent(inout) :: sweep
+      type(band_type), allocatable :: bands(:)
       ! Index of the first band that the case asks for.
       integer :: first_band
 
-      call get_level_bands(case%bands, sweep%bands, first_band)
+      call get_level_bands(case%bands, bands, first_band)
       sweep%levels = levels
-      sweep%columns = get_result_columns(case, sweep%bands, first_band)
-      call set_projections(sweep%projections, case%sampling%sample_rate, sweep%bands, get_sample_count(case%sampling))
+      sweep%columns = get_result_columns(case, bands, first_band)
+      call set_projections(sweep%projections, case%sampling%sample_rate, bands, get_sample_count(case%sampling))
    end subroutine new_sweep
 
    !> Takes the sweep of an earlier call.
@@ -151,13 +150,11 @@ contains
             //'fewer at a time')
          return
       end if
-      remaining = [(i, i=1, size(values, 2))]
-      if (suits_batch(case, columns)) then
-         call solve_batch(case, columns, values, threads, sweep, error)
-         if (allocated(error)) return
-         ! Failed samples are repeated one by one, for their error messages.
-         remaining = pack(remaining, sweep%status /= 0)
-      end if
+      sweep%status = 1
+      if (suits_batch(case, columns)) call solve_batch(case, columns, values, threads, sweep, error)
+      if (allocated(error)) return
+      ! Those that fail in a batch are repeated one by one, for their error messages.
+      remaining = pack([(i, i=1, size(values, 2))], sweep%status /= 0)
       !$omp parallel num_threads(threads) if (size(remaining) > 1)
       call solve_remaining()
       !$omp end parallel
@@ -311,7 +308,7 @@ contains
       !> Values of the keys: [n_column, n_sample].
       real(wp), intent(in) :: values(:, :)
       integer, intent(in) :: threads
-      !> The sweep; samples without results have the status 1.
+      !> The sweep; samples without results keep their status.
       type(sweep_type), intent(inout) :: sweep
       !> Set if the sampling is invalid, its records do not fit into memory, the source is unknown, or after an interrupt.
       type(error_type), allocatable, intent(out) :: error
@@ -325,7 +322,6 @@ contains
       if (allocated(error)) return
       call fill_samples(case, columns, values, samples)
       call get_blocks(samples, valid, order, first)
-      sweep%status = 1
       !$omp parallel num_threads(threads)
       call solve_blocks()
       !$omp end parallel
