@@ -6,15 +6,14 @@
 module thud_receiver
    use thud_constants, only: pi
    use thud_kinds, only: wp
+   use thud_phi, only: get_phi
+   use thud_vector_fit, only: get_response
    use thud_zero_search, only: bisection_type
    implicit none (type, external)
    private
 
    public :: advance_receiver, can_strike, get_mobility, get_real_sum, get_receiver_velocity, is_rigid
    public :: new_receiver_motion, new_receiver_step, receiver_motion_type, receiver_step_type, receiver_type
-
-   !> Magnitude of pole times step below which series replace the closed forms.
-   real(wp), parameter :: small = 0.05_wp
 
    !> A receiver. The default is rigid.
    type :: receiver_type
@@ -30,8 +29,8 @@ module thud_receiver
    type :: receiver_step_type
       !> Length of the step, s.
       real(wp) :: interval = 0.0_wp
-      !> exp(p h), its integral over the step h (s), and the integral of this integral (s2): [n_pole].
-      complex(wp), allocatable :: decay(:), gain(:), travel(:)
+      !> exp(p h), and its integral over the step h (s): [n_pole].
+      complex(wp), allocatable :: decay(:), gain(:)
       !> Residues times this integral: displacement by an amplitude, m/(N s): [n_pole].
       complex(wp), allocatable :: displacement(:)
       !> Displacement at the end by a unit force, constant in the step, m/N.
@@ -67,18 +66,11 @@ contains
       real(wp), intent(in) :: frequency(:)
       !> The mobility, m/(N s): [n].
       complex(wp) :: mobility(size(frequency))
-      complex(wp) :: s(size(frequency))
-      integer :: k
+      integer :: i
 
-      s = cmplx(0.0_wp, 2*pi*frequency, wp)
       mobility = receiver%direct
       if (.not. allocated(receiver%pole)) return
-      do k = 1, size(receiver%pole)
-         ! Half of a doubled residue belongs to the conjugate pole; both halves of a real residue are equal.
-         associate (pole => receiver%pole(k), residue => receiver%residue(k))
-            mobility = mobility + (residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
-         end associate
-      end do
+      mobility = [(get_response(receiver%pole, receiver%residue, receiver%direct, 2*pi*frequency(i)), i=1, size(frequency))]
    end function get_mobility
 
    !> A receiver at rest.
@@ -96,29 +88,21 @@ contains
       !> Length of the steps, s.
       real(wp), intent(in) :: interval
       type(receiver_step_type) :: step
-      complex(wp) :: z
+      complex(wp) :: phi(0:2)
       integer :: k, n
 
       n = 0
       if (allocated(receiver%pole)) n = size(receiver%pole)
       step%interval = interval
-      allocate (step%decay(n), step%gain(n), step%travel(n))
-      do k = 1, n
-         z = receiver%pole(k)*interval
-         step%decay(k) = exp(z)
-         if (abs(z) < small) then
-            step%gain(k) = interval*(1 + z/2*(1 + z/3*(1 + z/4*(1 + z/5*(1 + z/6*(1 + z/7*(1 + z/8)))))))
-            step%travel(k) = interval**2/2*(1 + z/3*(1 + z/4*(1 + z/5*(1 + z/6*(1 + z/7*(1 + z/8*(1 + z/9)))))))
-         else
-            step%gain(k) = interval*(step%decay(k) - 1)/z
-            step%travel(k) = interval**2*(step%decay(k) - 1 - z)/z**2
-         end if
-      end do
-      allocate (step%displacement(n))
       step%compliance = interval*receiver%direct
-      if (n == 0) return
-      step%displacement = receiver%residue*step%gain
-      step%compliance = step%compliance + sum(real(receiver%residue*step%travel, wp))
+      allocate (step%decay(n), step%gain(n), step%displacement(n))
+      do k = 1, n
+         phi = get_phi(receiver%pole(k)*interval, 2)
+         step%decay(k) = phi(0)
+         step%gain(k) = interval*phi(1)
+         step%displacement(k) = receiver%residue(k)*step%gain(k)
+         step%compliance = step%compliance + real(receiver%residue(k)*interval**2*phi(2), wp)
+      end do
    end function new_receiver_step
 
    !> Advances the motion by a step with a constant force.

@@ -4,7 +4,7 @@ module thud_passivity
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    use thud_lapack, only: dposv, zgeev
-   use thud_vector_fit, only: get_basis, get_residues
+   use thud_vector_fit, only: get_basis, get_residues, get_response
    implicit none (type, external)
    private
 
@@ -206,16 +206,5 @@ contains
       end do
       omega = (low + high)/2
    end function get_minimum
-
-   !> Value at an angular frequency, rad/s.
-   pure function get_response(pole, residue, direct, omega) result(response)
-      complex(wp), intent(in) :: pole(:), residue(:)
-      real(wp), intent(in) :: direct, omega
-      complex(wp) :: response
-
-      associate (s => cmplx(0.0_wp, omega, wp))
-         response = direct + sum(residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
-      end associate
-   end function get_response
 
 end module thud_passivity

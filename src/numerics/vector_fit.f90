@@ -9,7 +9,7 @@ module thud_vector_fit
    implicit none (type, external)
    private
 
-   public :: fit_rational, get_basis, get_residues
+   public :: fit_rational, get_basis, get_residues, get_response
 
    !> Maximum number of relocations of the poles; good data need about five.
    integer, parameter :: max_relocations = 40
@@ -77,6 +77,20 @@ contains
          j = j + 1
       end do
    end function get_residues
+
+   !> Value of a rational function at an angular frequency. Half of a doubled residue belongs to the conjugate pole; both
+   !> halves of a real residue are equal.
+   pure function get_response(pole, residue, direct, omega) result(response)
+      !> Poles, 1/s, and residues, doubled for pairs: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Constant part, and the frequency, rad/s.
+      real(wp), intent(in) :: direct, omega
+      complex(wp) :: response
+
+      associate (s => cmplx(0.0_wp, omega, wp))
+         response = direct + sum(residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
+      end associate
+   end function get_response
 
    !> Fits d + sum of r_k/(s - p_k).
    !>
