@@ -7,6 +7,7 @@ module thud_energy_flow
    use thud_kinds, only: wp
    use thud_lapack, only: dgetf2, dgetrs
    use thud_matrix_exponential, only: get_exponential
+   use thud_zero_search, only: advance_search, is_converged, new_zero_search, update_bracket, zero_search_type
    implicit none (type, external)
    private
 
@@ -18,11 +19,6 @@ module thud_energy_flow
 
    !> Duration of the search, s. A later maximum would need energy that is stored for longer than any room's decay.
    real(wp), parameter :: search_time = 20.0_wp
-
-   !> Tolerance of the time of a maximum, s; the error of the maximum is of second order in it.
-   real(wp), parameter :: time_tolerance = 1.0e-13_wp
-   !> Maximum number of Newton steps.
-   integer, parameter :: max_refine = 60
 
    !> Subsystems and the flow between them.
    type :: energy_flow_type
@@ -152,35 +148,24 @@ contains
       end do
    end function get_fast_maximum
 
-   !> Maximum of the detector's response inside a step in which it turns from rise to fall, by Newton's method for zero
-   !> slope, with bisection if it leaves the bracket.
+   !> Maximum of the detector's response inside a step in which it turns from rise to fall, where its slope is zero.
    pure function get_maximum_within(matrix, state) result(maximum)
       !> Matrix of energies and response, 1/s, and both at the beginning of the step: [n + 1, n + 1], [n + 1].
       real(wp), intent(in) :: matrix(:, :), state(:)
       real(wp) :: maximum
-      real(wp) :: trial(size(state)), rate(size(state))
-      real(wp) :: low, high, offset, next_offset
-      integer :: i
+      real(wp) :: trial(size(state))
+      type(zero_search_type) :: search
 
-      low = 0.0_wp
-      high = search_step
-      offset = search_step/2
-      associate (n => size(state))
-         do i = 1, max_refine
-            trial = matmul(get_exponential(offset*matrix), state)
-            rate = matmul(matrix, trial)
-            if (rate(n) > 0.0_wp) then
-               low = offset
-            else
-               high = offset
-            end if
-            next_offset = offset - rate(n)/dot_product(matrix(n, :), rate)
-            if (abs(next_offset - offset) < time_tolerance) exit
-            offset = next_offset
-            if (.not. (next_offset > low .and. next_offset < high)) offset = (low + high)/2
+      associate (slope => matrix(size(state), :))
+         trial = matmul(get_exponential(search_step*matrix), state)
+         search = new_zero_search(dot_product(slope, state), search_step, dot_product(slope, trial))
+         do while (.not. is_converged(search))
+            call advance_search(search)
+            trial = matmul(get_exponential(search%trial*matrix), state)
+            call update_bracket(search, dot_product(slope, trial))
          end do
-         maximum = trial(n)
       end associate
+      maximum = trial(size(state))
    end function get_maximum_within
 
 end module thud_energy_flow
