@@ -2,7 +2,6 @@
 !> hollow sphere.
 module thud_free_modes
    use thud_ball, only: ball_type, get_density
-   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type
@@ -100,14 +99,12 @@ contains
       ! The solutions are singular at the center.
       rate = max(min_rate, acosh(2*ball%outer_radius/ball%wall_thickness - 1))
       highest_omega = 10*sqrt(ball%youngs_modulus/get_density(ball))/ball%outer_radius
-      call use_one_blas_thread()
       do pass = 1, max_passes
          basis = new_basis(ball, count + 1, .false., highest_omega, ceiling(shape_digits/rate))
          call find_lowest(basis, highest_omega, lowest, error)
          if (allocated(error) .or. lowest(count)%omega <= highest_omega) exit
          highest_omega = 1.5_wp*highest_omega
       end do
-      call restore_blas_threads()
       if (pass > max_passes) error = numerical_error('= '//to_text(count)//' needs too many polynomials; allowed: fewer ' &
          //'modes', 'modes', 'count')
       if (.not. allocated(error)) call describe(ball, basis, lowest, modes)
