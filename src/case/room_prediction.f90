@@ -102,9 +102,9 @@ contains
                return
             end if
             simple_modes = modes
-            ! Beyond the modes of a file the plate takes their place.
-            if (.not. modes%known_limit < huge(1.0_wp)) call get_floor_modes(trim(state%group), &
-               get_simplified(modes%stack), plate, state%air, simple_modes, error)
+            ! Modes of a file have no plates with stiffness; beyond these modes the infinite plate takes their place.
+            if (modes%stack%plate(1)%along > 0.0_wp) call get_floor_modes(trim(state%group), get_simplified(modes%stack), &
+               plate, state%air, simple_modes, error)
             if (allocated(error)) return
             ! Of a floor whose middle represents it, as much of the middle as the room covers; losses keep energy near the
             ! strike.

@@ -35,8 +35,6 @@ module thud_floor_modes
       real(wp), allocatable :: omega(:), loss_factor(:)
       !> Frequency up to which modes are treated individually, and up to which the others are summed, rad/s.
       real(wp) :: limit = 0.0_wp, sum_limit = 0.0_wp
-      !> Frequency above which the modes of the floor are not known, rad/s.
-      real(wp) :: known_limit = huge(1.0_wp)
    end type floor_modes_type
 
 contains
@@ -153,7 +151,6 @@ contains
       selected%loss_factor = pack(modes%loss_factor, is_selected)
       selected%limit = modes%limit
       selected%sum_limit = modes%sum_limit
-      selected%known_limit = modes%known_limit
    end function get_selected_modes
 
    !> Squared angular frequencies with their losses, omega**2 (1 + i eta), of mixed modes, rad2/s2: [n_mode].

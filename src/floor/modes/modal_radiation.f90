@@ -116,8 +116,7 @@ contains
          radiation(i) = get_mean_radiation(get_coupled_modes(selected, part, stated_strike), plate, air, bands(i), along, &
             across)
          ! A plate without modes there, or without resolved or known ones.
-         if (.not. radiation(i)%radiation_factor > 0.0_wp &
-            .or. 2*pi*bands(i)%upper > min(modes%known_limit, modes%limit)) then
+         if (.not. radiation(i)%radiation_factor > 0.0_wp .or. 2*pi*bands(i)%upper > modes%limit) then
             radiation(i) = modal_radiation_type(radiation_factor=get_plate_radiation(plate, air, bands(i)%center), &
                conductance=1/get_resistance(plate), energy_beyond=modes%stack%length*modes%stack%width/part%area - 1)
          end if

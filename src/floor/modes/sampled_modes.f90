@@ -289,7 +289,6 @@ contains
       ! There is no mode above the highest one.
       modes%limit = maxval(modes%omega)*(1 + epsilon(1.0_wp))
       modes%sum_limit = modes%limit
-      modes%known_limit = modes%limit
       allocate (modes%modes%displacement(1), modes%modes%block(1))
       call new_splines(x, modes%modes%displacement(1)%x, by_x)
       call new_splines(y, modes%modes%displacement(1)%y, by_y)

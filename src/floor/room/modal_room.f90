@@ -118,8 +118,7 @@ contains
       n_ball = size(box%ball, 2)
       n_microphone = size(box%microphone, 2)
       ! Bands that the modes of the floor do not reach are statistical.
-      room%n_band = count(box%bands%center <= box%crossover &
-         .and. 2*pi*box%bands%upper <= min(modes%limit, modes%known_limit))
+      room%n_band = count(box%bands%center <= box%crossover .and. 2*pi*box%bands%upper <= modes%limit)
       do
          if (room%n_band == 0) exit
          coupled%highest = room_ratio*box%bands(room%n_band)%upper
