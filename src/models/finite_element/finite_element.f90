@@ -229,10 +229,11 @@ contains
 
    !> Minimum error with friction at which a sliding surface may begin to stick and slip on its own (`slip_friction`).
    function get_min_error(self, ball) result(error)
+      !> The model with its numbers of elements, none of them automatic.
       class(finite_element_type), intent(in) :: self
       type(ball_type), intent(in) :: ball
       real(wp) :: error(octave_count)
-      type(mesh_options_type) :: automatic, mesh
+      type(mesh_options_type) :: automatic
       real(wp) :: octave, scale
       integer :: i, below
       logical :: slips
@@ -245,7 +246,6 @@ contains
       end associate
       if (.not. slips) return
       automatic = get_element_counts(ball, mesh_options_type())
-      mesh = get_element_counts(ball, self%mesh)
       scale = get_shear_rate(ball)/get_shear_rate(slip_ball)
       do i = 1, octave_count
          ! The octave of `slip_ball` that corresponds to this one; octaves are 10**0.3 apart.
@@ -253,7 +253,7 @@ contains
          below = min(int(octave), octave_count - 1)
          error(i) = slip_error(below) + (octave - below)*(slip_error(below + 1) - slip_error(below))
       end do
-      error = error*automatic%polar_elements/mesh%polar_elements
+      error = error*automatic%polar_elements/self%mesh%polar_elements
    end function get_min_error
 
    !> Velocity of shear waves per outer radius, 1/s.
