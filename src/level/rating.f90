@@ -7,11 +7,7 @@ module thud_rating
    private
 
    public :: class_limits, correct_for_background, fast_reverberation, get_a_weighted_level, get_class, get_inverse_a_rating
-   public :: get_rated_bands, get_rounded, get_standardization, rated_set_names, rating_names, rating_titles
-
-   !> Sets of bands that have a rating: [n_set]. One-third-octave bands are not summed into octaves first: the maximum of a
-   !> sum is not the sum of the maxima.
-   character(len=24), parameter :: rated_set_names(*) = [character(len=24) :: 'octave', 'third']
+   public :: get_rated_bands, get_rounded, get_standardization, rating_names, rating_titles
 
    !> Nominal mid frequency of the lowest one-third-octave band that is rated, Hz.
    real(wp), parameter :: lowest_rated = 50.0_wp
@@ -55,9 +51,10 @@ module thud_rating
 
 contains
 
-   !> Bands that a rating uses: octaves from 63 Hz, one-third-octave bands from 50 Hz.
+   !> Bands that a rating uses: octaves from 63 Hz, one-third-octave bands from 50 Hz. One-third-octave bands are not summed
+   !> into octaves first: the maximum of a sum is not the sum of the maxima.
    pure function get_rated_bands(name) result(bands)
-      !> One of `rated_set_names`.
+      !> One of `band_set_names`.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable :: bands(:)
@@ -68,7 +65,7 @@ contains
 
    !> A-weighted maximum level from the bands of a set (ISO 717-2 annex D), not rounded, dB.
    pure function get_a_weighted_level(name, level) result(total)
-      !> One of `rated_set_names`.
+      !> One of `band_set_names`.
       character(len=*), intent(in) :: name
       !> Levels of its rated bands, dB: [n_band].
       real(wp), intent(in) :: level(:)

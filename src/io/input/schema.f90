@@ -9,7 +9,7 @@ module thud_schema
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_quantities, only: history_quantity_count, quantities, sample_quantity_count
-   use thud_rating, only: class_limits, get_rated_bands, rated_set_names, rating_names, rating_titles
+   use thud_rating, only: class_limits, get_rated_bands, rating_names, rating_titles
    use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, source_names, verdict_names
    use thud_text, only: join, newline, to_text
@@ -44,10 +44,10 @@ contains
             //trim(merge(',', ' ', i < size(band_set_names)))
       end do
       text = text//'},'//newline//'"rated_bands": {'
-      do i = 1, size(rated_set_names)
-         bands = get_rated_bands(rated_set_names(i))
-         text = text//newline//text_value(rated_set_names(i))//': ['//join(bands%nominal)//']' &
-            //trim(merge(',', ' ', i < size(rated_set_names)))
+      do i = 1, size(band_set_names)
+         bands = get_rated_bands(band_set_names(i))
+         text = text//newline//text_value(band_set_names(i))//': ['//join(bands%nominal)//']' &
+            //trim(merge(',', ' ', i < size(band_set_names)))
       end do
       text = text//'},'//newline//'"limits": {'
       do i = 1, size(source_names)
