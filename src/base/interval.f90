@@ -103,11 +103,8 @@ contains
       ! Whole numbers need no decimals.
       if (index(text, '.0', back=.true.) == len(text) - 1) text = text(:len(text) - 2)
       if (key == '') return
-      if (abs(number) < huge(number)) then
-         text = trim(key)//' = '//text
-      else
-         text = trim(key)
-      end if
+      text = trim(key)//' = '//text
+      if (.not. abs(number) < huge(number)) text = trim(key)
    end subroutine get_end_text
 
 end module thud_interval

@@ -56,9 +56,7 @@ contains
          known = columns(i)%field > 0 .and. dot /= 1
          if (known) then
             if (fields(columns(i)%field)%kind == 'list') count = size(fields(columns(i)%field)%get_entries())
-            do j = 1, count
-               if (word == key//'('//to_text(j)//')') columns(i)%entry = j
-            end do
+            columns(i)%entry = findloc([(word == key//'('//to_text(j)//')', j=1, count)], .true., dim=1)
             known = word == key .and. count == 0 .or. columns(i)%entry > 0
          end if
          if (.not. known) then

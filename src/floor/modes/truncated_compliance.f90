@@ -38,8 +38,7 @@ contains
 
       allocate (ribs%position(0))
       if (allocated(plate%ribs)) ribs = plate%ribs
-      allocate (near(size(ribs%position)))
-      near = .false.
+      allocate (near(size(ribs%position)), source=.false.)
       do i = 1, min(max_ribs, size(near))
          near(minloc(abs(ribs%position - y), dim=1, mask=.not. near)) = .true.
       end do

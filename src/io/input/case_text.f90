@@ -179,13 +179,9 @@ contains
       !> The texts: [n].
       character(len=*), intent(in) :: texts(:)
       character(len=len(texts)), allocatable :: once(:)
-      logical :: first(size(texts))
       integer :: i
 
-      do i = 1, size(texts)
-         first(i) = .not. any(texts(:i - 1) == texts(i))
-      end do
-      once = pack(texts, first)
+      once = pack(texts, [(.not. any(texts(:i - 1) == texts(i)), i=1, size(texts))])
    end function distinct
 
    !> The input as the text of a namelist file; reading it gives the same case. Values of the standard ball for keys

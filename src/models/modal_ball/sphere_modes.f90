@@ -92,9 +92,7 @@ contains
       basis%density = get_density(ball)
       basis%shear_modulus = ball%youngs_modulus/(2*(1 + ball%poisson_ratio))
       basis%incompressible = 0.5_wp - ball%poisson_ratio < incompressible_distance
-      if (.not. basis%incompressible) then
-         basis%lame = 2*basis%shear_modulus*ball%poisson_ratio/(1 - 2*ball%poisson_ratio)
-      end if
+      if (.not. basis%incompressible) basis%lame = 2*basis%shear_modulus*ball%poisson_ratio/(1 - 2*ball%poisson_ratio)
       if (with_gas) basis%gas_stiffness = ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
          /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
       if (present(extra_degree)) basis%extra_degree = extra_degree
