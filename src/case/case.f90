@@ -13,7 +13,7 @@ module thud_case
    use thud_plate, only: plate_type
    use thud_rectangular_floor, only: rectangular_floor_type
    use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, &
-      new_models
+      new_models, standard_moduli
    use thud_room, only: check_below_subceiling, check_room, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
@@ -96,11 +96,8 @@ contains
       !> One of `model_names`.
       character(len=*), intent(in) :: model
       real(wp) :: modulus
-      integer :: number
 
-      modulus = 0.0_wp
-      number = findloc(model_names == model, .true., dim=1)
-      if (number > 0) modulus = case%models(number)%model%get_standard_modulus()
+      modulus = sum(standard_moduli, mask=model_names == model)
       if (.not. modulus > 0.0_wp) modulus = case%ball%youngs_modulus
    end function get_modulus
 

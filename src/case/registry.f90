@@ -1,14 +1,15 @@
 !> The source models and the floors by name.
 module thud_registry
-   use thud_finite_element, only: finite_element_type
+   use thud_finite_element, only: finite_element_modulus, finite_element_type
    use thud_floor_model, only: floor_model_type
-   use thud_hollow_sphere, only: hollow_sphere_type
+   use thud_hollow_sphere, only: hollow_sphere_modulus, hollow_sphere_type
    use thud_hunt_crossley, only: hunt_crossley_type
    use thud_joist_floor, only: joist_floor_type
+   use thud_kinds, only: wp
    use thud_laminate_floor, only: laminate_floor_type
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
    use thud_measured_modes, only: measured_modes_type
-   use thud_modal_ball, only: modal_ball_type
+   use thud_modal_ball, only: modal_ball_modulus, modal_ball_type
    use thud_modal_floor, only: modal_floor_type
    use thud_plate_floor, only: plate_floor_type
    use thud_point_floors, only: infinite_plate_floor_type, oscillator_floor_type, rigid_floor_type
@@ -18,10 +19,15 @@ module thud_registry
    private
 
    public :: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
+   public :: standard_moduli
 
    !> Names of the models and of the namelist groups with their options; the first is the default.
    character(len=24), parameter :: model_names(*) = [character(len=24) :: 'modal_ball', 'finite_element', &
       'hollow_sphere', 'measured_modes', 'hunt_crossley', 'two_mass']
+
+   !> Modulus of elasticity of the standard ball in each of them, Pa; 0 for models that do not use the wall: [n_model].
+   real(wp), parameter :: standard_moduli(size(model_names)) = [modal_ball_modulus, finite_element_modulus, &
+      hollow_sphere_modulus, 0.0_wp, 0.0_wp, 0.0_wp]
 
    !> Names of the floors and of their namelist groups; the first, the default, is rigid.
    character(len=24), parameter :: floor_names(*) = [character(len=24) :: 'rigid', 'infinite_plate', 'oscillator', &

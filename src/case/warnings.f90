@@ -1,7 +1,7 @@
 !> Warnings on cases that are allowed but implausible: a ball unlike rubber, a force that no real source has.
 module thud_warnings
    use thud_ball, only: ball_type, get_density
-   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_band, only: get_band_name, octave_count, octaves
    use thud_case, only: case_type, get_active_fields, get_model_number, get_unstated_fields
    use thud_constants, only: not_a_number
    use thud_field, only: field_type, key_length
@@ -10,7 +10,7 @@ module thud_warnings
    use thud_kinds, only: wp
    use thud_note, only: note_type
    use thud_refined_drop, only: finer_quantities, get_resolution, max_error
-   use thud_registry, only: floor_names
+   use thud_registry, only: floor_names, standard_moduli
    use thud_room, only: box_type, new_box, room_level_type
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, quoted, to_text
@@ -43,12 +43,11 @@ contains
       type(note_type), allocatable, intent(out) :: warnings(:)
       !> Force history on a mobile floor.
       type(force_history_type), intent(in), optional :: on_floor
-      logical :: uses_wall
 
       allocate (warnings(0))
-      uses_wall = .not. case%has_impact
-      if (case%has_impact) uses_wall = case%models(get_model_number(case))%model%get_standard_modulus() > 0.0_wp
-      if (uses_wall) call add_limit_warnings(get_rubber_limits(case%ball), warnings)
+      ! Free modes, and these models, use the wall.
+      if (.not. case%has_impact .or. standard_moduli(get_model_number(case)) > 0.0_wp) call add_limit_warnings( &
+         get_rubber_limits(case%ball), warnings)
       if (.not. case%has_impact) return
       call add_law_warning(case, warnings)
       if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(warnings, &
@@ -99,7 +98,6 @@ contains
       character(len=*), intent(in) :: group
       type(force_history_type), intent(in) :: history
       type(validity_limit_type) :: limit
-      type(band_type) :: bands(octave_count)
       integer :: first, last
 
       limit = validity_limit_type(group, 'numerical error', not_a_number, highest=max_error, &
@@ -111,10 +109,9 @@ contains
          ! Rounded up, so that it exceeds the limit as printed.
          limit%value = ceiling(100*maxval(error%octave))/100.0_wp
       end associate
-      bands = get_octaves()
-      limit%quantity = 'numerical error in dB at '//trim(get_band_name(bands(last)))//' Hz'
-      if (first < last) limit%quantity = 'numerical error in dB at '//trim(get_band_name(bands(first)))//' to ' &
-         //trim(get_band_name(bands(last)))//' Hz'
+      limit%quantity = 'numerical error in dB at '//trim(get_band_name(octaves(last)))//' Hz'
+      if (first < last) limit%quantity = 'numerical error in dB at '//trim(get_band_name(octaves(first)))//' to ' &
+         //trim(get_band_name(octaves(last)))//' Hz'
       limit%reason = 'raise the resolution, now '//get_resolution(history)
    end function get_error_limit
 
@@ -167,18 +164,16 @@ contains
       type(criterion_type), intent(in) :: criteria(:)
       !> The warnings: [n].
       type(note_type), allocatable, intent(inout) :: warnings(:)
-      type(band_type) :: bands(octave_count)
-      character(len=:), allocatable :: octaves
+      character(len=:), allocatable :: deviations
       integer :: i
 
-      bands = get_octaves()
-      octaves = ''
+      deviations = ''
       do i = 1, octave_count
-         if (.not. conforms(criteria(i))) octaves = octaves//', '//trim(get_band_name(bands(i)))//' Hz ' &
+         if (.not. conforms(criteria(i))) deviations = deviations//', '//trim(get_band_name(octaves(i)))//' Hz ' &
             //fixed(criteria(i)%value - (criteria(i)%lower + criteria(i)%upper)/2, 1)//' dB'
       end do
-      if (octaves /= '') call add(warnings, 'source_not_conforming', 'room', '', 'the source does not conform (' &
-         //octaves(3:)//' from the nominal levels): the level in the room is not that of a standard source')
+      if (deviations /= '') call add(warnings, 'source_not_conforming', 'room', '', 'the source does not conform (' &
+         //deviations(3:)//' from the nominal levels): the level in the room is not that of a standard source')
    end subroutine add_source_warning
 
    !> Adds a warning on bands below the crossover that are statistical: their modes are not resolved, or would take too long.

@@ -4,7 +4,7 @@
 module thud_refined_drop
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use thud_ball, only: ball_type
-   use thud_band, only: band_type, get_octaves, octave_count
+   use thud_band, only: band_type, octave_count, octaves
    use thud_constants, only: not_a_number, pi
    use thud_drop, only: drop_type
    use thud_error, only: error_type, signal_base
@@ -114,7 +114,7 @@ contains
       type(force_history_type), intent(inout) :: history
       type(error_type), allocatable :: error
 
-      call get_force_exposure_levels(history%floor_force, history%sample_rate, get_octaves(), 'exact', &
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, octaves, 'exact', &
          history%octave_level, error)
       if (allocated(error)) history%octave_level = not_a_number
       if (.not. history%exact_contact_time > 0.0_wp) history%exact_contact_time = history%contact_time
@@ -141,7 +141,7 @@ contains
       time_change = abs(history%exact_contact_time - coarse%exact_contact_time)
       if (size(coarse%floor_force) == size(history%floor_force)) then
          ! Levels may agree by chance, the forces do not.
-         call get_force_exposure_levels(history%floor_force - coarse%floor_force, history%sample_rate, get_octaves(), &
+         call get_force_exposure_levels(history%floor_force - coarse%floor_force, history%sample_rate, octaves, &
             'exact', level, error)
          if (allocated(error)) return
          change = max(change, in_phase*20/log(10.0_wp)*10**((level - history%octave_level)/20))
@@ -152,7 +152,7 @@ contains
          ! signs. Levels may agree by chance: aliasing has one sign or the other, as the force ends before or after the
          ! middle of a sampling interval.
          call get_force_exposure_levels([(merge(1, -1, mod(i, 2) == 1)*history%floor_force(i), &
-            i=1, size(history%floor_force))], history%sample_rate, get_octaves(), 'exact', level, error)
+            i=1, size(history%floor_force))], history%sample_rate, octaves, 'exact', level, error)
          if (allocated(error)) return
          change = max(change, 20/log(10.0_wp)*10**((level - history%octave_level)/20))
       end if
@@ -208,10 +208,8 @@ contains
       type(force_history_type), intent(in) :: history
       real(wp) :: loss(octave_count)
       real(wp) :: phase(octave_count)
-      type(band_type) :: octaves(octave_count)
       real(wp) :: substeps
 
-      octaves = get_octaves()
       phase = pi*octaves%upper/history%sample_rate
       loss = -20*log10(sin(phase)/phase)
       ! Two samples share the middle step of an odd number in half, which is lost in part; at the center of the octave,

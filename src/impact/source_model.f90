@@ -41,7 +41,6 @@ module thud_source_model
       procedure :: check
       procedure :: refine
       procedure :: compress
-      procedure :: get_standard_modulus
       procedure :: get_validity_limits
    end type source_model_type
 
@@ -86,15 +85,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
    end subroutine check
-
-   !> Modulus of elasticity of the standard ball in this model, Pa; by default 0, for models that do not use the wall.
-   function get_standard_modulus(self) result(modulus)
-      class(source_model_type), intent(in) :: self
-      !> The modulus, Pa.
-      real(wp) :: modulus
-
-      modulus = 0.0_wp
-   end function get_standard_modulus
 
    !> Validity limits of the model for a result; by default those of a source without size and without gravity during the
    !> contact.

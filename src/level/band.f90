@@ -5,8 +5,8 @@ module thud_band
    implicit none (type, external)
    private
 
-   public :: band_choices, band_set_names, band_type, get_band_name, get_bands, get_level_bands, get_octaves
-   public :: octave_count, octave_set
+   public :: band_choices, band_set_names, band_type, get_band_name, get_bands, get_level_bands
+   public :: octave_count, octave_set, octaves
 
    !> Adjacent bands of one width.
    type :: band_set_type
@@ -58,15 +58,10 @@ module thud_band
    !> Number of octaves.
    integer, parameter :: octave_count = count(all_bands%set == octave_set)
 
+   !> The octaves that assessments use, ascending: [octave_count].
+   type(band_type), parameter :: octaves(octave_count) = all_bands(:octave_count)
+
 contains
-
-   !> The octaves that assessments use.
-   pure function get_octaves() result(bands)
-      !> The bands, ascending: [octave_count].
-      type(band_type) :: bands(octave_count)
-
-      bands = get_bands(octave_set)
-   end function get_octaves
 
    !> Bands of a set; empty if no set has this name.
    pure function get_bands(name) result(bands)
@@ -86,7 +81,7 @@ contains
       !> Index of the first band of the choice.
       integer, intent(out) :: first
 
-      bands = [get_octaves(), pack(all_bands, all_bands%set /= octave_set &
+      bands = [octaves, pack(all_bands, all_bands%set /= octave_set &
          .and. (all_bands%set == choice .or. choice == 'both'))]
       first = merge(octave_count + 1, 1, any(choice == band_set_names(2:)))
    end subroutine get_level_bands

@@ -1,6 +1,6 @@
 !> Results as tables on the screen.
 module thud_screen_tables
-   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_band, only: band_type, get_band_name, octave_count, octaves
    use thud_case, only: case_type, get_model_number, get_unstated_fields
    use thud_compute, only: get_assessed_force, impact_type, results_type
    use thud_constants, only: version
@@ -11,6 +11,7 @@ module thud_screen_tables
       sample_quantity_count
    use thud_records, only: get_verdict_word
    use thud_refined_drop, only: finer_prefix, finer_quantities
+   use thud_registry, only: standard_moduli
    use thud_room_table, only: get_room_table
    use thud_source_limits, only: combine_verdicts, criterion_count, criterion_type, get_verdict, verdict_conforms, &
       verdict_names, verdict_undecided
@@ -197,11 +198,9 @@ contains
       !> The error matters, however small: [octave_count].
       logical, intent(in) :: matters(:)
       character(len=:), allocatable :: rows
-      type(band_type) :: octaves(octave_count)
       integer :: i
 
       rows = ''
-      octaves = get_octaves()
       do i = 1, octave_count
          associate (error => history%numerical_error%octave(i))
             if (history%numerical_error%known .and. (error > shown_error .or. matters(i))) rows = rows &
@@ -224,7 +223,7 @@ contains
       if (case%left_out /= '') lines = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
       allocate (fields, source=get_unstated_fields(case))
       ! Without a wall the modulus has no effect.
-      if (.not. case%models(get_model_number(case))%model%get_standard_modulus() > 0.0_wp) fields = fields(:0)
+      if (.not. standard_moduli(get_model_number(case)) > 0.0_wp) fields = fields(:0)
       if (size(fields) > 0) lines = lines//'  Not stated, so of the standard ball:'
       do i = 1, size(fields)
          call fields(i)%get_text(value)
@@ -332,34 +331,30 @@ contains
    function get_verification_rows(history) result(rows)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: rows
-      type(band_type) :: octaves(octave_count)
       type(quantity_type) :: quantity, error_quantity
       character(len=:), allocatable :: line
-      real(wp) :: values(history_quantity_count)
-      real(wp) :: value, change, stated
+      real(wp), dimension(size(finer_quantities)) :: values, errors
+      real(wp) :: change, stated
       integer :: i, first
 
       rows = ''
       first = findloc(history%model_quantity_name, finer_quantities(1), dim=1)
       if (first == 0) return
-      octaves = get_octaves()
       rows = newline//'  at a finer resolution      value          change    stated error'//newline &
          //model_quantity_rows(history, finer_prefix)
-      values = get_quantities(history)
+      values = [history%octave_level, history%contact_time, history%restitution, history%peak_force]
+      associate (error => history%numerical_error)
+         errors = [error%octave, error%contact_time, error%restitution, error%peak_force]
+      end associate
       do i = 1, size(finer_quantities)
          associate (name => finer_quantities(i) (len(finer_prefix) + 1:), finer => history%model_quantity(first - 1 + i))
             error_quantity = get_quantity(trim(name)//'_error')
-            if (i <= octave_count) then
-               quantity = error_quantity
-               quantity%title = get_level_title(octaves(min(i, octave_count)))
-               value = history%octave_level(min(i, octave_count))
-            else
-               quantity = get_quantity(name)
-               value = values(findloc(quantities%name, name, dim=1))
-            end if
+            quantity = error_quantity
+            if (i > octave_count) quantity = get_quantity(name)
+            if (i <= octave_count) quantity%title = get_level_title(octaves(i))
             line = quantity_row(quantity, finer)
-            change = (finer - value)*quantity%display_scale
-            stated = values(findloc(quantities%name, error_quantity%name, dim=1))*quantity%display_scale
+            change = (finer - values(i))*quantity%display_scale
+            stated = errors(i)*quantity%display_scale
             rows = rows//padded(line(:len(line) - 1), 40)//flush_right(fixed(change, error_quantity%decimals), 8) &
                //flush_right(fixed(stated, error_quantity%decimals), 16)
             ! As far as the decimals show it.

@@ -35,6 +35,9 @@ module thud_finite_element
 
    public :: finite_element_type, get_frame_count
 
+   !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
+   real(wp), parameter, public :: finite_element_modulus = 2.06e6_wp
+
    !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
 
@@ -100,7 +103,6 @@ module thud_finite_element
       procedure :: refine
       procedure :: solve
       procedure :: compress
-      procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: get_loss_factors
    end type finite_element_type
@@ -274,14 +276,6 @@ contains
       if (self%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling) &
          /max(1, nint(self%snapshot_interval*sampling%sample_rate))
    end function get_frame_count
-
-   !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md).
-   function get_standard_modulus(self) result(modulus)
-      class(finite_element_type), intent(in) :: self
-      real(wp) :: modulus
-
-      modulus = 2.06e6_wp
-   end function get_standard_modulus
 
    !> The limit of the speed of the ball; the error of the mesh is stated by its numerical error.
    function get_validity_limits(self, ball, drop, history) result(limits)

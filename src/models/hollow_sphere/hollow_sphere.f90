@@ -23,6 +23,9 @@ module thud_hollow_sphere
    public :: get_shell_stiffness, hollow_sphere_type, new_shell, restitution_weights, shell_type
    public :: solve_hollow_sphere
 
+   !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
+   real(wp), parameter, public :: hollow_sphere_modulus = 1.6e6_wp
+
    !> Options of the model.
    type, extends(source_model_type) :: hollow_sphere_type
       !> Treatment of the momentum of wall that enters or leaves the flat cap, one of `flux_choices`.
@@ -30,7 +33,6 @@ module thud_hollow_sphere
    contains
       procedure :: get_fields
       procedure :: solve => solve_hollow_sphere
-      procedure :: get_standard_modulus
       procedure :: get_validity_limits
       procedure :: compress
    end type hollow_sphere_type
@@ -75,14 +77,6 @@ contains
       fields = [choice_field('momentum_flux', self%momentum_flux, &
          'term for the momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_fields
-
-   !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
-   function get_standard_modulus(self) result(modulus)
-      class(hollow_sphere_type), intent(in) :: self
-      real(wp) :: modulus
-
-      modulus = 1.6e6_wp
-   end function get_standard_modulus
 
    !> Limits of the assumptions: a thin shell, a wall that stays close to the sphere, and no gravity during the contact.
    function get_validity_limits(self, ball, drop, history) result(limits)

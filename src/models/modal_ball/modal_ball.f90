@@ -30,6 +30,10 @@ module thud_modal_ball
 
    public :: modal_ball_type
 
+   !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
+   !> modulus.
+   real(wp), parameter, public :: modal_ball_modulus = 1.56e6_wp
+
    !> Rings of levels 0 and 1.
    real(wp), parameter :: coarse_rings = 36.0_wp, default_rings = 40.0_wp
 
@@ -99,7 +103,6 @@ module thud_modal_ball
       procedure :: refine
       procedure :: solve
       procedure :: compress
-      procedure :: get_standard_modulus
       procedure :: get_validity_limits
    end type modal_ball_type
 
@@ -238,15 +241,6 @@ contains
 
       yes = self%highest_frequency > 0.0_wp .and. self%highest_frequency*ratio < get_automatic_frequency(self, ball)
    end function has_few_modes
-
-   !> Modulus of elasticity of the standard ball, Pa, calibrated (docs/standard_ball.md): for linear modes an effective
-   !> modulus.
-   function get_standard_modulus(self) result(modulus)
-      class(modal_ball_type), intent(in) :: self
-      real(wp) :: modulus
-
-      modulus = 1.56e6_wp
-   end function get_standard_modulus
 
    !> Limits of linear modes.
    function get_validity_limits(self, ball, drop, history) result(limits)
