@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import struct
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import nptdms
@@ -14,15 +14,25 @@ import pyuff
 import scipy.io
 import soundfile
 
+from thud.recordings.config import Config
+from thud.recordings.signal_files import open_signals
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from thud.recordings.signal import Signal
+
     Writer = Callable[[Path, NDArray[np.float64], float, str], None]
 
 PEAK, DURATION = 1500.0, 0.02
+
+
+def opened(path: Path | str, **stated: Any) -> list[Signal]:  # noqa: ANN401 - of `Config`
+    """Return the signals of a file of which some keys of the configuration are stated."""
+    return open_signals(path, Config(**stated))
 
 
 def half_sine(rate: float, before: float = 0.01, after: float = 0.01) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 import thud
 from thud.recordings.table import read_table, time_and_force
-from thud.recordings.uniform_grid import read_record
+from thud.recordings.times import read_record
 
 FLAGSHIP = (REPOSITORY / "inputs/rubber_ball_100cm.nml").read_text()
 

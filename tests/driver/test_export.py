@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, load_script, names_in, naming
+from recording_files import opened
 from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
@@ -20,7 +21,6 @@ from thud.cli.case_commands import EXPORT, KINDS
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.export.wav import wav_file
 from thud.recordings.read_recording import read_recording
-from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,7 +57,7 @@ def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_
     ending, _ = EXPORTS[kind]
     path = FORCE.save(tmp_path / f"force{ending}", kind)[0]
     calibration = 2048.0 if kind == "wav" else None
-    (signal,) = open_signals(path, calibration=calibration)
+    (signal,) = opened(path, calibration=calibration)
     # A universal file holds six digits of the time step.
     assert signal.sample_rate == pytest.approx(44100.0, rel=5e-6 if kind == "uff" else 1e-12)
     read = signal.read(0, signal.n_sample)
@@ -171,7 +171,7 @@ def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
         if ending == ".uff":
             pytest.importorskip("pyuff", reason="the extra recordings is not installed")
         assert force.save(tmp_path / f"force{ending}", kind)
-    (signal,) = open_signals(tmp_path / "force.csv")
+    (signal,) = opened(tmp_path / "force.csv")
     assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
 
 

@@ -12,7 +12,7 @@ import thud
 from thud.recordings import table
 from thud.recordings.formats.text import read_channels
 from thud.recordings.table import time_and_force
-from thud.recordings.uniform_grid import read_record
+from thud.recordings.times import read_record
 
 if TYPE_CHECKING:
     from collections.abc import Callable

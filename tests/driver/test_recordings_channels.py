@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import soundfile
 from conftest import naming, noted
-from recording_files import half_sine as unit_pulse
+from recording_files import half_sine as unit_pulse, opened
 from scipy import stats
 from synthetic import half_sine, make_drop
 
@@ -24,7 +24,6 @@ from thud.recordings.config import Config, read_config
 from thud.recordings.load_cells import add_signals, require_channels
 from thud.recordings.recorded_levels import average_levels, measure_levels, noise_exceeds
 from thud.recordings.signal import Signal
-from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,11 +75,11 @@ def write_wav(path: Path, columns: Sequence[NDArray[np.float64]]) -> Path:
 )
 def test_load_cells_are_added(channels: Any, tmp_path: Path) -> None:  # noqa: ANN401
     path = write_table(tmp_path / "cells.csv", cells(), NAMES)
-    (signal,) = open_signals(path, channels=channels)
+    (signal,) = opened(path, channels=channels)
     np.testing.assert_allclose(signal.read(0, signal.n_sample), sum(cells()), atol=1e-3)
     assert (signal.notes[-1].code, signal.notes[-1].value) == ("cells_added", 4)
     found = thud.read_recording(path, channels=channels)
-    (whole,) = open_signals(write_table(tmp_path / "sum.csv", [sum(cells())], ["F"]))
+    (whole,) = opened(write_table(tmp_path / "sum.csv", [sum(cells())], ["F"]))
     expected = thud.Recording.from_signals([whole], Config())
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=1e-3)
 
@@ -91,20 +90,20 @@ def test_each_load_cell_has_its_calibration(tmp_path: Path) -> None:
     path = write_wav(
         tmp_path / "cells.wav", [f / scale for f, scale in zip(cells(), scales, strict=True)]
     )
-    (signal,) = open_signals(path, channels="sum", calibration=chains)
+    (signal,) = opened(path, channels="sum", calibration=chains)
     force = signal.read(0, signal.n_sample)
     np.testing.assert_allclose(force, sum(cells()), atol=1e-2)
     # A charge amplifier inverts, and the sum decides on the sign.
     inverted = [f"-{chain}" if isinstance(chain, str) else -chain for chain in chains]
-    (signal,) = open_signals(path, channels=[1, 2, 3, 4], calibration=inverted)
+    (signal,) = opened(path, channels=[1, 2, 3, 4], calibration=inverted)
     np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
     assert "sign_changed" in [note.code for note in signal.notes]
-    (signal,) = open_signals(path, channels="sum", calibration=inverted, polarity="positive")
+    (signal,) = opened(path, channels="sum", calibration=inverted, polarity="positive")
     np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
     with pytest.raises(InputError, match=naming("2 calibrations for 4 channels")):
-        open_signals(path, channels="sum", calibration=chains[:2])
+        opened(path, channels="sum", calibration=chains[:2])
     with pytest.raises(InputError, match=naming("2 calibrations for 1 channel")):
-        open_signals(path, channel=1, calibration=chains[:2])
+        opened(path, channel=1, calibration=chains[:2])
 
 
 def test_configuration_and_keywords_select_channels(tmp_path: Path) -> None:
@@ -120,7 +119,7 @@ def test_configuration_and_keywords_select_channels(tmp_path: Path) -> None:
     one = thud.read_recording(path, config=lab, channel="F4", calibration="1 N/V")
     assert one.peak_force == pytest.approx(SHARES[3] * peak, rel=0.01)
     with pytest.raises(InputError, match=naming("both channel and channels")):
-        open_signals(path, channel=1, channels="sum")
+        opened(path, channel=1, channels="sum")
     lab.write_text('channels = ["F1"]\n')
     with pytest.raises(InputError, match=naming("lab.toml", "channels", "is not allowed")):
         read_config(lab)
@@ -154,20 +153,20 @@ def test_senseless_channels_are_refused(channels: object) -> None:
 def test_channels_to_be_added_must_be_forces(tmp_path: Path) -> None:
     force, noise = record(0), record(1, share=0.0)
     path = write_table(tmp_path / "one.csv", [force], ["F"])
-    with pytest.raises(InputError, match=naming('"sum" finds 1 channel of force')):
-        open_signals(path, channels="sum")
+    with pytest.raises(InputError, match=naming('"sum" needs two or more channels of force')):
+        opened(path, channels="sum")
     # One force among other channels needs no choice.
     path = tmp_path / "mixed.csv"
     table = np.column_stack([np.arange(len(force)) / RATE, force, noise, noise])
     np.savetxt(path, table, "%.7g", ",", header="t [s],F [N],trigger [V],a [g]", comments="")
     assert thud.read_recording(path).peak_force == pytest.approx(1500, rel=0.01)
     with pytest.raises(InputError, match=naming("matches 0 channels")):
-        open_signals(path, channels="F+G")
+        opened(path, channels="F+G")
     with pytest.raises(InputError, match=naming("names one channel twice")):
-        open_signals(path, channels="F+2")
+        opened(path, channels="F+2")
     path = write_table(tmp_path / "axes.csv", cells()[:3], ["Fx", "Fy", "Fz"])
     with pytest.raises(InputError, match=naming("different directions")):
-        open_signals(path, channels="sum")
+        opened(path, channels="sum")
     path = write_table(tmp_path / "total.csv", [*cells(), sum(cells())], [*NAMES, "Fz"])
     with pytest.raises(InputError, match=naming("Fz", "is the sum of the other channels")):
         thud.read_recording(path, channels="sum")
@@ -179,16 +178,16 @@ def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
         ({"channel": "F1"}, "F2, F3, F4"),
         ({"channels": "F1+F2+F3"}, "F4"),
     ):
-        (signal,) = open_signals(path, **given)
+        (signal,) = opened(path, **given)
         note = signal.notes[-1]
         assert (note.code, note.others["channels"]) == ("forces_left_out", missing)
-    assert not warned(open_signals(path, channels="sum"))
+    assert not warned(opened(path, channels="sum"))
     # The sum of load cells, small lateral forces, and a channel without any signal.
     force = sum(cells())
     columns = [*cells(), force, 0.01 * force, np.ones(len(force))]
     path = write_table(tmp_path / "plate.csv", columns, [*NAMES, "Fz", "Fx", "F0"])
-    assert not warned(open_signals(path, channel="Fz"))
-    assert not warned(open_signals(path, channels="F1+F2+F3+F4"))
+    assert not warned(opened(path, channel="Fz"))
+    assert not warned(opened(path, channels="F1+F2+F3+F4"))
 
 
 def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
@@ -200,7 +199,7 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=naming("F1", "all samples are 0")):
         thud.read_recording(path, channels="sum")
     path = write_table(tmp_path / "inverted.csv", [-first, *others], NAMES)
-    assert warned(open_signals(path, channels="sum")) == [("cell_sign", "inverted.csv, F1")]
+    assert warned(opened(path, channels="sum")) == [("cell_sign", "inverted.csv, F1")]
     lost = first.copy()
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
     path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)
@@ -259,17 +258,6 @@ def test_sum_with_another_calibration_raises_a_warning(tmp_path: Path) -> None:
     path = write_table(tmp_path / "total.csv", loads(F4=total), NAMES)
     note = noted(cell_notes(path), "cell_like_sum")
     assert (note.others["cell"], note.value) == ("total.csv, F4", pytest.approx(1.1, rel=0.01))
-
-
-def test_load_cell_in_another_unit_is_named(tmp_path: Path) -> None:
-    force, noise = cells(), record(1, share=0.0)
-    path = tmp_path / "mixed.csv"
-    table = np.column_stack([np.arange(len(noise)) / RATE, *force[:3], force[3] / 250, noise])
-    head = "t [s],F1 [N],F2 [N],F3 [N],F4 [V],trigger [V]"
-    np.savetxt(path, table, "%.7g", ",", header=head, comments="")
-    (signal,) = open_signals(path, channels="sum")
-    assert signal.notes[-1].code == "channels_similar"
-    assert signal.notes[-1].others["channels"] == "F4 [V]"
 
 
 def test_channels_of_unequal_length_are_refused() -> None:

@@ -167,7 +167,7 @@ def later(force: np.ndarray, share: float) -> np.ndarray:
         (lambda f: median_filter(f, 25), "noise of the background ends", "clipped"),
         (lambda f: np.repeat(f[::24], 24)[: len(f)], "24 samples each are equal", "clipped"),
         (lambda f: f / 150, "unit = 'kN'", "probably wrong"),
-        (np.maximum.accumulate, "", "polarity"),
+        (np.maximum.accumulate, "does not return", "unit"),
         (lambda f: np.minimum(f, 1200), "clipped", "equal"),
         (lambda f: later(f, 0.2), "below 0.25 of the highest", "bounce"),
         (lambda f: f + np.roll(f, 420), "--leave-out", "clipped"),

@@ -19,11 +19,10 @@ import pyuff
 import scipy.io
 import soundfile
 from conftest import naming
-from recording_files import WRITERS, half_sine
+from recording_files import WRITERS, half_sine, opened
 
 from thud.base.errors import InputError
 from thud.recordings.calibration import calibrate
-from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,7 +102,7 @@ FORMATS: dict[str, Callable[..., None]] = {
 
 
 def read(path: Path, **stated: Any) -> NDArray[np.float64]:  # noqa: ANN401
-    (signal,) = open_signals(path, **stated)
+    (signal,) = opened(path, **stated)
     assert signal.sample_rate == pytest.approx(RATE)
     return signal.read(0, signal.n_sample)
 
@@ -141,7 +140,7 @@ def test_what_a_header_states_is_applied_or_refused(name: str, tmp_path: Path) -
         if newtons is None or is_known:
             continue
         # A calibration is that of the stored values, and the factor is named in a note.
-        (signal,) = open_signals(path, calibration=1500.0 / float(stored[abs(stored).argmax()]))
+        (signal,) = opened(path, calibration=1500.0 / float(stored[abs(stored).argmax()]))
         np.testing.assert_allclose(signal.read(0, signal.n_sample), FORCE, atol=1e-6)
         stated = [note for note in signal.notes if note.code == "factor_not_applied"]
         assert any(factor in note.others["factor"] for note in stated)
@@ -162,7 +161,7 @@ def test_other_numbers_of_a_header_are_no_factors(name: str, key: str, tmp_path:
 def test_sensitivity_without_a_unit_is_not_ignored(name: str, tmp_path: Path) -> None:
     FORMATS[name](tmp_path / name, FORCE, [("array", "Fs", RATE), ("array", "sensitivity", 4.0)])
     with pytest.raises(InputError, match=naming("sensitivity", "calibration")):
-        open_signals(tmp_path / name)
+        opened(tmp_path / name)
 
 
 def test_offset_of_a_convention_is_added(tmp_path: Path) -> None:
@@ -176,7 +175,7 @@ def test_offset_of_a_convention_is_added(tmp_path: Path) -> None:
             np.testing.assert_allclose(read(path), FORCE, atol=1e-9)
         else:
             with pytest.raises(InputError, match=naming("offset = 25.0")):
-                open_signals(path)
+                opened(path)
 
 
 def test_units_that_disagree_are_refused(tmp_path: Path) -> None:
@@ -184,12 +183,12 @@ def test_units_that_disagree_are_refused(tmp_path: Path) -> None:
         file["Force_kN"], file.attrs["Fs"] = FORCE, RATE
         file["Force_kN"].attrs["units"] = "N"
     with pytest.raises(InputError, match=naming("N by the attribute, kN by the name", "unit =")):
-        open_signals(tmp_path / "a.h5")
+        opened(tmp_path / "a.h5")
     np.testing.assert_allclose(read(tmp_path / "a.h5", unit="N"), FORCE)
     units = np.array(["s", "kN"], dtype=object)
     scipy.io.savemat(tmp_path / "a.mat", {"M": np.column_stack([TIME, FORCE]), "units": units})
     with pytest.raises(InputError, match=naming("s, kN", "unit =")):
-        open_signals(tmp_path / "a.mat")
+        opened(tmp_path / "a.mat")
 
 
 # Units of data set 164 per m and per N, and labels with newtons per unit.
@@ -228,11 +227,11 @@ def test_units_of_universal_files_are_applied_or_refused(
         agree = not units or not is_force or math.isclose(size, by_system, rel_tol=1e-3)
         is_right = newtons is not None and agree
     if is_right:
-        (signal,) = open_signals(path)
+        (signal,) = opened(path)
         np.testing.assert_allclose(signal.read(0, signal.n_sample), FORCE, rtol=1e-6, atol=1e-6)
     else:
         with pytest.raises(InputError, match=r"unit|calibration"):
-            open_signals(path)
+            opened(path)
 
 
 def tdms_scale(kind: str) -> dict[str, Any]:
@@ -262,7 +261,7 @@ def test_scales_of_tdms_are_applied_or_refused_by_name(
         np.testing.assert_allclose(read(tmp_path / "a.tdms"), FORCE)
     else:
         with pytest.raises(InputError, match=naming("a.tdms", kind, "scale")):
-            open_signals(tmp_path / "a.tdms")
+            opened(tmp_path / "a.tdms")
     assert capfd.readouterr() == ("", "")
     loggers = [logging.getLogger(name) for name in logging.root.manager.loggerDict]
     assert not any(logger.filters for logger in loggers if logger.name.startswith("nptdms"))
@@ -283,7 +282,7 @@ def test_tdms_that_is_cut_off_anywhere_is_refused(order: str, tmp_path: Path) ->
     for cut in {*range(5, len(data), 97), *range(boundary + 1, boundary + 40)}:
         path.write_bytes(data[:cut])
         with pytest.raises(InputError, match=r"a\.tdms: "):
-            open_signals(path)
+            opened(path)
 
 
 def big_endian_tdms() -> bytes:
@@ -333,7 +332,7 @@ def test_times_with_a_factor_give_no_rate(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.nc", "r+") as file:
         file["time"].attrs["gain"] = 2.0
     with pytest.raises(InputError, match=naming("sample rate", "sample_rate")):
-        open_signals(tmp_path / "a.nc")
+        opened(tmp_path / "a.nc")
     np.testing.assert_allclose(read(tmp_path / "a.nc", sample_rate=RATE), FORCE)
 
 
@@ -369,13 +368,13 @@ def test_sound_of_a_stream_is_read_to_its_end(length: int, kind: str, tmp_path: 
     data[4:8] = data[at : at + 4] = struct.pack("<I", length)
     path.write_bytes(data)
     np.testing.assert_array_equal(read(path, calibration=5000.0), whole)
-    (signal,) = open_signals(path, calibration=5000.0)
+    (signal,) = opened(path, calibration=5000.0)
     assert "length_unknown" in [note.code for note in signal.notes]
     # A length that no stream begins with is a length.
     data[at : at + 4] = struct.pack("<I", length - 1)
     path.write_bytes(data)
     with pytest.raises(InputError, match="cut off"):
-        open_signals(path, calibration=5000.0)
+        opened(path, calibration=5000.0)
 
 
 def test_bw64_is_refused_with_what_helps(tmp_path: Path) -> None:
@@ -383,7 +382,7 @@ def test_bw64_is_refused_with_what_helps(tmp_path: Path) -> None:
     data = (tmp_path / "a.wav").read_bytes()
     (tmp_path / "a.wav").write_bytes(b"BW64" + data[4:])
     with pytest.raises(InputError, match=naming("a.wav", "BW64", "ffmpeg")):
-        open_signals(tmp_path / "a.wav")
+        opened(tmp_path / "a.wav")
 
 
 def test_calibration_of_a_file_with_a_factor_names_it(tmp_path: Path) -> None:
@@ -398,5 +397,5 @@ def test_every_writer_of_the_tests_is_read_without_a_note_on_factors(tmp_path: P
     for name, write in WRITERS.items():
         sound = name.startswith("pcm")
         write(tmp_path / name, FORCE / 5000 if sound else FORCE, RATE, "N")
-        (signal,) = open_signals(tmp_path / name, calibration=5000.0 if sound else None)
+        (signal,) = opened(tmp_path / name, calibration=5000.0 if sound else None)
         assert "factor_not_applied" not in [note.code for note in signal.notes]

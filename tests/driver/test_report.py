@@ -29,11 +29,11 @@ from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, ReportConfig, read_config
-from thud.recordings.dates import read_date
 from thud.recordings.picture import read_picture
 from thud.recordings.plate import Plate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
+from thud.recordings.times import read_date
 from thud.report.contents import FIELDS, missing_fields, report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_notes, shorten

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import naming
+from recording_files import opened
 
 import thud
 from thud.base.units import UNITS, find_unit
-from thud.recordings.date_times import seconds_of_day
-from thud.recordings.signal_files import open_signals
 from thud.recordings.table import read_table, time_and_force
+from thud.recordings.times import seconds_of_day
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -149,7 +149,7 @@ def outcome(path: Path, chance: random.Random) -> str:
         table = read_table(path)
         is_force = any(UNITS.get(find_unit(c.unit), ("",))[0] == "N" for c in table.columns)
         stated = {} if is_force or not has_units else {"calibration": f"{SENSITIVITY} N/V"}
-        signals = open_signals(path, channel="F1" if stated else None, **stated)
+        signals = opened(path, channel="F1" if stated else None, **stated)
     except thud.InputError:
         return "refused"
     return (
@@ -272,7 +272,7 @@ def test_ordinary_layouts_are_read_with_their_units(
     path.write_text("\n".join([head, *lines, ""]), encoding="utf-8")
     stated = {"calibration": f"{SENSITIVITY} N/V"} if base == "V" else {}
     sums = {"channels": "sum"} if "F2" in head else {}
-    (signal,) = open_signals(path, **stated, **sums)
+    (signal,) = opened(path, **stated, **sums)
     force = signal.read(0, signal.n_sample)
     np.testing.assert_allclose(force, PULSE * (1.5 if sums else 1.0), atol=1e-4)
     assert signal.sample_rate == pytest.approx(RATE, rel=1e-5)
@@ -308,7 +308,7 @@ def test_units_and_titles_that_do_not_fit_are_refused(
     rows = [row.format(t=f"{i / RATE:.6f}", f=f"{force:.2f}") for i, force in enumerate(PULSE)]
     path.write_text("\n".join([head, *rows, ""]), encoding="utf-8")
     with pytest.raises(thud.InputError, match=words):
-        open_signals(path)
+        opened(path)
     with pytest.raises(thud.InputError):
         time_and_force(read_table(path))
 
@@ -322,7 +322,9 @@ def test_spellings_of_units(text: str, unit: str) -> None:
     assert find_unit(text) == unit
 
 
-@pytest.mark.parametrize(("text", "time"), [("15:30,00", 930.0), ("15:30", 55_800.0)])
+@pytest.mark.parametrize(
+    ("text", "time"), [("15:30,00", 930.0), ("15:30", 930.0), ("3:15:30", 11_730.0)]
+)
 def test_fractions_of_seconds_show_minutes(text: str, time: float) -> None:
     assert seconds_of_day(text) == time
 
@@ -334,5 +336,5 @@ def test_exact_clock_shows_its_rate(decimals: int, tmp_path: Path) -> None:
         f"10:00:{i / 1e4:0{decimals + 3}.{decimals}f};{force:.3f}" for i, force in enumerate(PULSE)
     ]
     path.write_text("\n".join(["Clock;Force [N]", *rows]), encoding="utf-8")
-    (signal,) = open_signals(path)
+    (signal,) = opened(path)
     assert signal.sample_rate == pytest.approx(1e4, rel=1e-9)

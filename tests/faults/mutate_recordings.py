@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from recording_files import WRITERS, half_sine
 
 from thud.base.errors import InputError
+from thud.recordings.config import Config
 from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
@@ -126,11 +127,11 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     rng = np.random.default_rng(chance.getrandbits(63))
     path.write_bytes(mutate(_originals()[path.name], rng))
     try:
-        signals = open_signals(
-            path,
+        config = Config(
             calibration=5000.0 if path.name.startswith("pcm") else None,
             channels="sum" if path.name.startswith("cells") else None,
         )
+        signals = open_signals(path, config)
         for signal in signals[:4]:
             for start in range(0, signal.n_sample, 2**20):
                 signal.read(start, min(signal.n_sample, start + 2**20))

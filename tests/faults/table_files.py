@@ -24,7 +24,7 @@ from thud.floors.survey import levels_csv, rating_table, read_room_levels
 from thud.recordings.config import read_config
 from thud.recordings.formats.text import read_channels
 from thud.recordings.table import read_table, time_and_force
-from thud.recordings.uniform_grid import read_record
+from thud.recordings.times import read_record
 from thud.studies.compression_fit import fit_compression
 
 if TYPE_CHECKING:

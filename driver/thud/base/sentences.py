@@ -21,8 +21,7 @@ PROCESSING = {
     "length_unknown": "the header states no length; the samples were read to the end of the file",
     "times_rounded": "the times, rounded to {value:.1g} {unit}, were replaced by a grid of "
     "{rate:.7g} Hz",
-    "date_times_rate": "the sample rate is that of the date-times, {value:.7g} {unit}",
-    "date_times_coarse": "the date-times are too coarse to show the sample rate",
+    "times_coarse": "the times of day are too coarse to show the sample rate",
     # Background.
     "offset_removed": "an offset of {value:.3g} {unit} was removed",
     "drift_removed": "a drift of {value:.3g} {unit} was removed",
@@ -59,8 +58,6 @@ WARNINGS = {
     "may be wrong",
     "forces_left_out": "the file has forces in other channels, too, which are not included: "
     "{channels}",
-    "channels_similar": "channels in another unit resemble the force, but are not included: "
-    "{channels}; if they are load cells, name all channels and state a calibration for each",
     "cell_sign": "the peak is {value:.4g} {unit} in a sum of {total:.4g} {unit}; the sign of this "
     "load cell may be wrong",
     # Faults of the force.

@@ -25,7 +25,7 @@ from thud.report.rows import INCOMPLETE, excluded_text, expanded_text, value_tex
 from thud.report.write import figures, json_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from thud.level.assessment import Verdict
     from thud.recordings.config import Config
@@ -115,7 +115,7 @@ def read_copies(
         signals = (
             _renamed(signal, Path(path).name, titles[Path(path).name])
             for path in recorded
-            for signal in _open(path, config)
+            for signal in open_signals(path, config)
         )
         recording = Recording.from_signals(signals, config)
     except ThudError as error:
@@ -143,11 +143,6 @@ def _config_of(paths: Sequence[str], table: Mapping[str, object]) -> Config:
     stated_tables = {name: stated[name] for name in TABLES if name in stated and name in table}
     merged = {name: {**keys, **table[name]} for name, keys in stated_tables.items()}  # type: ignore[dict-item]
     return config_from({**stated, **table, **merged})
-
-
-def _open(path: str, config: Config) -> Iterator[Signal]:
-    keys = ("channel", "channels", "unit", "calibration", "polarity", "sample_rate")
-    yield from open_signals(path, **{key: getattr(config, key) for key in keys})
 
 
 def _renamed(signal: Signal, copy: str, title: str) -> Signal:

@@ -9,7 +9,7 @@ import numpy as np
 
 from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_number
-from thud.recordings.channel import shown_path, shown_text
+from thud.recordings.channel import regular_file, shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
     Calibration,
@@ -20,7 +20,7 @@ from thud.recordings.force_units import (
 from thud.recordings.formats import read_channels
 from thud.recordings.load_steps import Level, Rate, Steps, measure_steps
 from thud.recordings.signal import Signal
-from thud.recordings.signal_files import channel_choices, choose_channels, regular_file
+from thud.recordings.signal_files import channel_choices, choose_channels
 
 if TYPE_CHECKING:
     import os

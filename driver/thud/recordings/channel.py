@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import importlib
 import os
-import threading
-import warnings
+import stat
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
 from thud.base.extras import packages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from pathlib import Path
 
     import numpy as np
     from numpy.typing import NDArray
@@ -75,6 +74,11 @@ class Channel:
     may_be_fractions: bool = False
     unapplied: str = ""
 
+    @property
+    def title(self) -> str:
+        """Name for messages, or the number if it has none."""
+        return shown_text(self.name) or f"channel {self.number}"
+
 
 def shown_text(text: object) -> str:
     """Return text from a file or a library for a message: short, printable, in one line."""
@@ -82,22 +86,16 @@ def shown_text(text: object) -> str:
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line[:MAX_SHOWN])
 
 
-def shown_path(path: Path) -> str:
+def shown_path(path: Path | str) -> str:
     """Return a path for a message, even if its name is not UTF-8."""
     return os.fsencode(path).decode("utf-8", "replace")
 
 
-_FILTERS = threading.RLock()
-
-
 @contextmanager
 def guarded(path: Path, kind: str) -> Iterator[None]:
-    """Convert any error of a library to InputError, and hide its warnings."""
+    """Convert any error of a library to InputError."""
     try:
-        # The filters of warnings belong to the process: one thread at a time changes them.
-        with _FILTERS, warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
+        yield
     except InputError:
         raise
     except MemoryError as error:
@@ -110,6 +108,24 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
             f"a complete, undamaged {kind} file",
             error,
         )
+
+
+def regular_file(path: str | os.PathLike[str]) -> Path:
+    """Return a path; raise InputError if it is no readable regular file (a pipe could block)."""
+    require_kind("recording", path, str | os.PathLike)
+    file = Path(path)
+    name = shown_path(file).replace("\0", "\N{REPLACEMENT CHARACTER}")
+    try:
+        mode = file.stat().st_mode
+        if stat.S_ISREG(mode):
+            file.open("rb").close()
+    except (OSError, ValueError) as error:  # a zero byte
+        reason = getattr(error, "strerror", "no path")
+        refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
+    if not stat.S_ISREG(mode):
+        kind = "a directory" if stat.S_ISDIR(mode) else "no regular file"
+        refuse(f"{name}: is {kind}", "a file")
+    return file
 
 
 def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module

@@ -12,8 +12,8 @@ from thud.base.errors import InputError
 from thud.base.files import read_toml
 from thud.base.note import Note
 from thud.level.levels import SOURCES
-from thud.recordings import dates
-from thud.recordings.channel import shown_path
+from thud.recordings import times
+from thud.recordings.channel import regular_file, shown_path
 from thud.recordings.config_values import (
     Choice,
     Listed,
@@ -37,7 +37,6 @@ from thud.recordings.polarity import POLARITIES
 from thud.recordings.recorder_filter import RecorderFilter
 from thud.recordings.response import Chain
 from thud.recordings.restitution import DropConditions
-from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
     import os
@@ -207,7 +206,7 @@ class Config(Table):
         These are calibrations that were due before the measurement, and dates of receipt and issue
         in the wrong order. `file_dates` are those of the files, which count if no date is stated.
         """
-        read = [dates.read_date(text) for text in ([self.date] if self.date else file_dates)]
+        read = [times.read_date(text) for text in ([self.date] if self.date else file_dates)]
         days = sorted(day.date().isoformat() for day in read if day)
         first, last = (days[0], days[-1]) if days else ("", "")
         received, issued = self.report.received, self.report.issued

@@ -18,7 +18,7 @@ from thud.base.checks import (
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
-from thud.recordings import dates
+from thud.recordings import times
 from thud.recordings.force_units import Calibration, plain_number, read_chain
 
 MAX_TEXT = 500
@@ -94,7 +94,7 @@ def to_date(value: object, key: str) -> str:
     if isinstance(value, date):
         return value.isoformat()[:10]
     text = to_line(value, key)
-    read = dates.read_date(text) if text else None
+    read = times.read_date(text) if text else None
     if text and read is None:
         refuse_value(key, value, 'a date, such as "2024-05-03"')
     return read.date().isoformat() if read else ""

@@ -150,12 +150,13 @@ def plain_number(calibration: T) -> T | float:
         return calibration
 
 
-def unit_of_chain(chain: str) -> str:
+def unit_of_chain(calibration: str | Calibration) -> str:
     """Return the base unit from which a chain converts to newtons; empty if it is not clear.
 
     >>> unit_of_chain("4.1 pC/N, 10 mV/pC")
     'V'
     """
+    chain = calibration.chain if isinstance(calibration, Calibration) else calibration
     factors = read_chain(chain)
     others = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
     ends = [unit for unit in others if _follow(unit, factors, None) is not None]

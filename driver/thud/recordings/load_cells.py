@@ -83,18 +83,17 @@ def refuse_directions(names: Sequence[str], file: str) -> None:
 def add_signals(cells: Sequence[Signal], name: str) -> Signal:
     """Return the sum of signals of equal rate and length."""
     first = cells[0]
-    for cell in cells[1:]:
+    notes: list[Note] = []
+    for cell in cells:
         if (cell.n_sample, cell.sample_rate) != (first.n_sample, first.sample_rate):
             refuse(
                 f"{cell.name}: {cell.n_sample} samples at {cell.sample_rate:g} Hz, "
                 f"{first.n_sample} at {first.sample_rate:g} Hz in {first.name}",
                 "channels that were recorded together",
             )
+        common = [replace(note, subject=name) for note in cell.notes]
+        notes += [note for note in common if note not in notes]
     uncertainties = [cell.calibration_uncertainty for cell in cells]
-    notes: list[Note] = []
-    for note in (note for cell in cells for note in cell.notes):
-        common = replace(note, subject=name)
-        notes += [common] * (common not in notes)
     known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     return replace(
         first,
@@ -104,24 +103,9 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
         calibration="; ".join(dict.fromkeys(cell.calibration for cell in cells)),
         # The reference of all calibrations is usually the same.
         calibration_uncertainty=max(known) if len(known) == len(cells) else None,
-        notes=tuple(notes),
+        notes=(*notes, Note("cells_added", name, len(cells))),
         cells=tuple(cells),
     )
-
-
-def check_signs(total: Signal, peak: float) -> tuple[Note, ...]:
-    """Return a warning for each cell whose force is mostly negative; the peak is that of the sum.
-
-    Raise InputError if all samples of a cell are equal.
-    """
-    warnings = []
-    for cell in total.cells:
-        extremes = scan(cell.read, cell.n_sample, cell.name)
-        up, down = extremes.peak(1.0), extremes.peak(-1.0)
-        if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
-            note = Note("cell_sign", cell.name, -down, unit="N", others={"total": peak})
-            warnings.append(note)
-    return tuple(warnings)
 
 
 def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.float64]:
@@ -129,6 +113,20 @@ def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.fl
     for cell in cells[1:]:
         total += cell.read(start, stop)
     return total
+
+
+def check_signs(cells: Sequence[Signal], peak: float) -> tuple[Note, ...]:
+    """Return a warning for each cell whose force is mostly negative; the peak is that of the sum.
+
+    Raise InputError if all samples of a cell are equal.
+    """
+    notes = []
+    for cell in cells:
+        extremes = scan(cell.read, cell.n_sample, cell.name)
+        up, down = extremes.peak(1.0), extremes.peak(-1.0)
+        if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
+            notes.append(Note("cell_sign", cell.name, -down, unit="N", others={"total": peak}))
+    return tuple(notes)
 
 
 def repair_cells(window: Window) -> tuple[Window, tuple[Note, ...]]:

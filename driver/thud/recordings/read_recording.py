@@ -95,17 +95,5 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         stated["leave_out"] = {**settings.leave_out, **leave_out}
     settings = replace(settings, **stated)
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
-    signals = (
-        signal
-        for path in files
-        for signal in open_signals(
-            path,
-            channel=settings.channel,
-            channels=settings.channels,
-            unit=settings.unit,
-            calibration=settings.calibration,
-            polarity=settings.polarity,
-            sample_rate=settings.sample_rate,
-        )
-    )
+    signals = (signal for path in files for signal in open_signals(path, settings))
     return Recording.from_signals(signals, settings, progress=progress)

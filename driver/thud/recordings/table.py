@@ -27,7 +27,6 @@ from thud.base.errors import InputError
 from thud.base.units import UNITS, find_unit
 from thud.base.workbooks import read_workbook
 from thud.recordings.channel import require_small, shown_path, shown_text
-from thud.recordings.date_times import continued, is_date, seconds_of_day
 from thud.recordings.header_aliases import (
     BRACKETS,
     DATE,
@@ -42,6 +41,7 @@ from thud.recordings.header_aliases import (
     plain,
     split_title,
 )
+from thud.recordings.times import DATE as DATE_CELL, seconds_of_day
 from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
@@ -271,7 +271,7 @@ def _read(layout: _Layout) -> Table:
         layout.decimal = find_decimal(_decisive(layout), layout.separator, layout.name)
     _require_separators(layout)
     values = _read_numbers(layout)
-    clock = None if layout.clock is None else continued(values.pop(layout.clock))
+    clock = None if layout.clock is None else values.pop(layout.clock)
     columns = [
         Column(i + 1, layout.names[i], layout.units[i], numbers, layout.name)
         for i, numbers in values.items()
@@ -305,7 +305,7 @@ def _find_numbers(layout: _Layout) -> list[str]:
         values = {i: _value(cell) for i, cell in filled.items()}
         used = {i: unit for i, (number, unit) in values.items() if is_number(number)}
         clocks = [i for i, cell in filled.items() if seconds_of_day(cell) is not None]
-        dates = [i for i, cell in filled.items() if is_date(cell)] + clocks
+        dates = [i for i, cell in filled.items() if DATE_CELL.fullmatch(cell)] + clocks
         # Dates precede the numbers, and further columns may hold words, such as a state.
         if (
             used
@@ -456,7 +456,9 @@ def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
             filled = _trimmed(cells)
             extra = filled[layout.width :]
             is_title = len(filled) <= layout.full_width or all(plain(c) in REMARK for c in extra)
-            has_number = any(is_number(c) or is_date(c) or seconds_of_day(c) for c in cells)
+            has_number = any(
+                is_number(c) or DATE_CELL.fullmatch(c) or seconds_of_day(c) for c in cells
+            )
             if len(cells) >= layout.width and is_title and filled and not has_number:
                 return cells[: max(layout.width, len(filled))]
     return []

@@ -28,7 +28,7 @@ from thud.recordings.header_aliases import (
     text_of,
     time_scale,
 )
-from thud.recordings.uniform_grid import uniform_grid
+from thud.recordings.times import uniform_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -13,9 +13,9 @@ from thud.level.assessment import get_criteria
 from thud.level.estimate import CONFIDENCE
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.config import Instrument
-from thud.recordings.dates import read_date
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import NOISE, REPEATABILITY
+from thud.recordings.times import read_date
 from thud.report.notes import processing, warnings
 from thud.report.rows import SCATTER
 

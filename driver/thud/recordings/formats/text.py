@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.recordings.channel import MIN_SAMPLES, Channel
-from thud.recordings.date_times import DAY, are_days, step_of_date_times
 from thud.recordings.header_aliases import DATE, find_rate, find_word
 from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
-from thud.recordings.uniform_grid import uniform_grid
+from thud.recordings.times import ROUNDED_TOLERANCE, last_digit, uniform_grid
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from thud.recordings.table import Table
 
 # Relative tolerance between the rate in the header and the rate of the times.
 SAME_RATE = 0.01
@@ -28,33 +30,28 @@ SAME_RATE = 0.01
 def read_channels(path: Path) -> list[Channel]:
     """Return the columns of numbers of a text file except the times."""
     table = read_table(path)
-    columns, name = list(table.columns), table.name
-    rows = len(columns[0].values)
+    rows = len(table.columns[0].values)
     if rows < MIN_SAMPLES:
-        count = f"{rows} rows of {len(columns)} numbers"
-        refuse(f"{name}: {count}", f"{MIN_SAMPLES} rows or more of numbers")
+        count = f"{rows} rows of {len(table.columns)} numbers"
+        refuse(f"{table.name}: {count}", f"{MIN_SAMPLES} rows or more of numbers")
     rate = find_rate(table.header, table.decimal)
-    time = next((column for column in columns if column.is_time), None)
-    if time is None and table.clock is None and len(columns) > 1 and not columns[0].unit:
-        first = columns[0]
-        time = first if rate is None or _are_times(first.values) else None
-    step = None
+    times, number = _times(table, rate)
     notes: tuple[Note, ...] = ()
-    if time is not None and (len(columns) > 1 or table.clock is not None):
-        columns.remove(time)
-        if not time.unit and are_days(time.values):
-            step, notes = _date_time_step(time.values, DAY, name)
+    if times is not None:
+        try:
+            _, step, notes = uniform_grid(times, table.name)
+        except InputError:
+            # Times of day may have too few digits to show the rate.
+            if number or last_digit(times) <= ROUNDED_TOLERANCE * np.ptp(times) / (rows - 1):
+                raise
+            notes = (Note("times_coarse"),)
         else:
-            _, step, notes = uniform_grid(time.to("s"), name)
-    elif table.clock is not None:
-        step, notes = _date_time_step(table.clock, 1.0, name)
-    if step is not None:
-        if rate is not None and abs(step * rate - 1) > SAME_RATE:
-            refuse(
-                f"{name}: {rate:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
-                "one sample rate",
-            )
-        rate = rate or 1 / step
+            if rate is not None and abs(step * rate - 1) > SAME_RATE:
+                refuse(
+                    f"{table.name}: {rate:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
+                    "one sample rate",
+                )
+            rate = rate or 1 / step
     return [
         Channel(
             name=column.name,
@@ -66,21 +63,23 @@ def read_channels(path: Path) -> list[Channel]:
             date=find_word(table.header, DATE),
             notes=notes,
         )
-        for column in columns
+        for column in table.columns
+        if column.number != number
     ]
 
 
-def _date_time_step(
-    times: NDArray[np.float64], unit: float, name: str
-) -> tuple[float | None, tuple[Note, ...]]:
-    """Return the step of date-times, s, and notes; `unit` is that of the times, s."""
-    step = step_of_date_times(times, name)
-    if step is None:
-        return None, (Note("date_times_coarse"),)
-    return unit * step, (Note("date_times_rate", value=1 / (unit * step), unit="Hz"),)
+def _times(table: Table, rate: float | None) -> tuple[NDArray[np.float64] | None, int]:
+    """Return the times of a table, s, and the number of their column; zero for times of day.
 
-
-def _are_times(column: NDArray[np.float64]) -> bool:
-    """Whether a column without a title rises uniformly enough to be times."""
-    rise = np.diff(column)
-    return bool((rise > 0).all() and rise.max() < 2 * rise.min() + SAME_RATE * rise.mean())
+    A column without a title is that of the times if it is the first and rises uniformly.
+    """
+    first, *others = table.columns
+    time = next((column for column in table.columns if column.is_time), None)
+    if time is None and table.clock is None and others and not first.unit:
+        with np.errstate(invalid="ignore"):  # infinite numbers
+            rise = np.diff(first.values)
+        is_rising = (rise > 0).all() and rise.max() < 2 * rise.min() + SAME_RATE * rise.mean()
+        time = first if rate is None or is_rising else None
+    if time is not None and (others or table.clock is not None):
+        return time.to("s"), time.number
+    return table.clock, 0

@@ -15,7 +15,7 @@ from thud.recordings.channel import Channel, library, require_small, shown_path
 from thud.recordings.force_units import UNITS, find_unit
 from thud.recordings.header_aliases import time_scale
 from thud.recordings.signal import read_array
-from thud.recordings.uniform_grid import uniform_grid
+from thud.recordings.times import uniform_grid
 
 if TYPE_CHECKING:
     from pathlib import Path

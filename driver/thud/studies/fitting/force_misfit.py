@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.noise import Background
-    from thud.recordings.uniform_grid import Record
+    from thud.recordings.times import Record
     from thud.studies.fitting.force_target import ForceTarget
 
     Array = NDArray[np.float64]

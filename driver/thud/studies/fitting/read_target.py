@@ -11,7 +11,7 @@ from thud.base.units import power_of, scaled
 from thud.recordings.formats import FORMATS
 from thud.recordings.read_recording import read_recording
 from thud.recordings.table import read_table, time_and_force
-from thud.recordings.uniform_grid import read_record
+from thud.recordings.times import read_record
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
 from thud.studies.parameter import read_quantity

@@ -1,7 +1,9 @@
-"""Times of samples on a uniform grid, and records of force over time."""
+"""Times of samples on a uniform grid, times of day, dates, and records of force over time."""
 
 from __future__ import annotations
 
+import re
+from datetime import datetime
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -24,6 +26,15 @@ MAX_COUNTED = 2**16
 FLOAT_DIGITS = 17
 # Maximum force, N: its square is finite.
 MAX_FORCE = 1e12
+DATE = re.compile(r"\d{1,4}(?P<mark>[-./])\d{1,2}(?P=mark)\d{1,4}", re.ASCII)
+# 10:15:30.25 or, in minutes and seconds as Excel shows them, 15:30.25, with or without a date.
+CLOCK = re.compile(
+    rf"(?:{DATE.pattern}(?:[ T]\s*|,\s+))?(?:(?P<hours>\d{{1,2}}):)??(?P<minutes>\d{{1,2}})"
+    r":(?P<seconds>\d{2}(?:[.,]\d{1,9})?)\s*(?:[ap]m)?(?:Z|[-+]\d\d:?\d\d)?",
+    re.IGNORECASE | re.ASCII,
+)
+DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
+TIME_FORMATS = ("", " %H:%M:%S", " %H:%M")
 
 
 class Record(NamedTuple):
@@ -113,3 +124,35 @@ def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
         refuse(f"{name}: the force has a peak of {force.max():.4g} N", f"up to {MAX_FORCE:g} N")
     uniform = np.asarray(begin + np.arange(rows) * step, dtype=np.float64)
     return Record(uniform, force.copy(), 1 / step)
+
+
+def seconds_of_day(cell: str) -> float | None:
+    """Return the time in a cell, s, since midnight or the full hour; None if it holds none.
+
+    >>> [seconds_of_day(cell) for cell in ("23.11.2026 01:00:02,5", "01:02.5")]
+    [3602.5, 62.5]
+    """
+    match = CLOCK.fullmatch(cell)
+    if match is None:
+        return None
+    seconds = float(match["seconds"].replace(",", "."))
+    return 3600.0 * int(match["hours"] or 0) + 60.0 * int(match["minutes"]) + seconds
+
+
+def read_date(text: str) -> datetime | None:
+    """Return a date written in ISO 8601 or one of the other known formats; None if in none.
+
+    >>> read_date("03.05.2024").date().isoformat()
+    '2024-05-03'
+    """
+    line = " ".join(text.split())
+    try:
+        return datetime.fromisoformat(line).replace(tzinfo=None)
+    except ValueError:
+        pass
+    for form in (date + time for date in DATE_FORMATS for time in TIME_FORMATS):
+        try:
+            return datetime.strptime(line, form)  # noqa: DTZ007 - files state no time zone
+        except ValueError:
+            continue
+    return None
