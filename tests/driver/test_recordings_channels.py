@@ -226,38 +226,9 @@ def cell_notes(path: Path) -> list[Note]:
     return [note for note in found.drops[0].notes if "cell" in note.others]
 
 
-@pytest.mark.parametrize(("delay", "side"), [(0.0005, "later"), (-0.003, "earlier")])
-def test_late_load_cell_raises_a_warning(delay: float, side: str, tmp_path: Path) -> None:
-    late = np.roll(cells()[1], round(delay * RATE))
-    path = write_table(tmp_path / "late.csv", loads(F2=late), NAMES)
-    note = noted(cell_notes(path), "cell_delayed")
-    assert note.others == {"cell": "late.csv, F2", "side": side}
-    assert note.value == pytest.approx(1e3 * abs(delay), rel=0.02)
-
-
-def test_load_cells_with_other_shapes_are_not_late(tmp_path: Path) -> None:
-    """The ball rolls by 2 % of the share, and a cell rings at 300 Hz with 3 % of its force."""
-    first, second, third, fourth = cells()
-    time = np.arange(len(first)) / RATE
-    tilt = 0.02 * np.sin(2 * np.pi * 25 * (time - 0.11)) * first
-    ringing = 1 + 0.03 * np.sin(2 * np.pi * 300 * time)
-    path = write_table(
-        tmp_path / "shapes.csv", [first + tilt, second - tilt, third * ringing, fourth], NAMES
-    )
-    assert not cell_notes(path)
-
-
 def test_dead_load_cell_raises_a_warning(tmp_path: Path) -> None:
     path = write_table(tmp_path / "dead.csv", loads(F3=record(9, share=0.0)), NAMES)
     assert noted(cell_notes(path), "cell_without_force").others["cell"] == "dead.csv, F3"
-
-
-def test_sum_with_another_calibration_raises_a_warning(tmp_path: Path) -> None:
-    first, second, third, _ = cells()
-    total = 1.1 * (first + second + third)
-    path = write_table(tmp_path / "total.csv", loads(F4=total), NAMES)
-    note = noted(cell_notes(path), "cell_like_sum")
-    assert (note.others["cell"], note.value) == ("total.csv, F4", pytest.approx(1.1, rel=0.01))
 
 
 def test_channels_of_unequal_length_are_refused() -> None:

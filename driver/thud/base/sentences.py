@@ -103,13 +103,6 @@ WARNINGS = {
     ),
     # Load cells.
     "cell_without_force": "this load cell carries {value:.1%} of the force; it may be dead",
-    "cell_delayed": (
-        "the force of this load cell is {value:.2g} {unit} {side} than that of the others"
-    ),
-    "cell_like_sum": (
-        "is {value:.3g} times the sum of the other channels; if it is their sum with another "
-        "calibration, it counts twice"
-    ),
     # Drops and bounces.
     "drop_like_bounce": (
         "the pulse begins {value:.2f} {unit} after the one before it, as a bounce would, and has "
