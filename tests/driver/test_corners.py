@@ -19,7 +19,7 @@ import pytest
 
 import thud
 from thud.base._schema import FLOORS, KEYS, MODELS
-from thud.case.case import Case, tables_case
+from thud.case.case import Case
 from thud.case.keys import limits
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def ends_of(key: Key, case: Case) -> tuple[Any, ...]:
 
 def corners_of(owner: str) -> list[Corner]:
     """Return group, key and value of each end of the keys of an owner, and of every impact."""
-    case = tables_case(OWNERS[owner])
+    case = Case.from_namelist(OWNERS[owner])
     common = {""} if owner in MODELS else set()
     return [
         (key.group, key.name, end)
@@ -95,7 +95,7 @@ def pairs_of(owner: str, count: int, draw: random.Random) -> list[Tables]:
 def answer(tables: Tables) -> str:
     """Return what is wrong with the answer to a case, or nothing."""
     try:
-        case = tables_case(tables)
+        case = Case.from_namelist(tables)
         sampling = case.sampling
         if sampling.duration * sampling.sample_rate * sampling.substeps > MANY_STEPS:
             return ""

@@ -18,7 +18,7 @@ from thud import plot
 from thud.base import _schema, bridge
 from thud.base.errors import ReportWarning
 from thud.base.note import Note
-from thud.case.case import tables_case
+from thud.case.case import Case
 from thud.cli import main
 from thud.floors.prediction import _force_change
 from thud.impact.room_level import new_room_level
@@ -513,7 +513,7 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     assert impact.room_level is not None
     assert found.level == pytest.approx(impact.room_level.level, abs=1e-12)
     tables = {"floor": {"name": "plate"}, "room": {}}
-    assert thud.solve_many({}, tables_case(tables)).room_rating == pytest.approx(
+    assert thud.solve_many({}, Case.from_namelist(tables)).room_rating == pytest.approx(
         [found.rating.level], abs=1e-9
     )
     done = run(case_file("&floor name = 'plate' /\n&room /\n"), "-o", "out")

@@ -173,7 +173,7 @@ def test_names_whose_packages_are_missing_say_so() -> None:
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: thud.solve(height=1.0), naming("modal_ball", "'height'", "Drop")),
+        (lambda: thud.solve(height=1.0), naming("ModalBall", "'height'", "Drop")),
         (lambda: thud.solve(bounces=2), naming("'bounces'", "FiniteElement")),
         (lambda: thud.solve(friction=1), naming("friction", "FiniteElement")),
         (lambda: thud.solve(force="floor"), naming("'force'", "Levels")),

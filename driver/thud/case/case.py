@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, TypeAlias, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, TypeAlias
 
 import f90nml
 import numpy as np
@@ -42,32 +42,29 @@ from thud.base.checks import (
 from thud.base.display import Displayed
 from thud.base.errors import InputError
 from thud.base.files import replace_file
-from thud.base.key import Group, require_keywords
+from thud.base.key import Group
 
 if TYPE_CHECKING:
-    from dataclasses import Field
+    from collections.abc import Iterator
     from typing import Any, Self
 
-GroupType = TypeVar("GroupType", bound=Group)
+    from thud.base.key import Key
+
 # Values by group and key, as f90nml has them.
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
-# Names of the keys that take lists of numbers or texts.
-LISTS = {key.name for key in KEYS if key.kind in {"list", "texts"}}
-# Source model of a case that names none.
-DEFAULT_MODEL = ModalBall
-# Optional groups of an impact, and all optional groups of a case.
-IMPACT_GROUPS: dict[str, type[Group]] = {
-    "compression": Compression,
-    "unknowns": Unknowns,
-    "room": Room,
-}
-OPTIONAL_GROUPS: dict[str, type[Group]] = {"modes": Modes, **IMPACT_GROUPS}
+# Names of the keys by namelist group.
+_NAMES: dict[str, list[str]] = {}
+for _key in KEYS:
+    _NAMES.setdefault(_key.group, []).append(_key.name)
+# Groups that a case may have.
+OPTIONAL_GROUPS: dict[str, type[Group]] = {
+    "modes": Modes, "compression": Compression, "unknowns": Unknowns, "room": Room,
+}  # fmt: skip
 
 
-def group_of(model: str, option: Field[Any]) -> str:
-    """Return the namelist group of an option of a model."""
-    group: str = option.metadata.get("group", model)
-    return group
+def attribute_of(key: Key) -> str:
+    """Return the name of the attribute of a `Case` that holds a key, or would hold it."""
+    return "model" if key.owner in MODELS else "floor" if key.owner in FLOORS else key.group
 
 
 def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -> ModelOptions:
@@ -80,9 +77,8 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
-    model = DEFAULT_MODEL.name if model is None else model
+    model = ModalBall.name if model is None else model
     require_choice("&model: name", model, MODELS)
-    require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
     return MODELS[model](**options)  # type: ignore[arg-type]
 
 
@@ -114,7 +110,7 @@ class Case(Group, Displayed):
     name: str = "python"
     ball: Ball = field(default_factory=Ball)
     drop: Drop = field(default_factory=Drop)
-    model: ModelOptions | None = field(default_factory=DEFAULT_MODEL)
+    model: ModelOptions | None = field(default_factory=ModalBall)
     sampling: Sampling = field(default_factory=Sampling)
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
@@ -124,31 +120,49 @@ class Case(Group, Displayed):
     compression: Compression | None = None
     unknowns: Unknowns | None = None
 
+    def __post_init__(self) -> None:
+        """Raise InputError if a group is of a wrong type."""
+        super().__post_init__()
+        for group, kind in GROUPS.items():
+            require_kind(group, getattr(self, group), kind)
+        require_kind("model", self.model, ModelOptions | None)
+        require_kind("floor", self.floor, FloorOptions | None)
+        for group, optional in OPTIONAL_GROUPS.items():
+            require_kind(group, getattr(self, group), optional | None)
+
     def __repr__(self) -> str:
         """Return what is computed."""
-        model = self.model.name if isinstance(self.model, ModelOptions) else ""
+        model = self.model.name if self.model else ""
         modes = "free modes" if self.modes else ""
-        floor = f"on {getattr(self.floor, 'name', None)}" if self.floor else ""
+        floor = f"on {self.floor.name}" if self.floor else ""
         room = "room below" if self.room else ""
         press = "quasi-static compression" if self.compression else ""
         return f"<Case {self.name}: {', '.join(filter(None, (model, floor, modes, room, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        units = {(key.owner or key.group, key.name): key.unit for key in KEYS}
-        rows: list[tuple[str, ...]] = [("group", "key", "value", "unit")]
-        for group, entries in vars(self.resolved()).items():
-            if isinstance(entries, Group):
-                owner = str(getattr(entries, "name", group))
-                for key, value in vars(entries).items():
-                    rows.append((owner, key, str(value), units[owner, key]))
-        return rows
+        entries = self.resolved().entries()
+        rows = [(key.owner or key.group, key.name, str(value), key.unit) for key, value in entries]
+        return [("group", "key", "value", "unit"), *rows]
+
+    def entries(self) -> Iterator[tuple[Key, object]]:
+        """Yield each key that the case has, but its name, with the value."""
+        for key in KEYS:
+            attribute = attribute_of(key)
+            options = getattr(self, attribute, None)
+            is_used = self.model or attribute not in GROUPS or attribute == "ball"
+            if options and is_used and key.owner in {"", attribute, getattr(options, "name", "")}:
+                yield key, getattr(options, key.name)
 
     def resolved(self) -> Self:
         """Return the case with the values of the standard ball by its model where keys are None."""
-        name = self.model.name if self.model else ""
-        model = self.model and _resolved(self.model, name)
-        return replace(self, ball=_resolved(self.ball, name), model=model)
+        values: dict[str, dict[str, object]] = {"ball": {}}
+        for key, value in self.entries():
+            standard = STANDARD_BALL.get((self.model.name if self.model else "", key.name))
+            if value is None and standard is not None:
+                values.setdefault(attribute_of(key), {})[key.name] = standard
+        changed = {name: replace(getattr(self, name), **new) for name, new in values.items()}
+        return replace(self, **changed)
 
     def to_namelist(self) -> Namelist:
         """Return the case as a namelist, which prints as the text of a file.
@@ -158,40 +172,17 @@ class Case(Group, Displayed):
         Raise InputError if a value is not a number, a text or, if the key takes a list, a list of
         numbers.
         """
-        for group, kind in GROUPS.items():
-            require_kind(group, getattr(self, group), kind)
-        require_kind("model", self.model, ModelOptions | None)
-        require_kind("floor", self.floor, FloorOptions | None)
-        for group, optional in OPTIONAL_GROUPS.items():
-            require_kind(group, getattr(self, group), optional | None)
-        groups: dict[str, dict[str, object]] = {
-            "case": {"name": self.name},
-            "ball": vars(self.ball),
-        }
-        if self.modes:
-            groups["modes"] = vars(self.modes)
-        if self.model:
-            groups["model"] = {"name": self.model.name}
-            groups |= {group: vars(getattr(self, group)) for group in GROUPS}
-            for option in fields(self.model):
-                values = groups.setdefault(group_of(self.model.name, option), {})
-                values[option.name] = getattr(self.model, option.name)
-        if self.floor:
-            groups["floor"] = {"name": self.floor.name}
-            groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
-        groups |= {
-            group: vars(options) for group in IMPACT_GROUPS if (options := getattr(self, group))
-        }
-        namelist = f90nml.Namelist()
+        groups: dict[str, dict[str, object]] = {"case": {"name": _plain(KEYS[0], self.name)}}
         model = self.model.name if self.model else ""
-        for group, options in groups.items():
-            is_source = group not in {*FLOORS, "room"}
-            plain = {
-                key: _plain(group, key, value)
-                for key, value in options.items()
-                if value is not None or not is_source or (model, key) not in STANDARD_BALL
-            }
-            namelist[group] = {key: value for key, value in plain.items() if value != []}
+        for key, value in self.entries():
+            group = groups.setdefault(key.group, {})
+            is_source = attribute_of(key) not in {"floor", "room"}
+            if value is None and is_source and (model, key.name) in STANDARD_BALL:
+                continue
+            if (plain := _plain(key, value)) != []:
+                group[key.name] = plain
+        namelist = f90nml.Namelist()  # a dictionary of groups would be sorted
+        namelist.update(groups)
         result: Namelist = namelist
         return result
 
@@ -202,81 +193,46 @@ class Case(Group, Displayed):
 
     @classmethod
     def from_namelist(cls, namelist: Namelist) -> Self:
-        """Return the case in a namelist; missing keys have their default."""
+        """Return the case in a namelist, or other tables of keys by group.
+
+        Missing keys have their default. Raise InputError if a group, a key, or the name of model
+        or floor is not known, or a group is not a table; `check_case` checks the values.
+        """
         content: dict[str, Any] = dict(namelist)
-        groups = {
-            group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
-        }
-        optional: dict[str, Any] = {
-            group: kind(**_with_lists(content[group]))
-            for group, kind in IMPACT_GROUPS.items()
-            if group in content
-        }
-        model = modes = None
-        if "modes" in content:
-            modes = Modes(**content["modes"])
-        if "model" in content or not modes:
-            name = content.get("model", {}).get("name", DEFAULT_MODEL.name)
-            kind = MODELS[name]
-            options = {}
-            for option in fields(kind):
-                entries = content.get(group_of(kind.name, option), {})
-                if option.name in entries:
-                    options[option.name] = entries[option.name]
-            model = new_model(name, _with_lists(options))
-        floor = None
-        if "floor" in content:
-            name = content["floor"].get("name", next(iter(FLOORS)))
-            floor = FLOORS[name](**_with_lists(content.get(name, {})))
+        refuse_unknown("the case", content, _NAMES)
+        for group, keys in content.items():
+            if not isinstance(keys, Mapping):
+                refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")
+            refuse_unknown(f"&{group}", keys, _NAMES[group])
+        kinds: dict[str, type[Group]] = {**GROUPS}
+        kinds |= {group: kind for group, kind in OPTIONAL_GROUPS.items() if group in content}
+        for group, choices in (("model", MODELS), ("floor", FLOORS)):
+            if group in content or (group == "model" and "modes" not in content):
+                name = content.get(group, {}).get("name", next(iter(choices)))
+                require_choice(f"&{group}: name", name, choices)
+                kinds[group] = choices[name]
+        values: dict[str, dict[str, object]] = {group: {} for group in kinds}
+        for key in KEYS:
+            kind = kinds.get(attribute := attribute_of(key))
+            is_used = key.owner in {"", attribute, getattr(kind, "name", "")}
+            if kind and is_used and key.group in content and key.name in content[key.group]:
+                values[attribute][key.name] = content[key.group][key.name]
+        for group in ("model", "floor"):
+            values.get(group, {}).pop("name", None)
+        groups: dict[str, Any] = {group: kind(**values[group]) for group, kind in kinds.items()}
         name = content.get("case", {}).get("name", cls.name)
-        return cls(name=name, model=model, floor=floor, modes=modes, **groups, **optional)
+        return cls(name=name, **{"model": None, **groups})
 
 
-def _resolved(group: GroupType, model: str) -> GroupType:
-    """Return a group with the values of the standard ball by a model where keys are None."""
-    values = {
-        name: STANDARD_BALL[model, name]
-        for name, value in vars(group).items()
-        if value is None and (model, name) in STANDARD_BALL
-    }
-    return replace(group, **values)  # type: ignore[type-var]
-
-
-def tables_case(tables: Mapping[str, Any]) -> Case:
-    """Return the case in tables of keys by group, such as those of JSON or TOML.
-
-    Raise InputError if a group, or the name of model or floor, is not known, or a group is not a
-    table; `check_case` checks the values.
-    """
-    refuse_unknown("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
-    for group, keys in tables.items():
-        if not isinstance(keys, Mapping):
-            refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")
-        known = [key.name for key in KEYS if key.group == group]
-        refuse_unknown(f"&{group}", keys, known or ["name"])
-    for group, choices in (("model", MODELS), ("floor", FLOORS)):
-        if group in tables:
-            require_choice(f"&{group}: name", tables[group].get("name"), list(choices))
-    return Case.from_namelist(tables)
-
-
-def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values of keys as read by `f90nml`; single values of list keys become tuples."""
-    return {
-        key: (tuple(value) if isinstance(value, list) else (value,)) if key in LISTS else value
-        for key, value in values.items()
-    }
-
-
-def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
-    """Return a value converted to a type that f90nml can write."""
+def _plain(key: Key, value: object) -> float | str | list[float | str]:
+    """Return the value of a key converted to a type that f90nml can write."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    if isinstance(value, list | tuple) and key in LISTS:
-        return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
+    if isinstance(value, list | tuple) and key.kind in {"list", "texts"}:
+        return [_plain(key, entry) for entry in value]  # type: ignore[misc]
     is_plain = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
     if not is_plain or (isinstance(value, int) and abs(value) > MAX_NUMBER):
-        refuse_value(f"&{group}: {key}", value, "a number or plain text")
+        refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
     return value  # type: ignore[return-value]
 
 
@@ -312,7 +268,7 @@ def check_case(case: Case) -> None:
 
 def is_portable_name(name: object) -> bool:
     """Whether a value is a name for files that any system can hold, as the library knows them."""
-    if not isinstance(name, str) or not name.isprintable() or name != name.strip():
+    if not isinstance(name, str) or name != name.strip():
         return False
     try:
         check_case(Case(name=name))

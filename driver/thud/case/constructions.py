@@ -33,7 +33,7 @@ from thud.base.checks import (
 from thud.base.display import Displayed
 from thud.base.errors import InputError
 from thud.base.files import inputs_folder, read_toml
-from thud.case.case import Case, check_case, tables_case
+from thud.case.case import Case, check_case
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -392,7 +392,7 @@ def _new_construction(content: Mapping[str, Any]) -> Construction:
         content["floor"]: {key: value for key, (value, _) in keys.items()},
         "room": {key: value for key, (value, _) in room.items()},
     }
-    case = tables_case(groups if room else {**groups, "room": {}})
+    case = Case.from_namelist(groups if room else {**groups, "room": {}})
     check_case(case if room else replace(case, room=None))
     assert case.floor is not None  # noqa: S101 - the tables have a floor
     result = Construction(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from thud.base._schema import GROUPS, KEYS
 from thud.base.checks import refuse, shown, suggestion
 from thud.base.key import Key
+from thud.case.case import attribute_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -87,20 +88,13 @@ def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
     return key, int(match[2]) if match[2] else None
 
 
-def _group_of(key: Key, case: Case) -> str:
-    """Return the name of the group of a case that holds a key."""
-    if case.floor and key.owner == case.floor.name:
-        return "floor"
-    return key.group if key.group in {*GROUPS, "room"} else "model"
-
-
 def with_values(case: Case, values: Mapping[str, object]) -> Case:
     """Return a copy of a case with new values of some keys, named as in `find_key`."""
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
         key, entry = find_key(name, key_owners(case))
-        group = _group_of(key, case)
+        group = attribute_of(key)
         changes = groups.setdefault(group, {})
         if entry is None:
             changes[key.name] = value
@@ -117,7 +111,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 def value_in(case: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None if there is no value or a list."""
     key, entry = find_key(name, key_owners(case))
-    value = getattr(getattr(case.resolved(), _group_of(key, case)), key.name, None)
+    value = getattr(getattr(case.resolved(), attribute_of(key)), key.name, None)
     if isinstance(value, tuple) and entry:
         value = next(iter(value[entry - 1 :]), None)
     return value if isinstance(value, Value) else None
@@ -143,10 +137,6 @@ def humanize(name: str) -> str:
 
 def limits(key: Key, case: Case) -> tuple[float, float]:
     """Return the limits of a key, evaluated with the values of the other keys of a case."""
-    group = getattr(case, _group_of(key, case))
-    return _limit(key.lower, group), _limit(key.upper, group)
-
-
-def _limit(limit: float | str, group: object) -> float:
-    """Return a limit; a text is the key of the group whose value it is."""
-    return float(getattr(group, limit)) if isinstance(limit, str) else limit
+    group = getattr(case, attribute_of(key))
+    low, high = (getattr(group, e) if isinstance(e, str) else e for e in (key.lower, key.upper))
+    return float(low), float(high)

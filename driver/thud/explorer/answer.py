@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse
-from thud.case.case import tables_case
+from thud.case.case import Case
 from thud.case.keys import humanize
 from thud.explorer.criteria import (
     RESULTS,
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
-    from thud.case.case import Case
     from thud.floors.prediction import RoomPrediction
     from thud.impact.floor_impact import FloorImpact
     from thud.impact.impact import Impact
@@ -61,7 +60,7 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
 
     Raise InputError if a value is not allowed, or TypeError or ValueError if its type is wrong.
     """
-    case = tables_case(values)
+    case = Case.from_namelist(values)
     used = case.to_namelist()
     for group in values:
         if group not in used:

@@ -26,7 +26,6 @@ from thud.case.case import (
     is_portable_name,
     new_model,
     read_case,
-    tables_case,
 )
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
 from thud.studies.parameter import Parameter, read_quantity, read_value
@@ -202,7 +201,7 @@ def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
     if not isinstance(path, str | Mapping | None):
         refuse_value("case", path, "the path of a namelist file, or tables of its groups")
     if isinstance(path, Mapping):
-        case = tables_case(path)
+        case = Case.from_namelist(path)
     else:
         case = Case() if path is None else read_case(folder / path)
     if (model := fixed.get("model")) is not None:
