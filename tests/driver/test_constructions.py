@@ -372,10 +372,10 @@ def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
         (
             "thickness = 0.2, density",
             "thickness = 0.3, density",
-            ("concrete 0.3 m", "thickness = 0.2"),
+            ("300 mm concrete", "732 kg/m2", "492 kg/m2"),
         ),
-        ("value = 0.2,", "value = 0.15,", ("concrete 0.2 m", "thickness = 0.15")),
-        ("value = 12,", "value = 45,", ("gypsum board 0.0125 m", "ceiling_mass = 45")),
+        ("value = 0.2,", "value = 0.15,", ("200 mm concrete", "492 kg/m2", "372 kg/m2")),
+        ("value = 12,", "value = 45,", ("12.5 mm gypsum board", "492 kg/m2", "525 kg/m2")),
     ],
 )
 def test_layers_that_contradict_the_keys_are_refused(

@@ -46,7 +46,9 @@ CEILING_KEYS = tuple(
 )
 # Density of layers that the keys need not contain, kg/m3, and tolerance of masses.
 MAX_LIGHT, MASS_TOLERANCE = 250.0, 0.02
+# Entries of a file, the texts first; the others are tables.
 _TEXTS = ("name", "kind", "floor", "note")
+_ENTRIES = (*_TEXTS, "layers", "keys", "room")
 _OPTIONAL = ("note", "room")
 _UNITS = {(key.owner, key.name): key.unit for key in KEYS}
 
@@ -118,27 +120,22 @@ class Construction(Displayed):
         require_kind("source", source, Case | None)
         source = source or Case(room=Room())
         ceiling: dict[str, Any] = {**self.room}
-        result = replace(
-            source,
-            name="_".join(re.findall(r"\w+", self.name)),
-            modes=None,
-            floor=self.floor,
-            room=replace(source.room or Room(), **ceiling),
-        )
+        room = replace(source.room or Room(), **ceiling)
+        name = "_".join(re.findall(r"\w+", self.name))
+        result = replace(source, name=name, modes=None, floor=self.floor, room=room)
         sides = _sides(source)
         if not sides or not isinstance(self.floor, RectangularFloor):
             return result
-        room, (length, width) = result.room, sides
-        if isinstance(self.floor, JoistFloor) and not isinstance(source.floor, JoistFloor):
-            length, width = sorted(sides)
-            if sides[0] > sides[1]:
-                assert room is not None  # noqa: S101 - that of the case above
+        length, width = sides
+        if isinstance(self.floor, JoistFloor):
+            if not isinstance(source.floor, JoistFloor) and length > width:
+                length, width = width, length
                 room = replace(
                     room, length=room.width, width=room.length,
                     corner_x=room.corner_y, corner_y=room.corner_x,
                 )  # fmt: skip
-        if isinstance(self.floor, JoistFloor) and "length" in self.sources:
-            length = self.floor.length
+            if "length" in self.sources:
+                length = self.floor.length
         resized = replace(result, room=room, floor=replace(self.floor, length=length, width=width))
         try:
             check_case(resized)
@@ -150,15 +147,12 @@ class Construction(Displayed):
         """Return header and a row of text for each stated key."""
         rows: list[tuple[str, ...]] = [("key", "value", "unit", "source")]
         for key, source in self.sources.items():
-            owner, value = ("room", self.room[key]) if key in self.room else self._of_floor(key)
+            owner = "room" if key in self.room else self.floor.name
+            value = self.room[key] if key in self.room else getattr(self.floor, key)
             values = value if isinstance(value, tuple) else (value,)
             text = ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in values)
             rows.append((key, text, _UNITS[owner, key], source))
         return rows
-
-    def _of_floor(self, key: str) -> tuple[str, object]:
-        """Return the name of the floor, and the value of its key."""
-        return self.floor.name, getattr(self.floor, key)
 
     def plot(self) -> Figure:
         """Draw the section of the floor with its layers."""
@@ -205,13 +199,10 @@ class Constructions(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and a row of text for each construction."""
-        return [
-            ("construction", "layers from top to bottom", "mass, kg/m2"),
-            *(
-                (entry.name, ", ".join(map(str, entry.layers)), f"{entry.mass_per_area:.0f}")
-                for entry in self.entries
-            ),
-        ]
+        header = ("construction", "layers from top to bottom", "mass, kg/m2")
+        layers = (", ".join(map(str, entry.layers)) for entry in self.entries)
+        masses = (f"{entry.mass_per_area:.0f}" for entry in self.entries)
+        return [header, *zip(self.names, layers, masses, strict=True)]
 
     def __getitem__(self, name: str) -> Construction:
         """Return a construction by its name, in which case and commas do not matter.
@@ -221,27 +212,10 @@ class Constructions(Displayed):
         names = [_words(known) for known in self.names]
         if _words(name) not in names:
             refuse(
-                f"construction = {shown(name)} is not known{self._suggestion(name)}",
+                f"construction = {shown(name)} is not known{suggestion(name, self.names)}",
                 "names that thud-driver floor --list shows, or the path of a TOML file",
             )
         return self.entries[names.index(_words(name))]
-
-    def _suggestion(self, name: object) -> str:
-        """Return the end of a message that suggests names that differ in numbers, the nearest two.
-
-        Without such names it suggests the closest spelling.
-        """
-        words, numbers = _parted(f"{name}")
-        known = {entry: _parted(entry) for entry in self.names}
-        distance = {
-            entry: sum(abs(a - b) for a, b in zip(numbers, others, strict=True))
-            for entry, (texts, others) in known.items()
-            if texts == words and len(others) == len(numbers)
-        }
-        nearest = sorted(sorted(distance, key=lambda entry: distance[entry])[:2])
-        if not nearest:
-            return suggestion(name, self.names)
-        return f" (did you mean {' or '.join(map(repr, nearest))}?)"
 
     def __iter__(self) -> Iterator[Construction]:
         """Iterate over the constructions."""
@@ -276,7 +250,7 @@ def constructions(text: str = "") -> Constructions:
     >>> thud.constructions("screed 200 15").names
     ('concrete 200, screed on 15 MN/m3', 'hollow core 200, screed on 15 MN/m3')
     """
-    return _library().filter(text)
+    return Constructions(_entries()).filter(text)
 
 
 def construction(name: str | os.PathLike[str]) -> Construction:
@@ -300,7 +274,7 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     """
     require_kind("construction", name, str | os.PathLike)
     if isinstance(name, str) and not name.endswith(".toml"):
-        return _library()[name]
+        return Constructions(_entries())[name]
     return read_construction(Path(name))
 
 
@@ -311,19 +285,15 @@ def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> C
     return floor.case(case) if isinstance(floor, Construction) else replace(case, floor=floor)
 
 
-def _library() -> Constructions:
-    """Return all constructions of the inputs, with dictionaries of their own."""
-    return Constructions(
-        tuple(
-            replace(entry, room={**entry.room}, sources={**entry.sources}) for entry in _entries()
-        )
-    )
-
-
 @cache
-def _entries() -> list[Construction]:
+def _read_library() -> list[Construction]:
     files = (inputs_folder() / "constructions").glob("*.toml")
     return sorted(map(read_construction, files), key=lambda entry: (entry.kind, _order(entry.name)))
+
+
+def _entries() -> tuple[Construction, ...]:
+    """Return copies of all constructions of the inputs, with dictionaries of their own."""
+    return tuple(map(replace, _read_library()))
 
 
 def _order(name: str) -> list[tuple[int, str]]:
@@ -340,15 +310,6 @@ def _searched(entry: Construction) -> str:
 def _words(text: str) -> list[str]:
     """Return the words of a text in lower case, without commas."""
     return text.lower().replace(",", " ").split()
-
-
-def _parted(text: str) -> tuple[list[str], list[int]]:
-    """Return the words of a text that are no whole numbers, and the numbers."""
-    words = _words(text)
-    return (
-        [word for word in words if not word.isdecimal()],
-        [int(word) for word in words if word.isdecimal()],
-    )
 
 
 def _sides(case: Case) -> tuple[float, float] | None:
@@ -377,11 +338,10 @@ def read_construction(path: Path) -> Construction:
 
 def _new_construction(content: Mapping[str, Any]) -> Construction:
     """Return the construction in the tables of a file."""
-    tables = ("layers", "keys", "room")
-    refuse_unknown("the construction", content, (*_TEXTS, *tables))
-    for key in (*_TEXTS, *tables):
+    refuse_unknown("the construction", content, _ENTRIES)
+    for key in _ENTRIES:
         if key not in content and key not in _OPTIONAL:
-            refuse(f"{key} is missing", f"{', '.join((*_TEXTS, *tables))}")
+            refuse(f"{key} is missing", ", ".join(_ENTRIES))
     for key in _TEXTS:
         _require_text(key, content.get(key, "none"))
     require_choice("floor", content["floor"], FLOORS)
@@ -416,16 +376,14 @@ def _require_masses(entry: Construction) -> None:
     mass = _mass_of_keys(entry)
     if mass is None:
         return
-    heavy = [layer for layer in entry.layers if layer.density > MAX_LIGHT]
-    least = sum(layer.thickness * layer.density for layer in heavy)
+    least = sum(
+        layer.thickness * layer.density for layer in entry.layers if layer.density > MAX_LIGHT
+    )
     if least * (1 - MASS_TOLERANCE) <= mass <= entry.mass_per_area * (1 + MASS_TOLERANCE):
         return
-    layers = ", ".join(f"{layer.material} {layer.thickness:g} m" for layer in heavy or entry.layers)
-    stated = {key: value for key, value, *_ in entry.rows() if key.endswith(("thickness", "mass"))}
-    keys = ", ".join(f"{key} = {value}" for key, value in stated.items())
     refuse(
-        f"the layers ({layers}) have {entry.mass_per_area:.0f} kg/m2, but the keys ({keys}) "
-        f"{mass:.0f} kg/m2",
+        f"the layers ({', '.join(map(str, entry.layers))}) have {entry.mass_per_area:.0f} kg/m2, "
+        f"but the keys {mass:.0f} kg/m2",
         f"layers and keys of the same mass, but for layers of up to {MAX_LIGHT:g} kg/m3",
     )
 
@@ -462,7 +420,6 @@ def _read_layers(layers: object) -> tuple[Layer, ...]:
     """Return the layers in a list of tables."""
     if not isinstance(layers, list) or not layers:
         refuse_value("layers", layers, "a list of tables with material, thickness and density")
-    result = []
     for number, layer in enumerate(layers, 1):
         if not isinstance(layer, Mapping) or set(layer) != set(Layer._fields):
             refuse_value(f"layer {number}", layer, "a table of material, thickness and density")
@@ -471,8 +428,7 @@ def _read_layers(layers: object) -> tuple[Layer, ...]:
             require_number(f"layer {number}: {key}", layer[key])
             if layer[key] <= 0:
                 refuse_value(f"layer {number}: {key}", layer[key], "positive numbers")
-        result.append(Layer(**layer))
-    return tuple(result)
+    return tuple(Layer(**layer) for layer in layers)
 
 
 def _require_text(name: str, value: object) -> None:
