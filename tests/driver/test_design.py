@@ -12,7 +12,6 @@ from conftest import REPOSITORY, naming
 from matplotlib.collections import LineCollection
 
 import thud
-from thud.level.rating import PredictedRating, Requirement
 from thud.plot.study_figures import _draw_limits
 from thud.plot.style import empty_axes
 
@@ -272,9 +271,9 @@ def test_map_of_a_room_answers_which_floors_meet_its_requirement(tmp_path: Path)
     assert two.plot().legends[0].get_texts()[0].get_text() == "required, 40 dB"
 
 
-@pytest.mark.parametrize(("lowest", "verdict"), [(49.4, "conforms"), (49.5, "does not conform")])
+@pytest.mark.parametrize(("lowest", "count"), [(49.4, 1), (49.5, 0)])
 def test_map_rounds_the_rating_as_the_verdict_does(
-    room_design: thud.Design, lowest: float, verdict: str
+    room_design: thud.Design, lowest: float, count: int
 ) -> None:
     """A floor of 49.4 dB met 49 dB by its verdict, and did not in the map."""
     found = room_design.room_rating
@@ -282,9 +281,7 @@ def test_map_rounds_the_rating_as_the_verdict_does(
     rating = found + lowest - float(found.min()) + 1e-9
     dataset = room_design.dataset.assign(room_rating=rating)
     shifted = replace(room_design, dataset=dataset, required=49.0)
-    met = f"{int(verdict == 'conforms')} of {found.size}"
-    assert dict(shifted.rows())["rating at most 49 dB"] == met
-    assert Requirement(49.0, PredictedRating("octaves", lowest, 0.1, {})).verdict == verdict
+    assert dict(shifted.rows())["rating at most 49 dB"] == f"{count} of {found.size}"
 
 
 def test_design_of_one_parameter_is_a_curve() -> None:

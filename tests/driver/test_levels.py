@@ -68,7 +68,7 @@ def test_threads_share_plans() -> None:
 @pytest.mark.parametrize(
     ("record", "rate", "words"),
     [
-        ([], 44100, naming("force", "samples")),
+        ([], 44100, naming("force", "empty")),
         ([1.0, np.nan], 44100, naming("force", "finite")),
         (PULSE, 0.0, naming("sample_rate", 0.0)),
         (PULSE, -1.0, naming("sample_rate", -1.0)),

@@ -25,7 +25,6 @@ from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.level.assessment import get_criteria
-from thud.level.rating import MET
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
 
@@ -68,7 +67,7 @@ STIFFNESS_STEP = 0.1
 FLOOR_STEPS = 15
 FLOOR_NOTE = (
     "Each layer alone; the level need not fall with each step, as modes of the room move. A "
-    f"requirement is met if its probability is at least {100 * MET:.0f} %."
+    "requirement is met if its probability is at least 84 %."
 )
 # Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
 # over the width of its range.
@@ -133,7 +132,7 @@ def _improve_floor(case: Case) -> Work:
         refuse("&room: required = 0: the room has no requirement", "the required level, dB")
     if required.verdict == VERDICTS[0]:
         return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
-    if not required.conforms:
+    if prediction.source_notes:
         reason = " ".join(map(str, prediction.source_notes))
         none = f"No floor meets the requirement with this source: {reason}. Choose another source."
         return {"changes": [], "none": none, "note": ""}

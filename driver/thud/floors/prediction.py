@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base._schema import RATINGS, Room
+from thud.base._schema import RATINGS, VERDICTS, Room
 from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
@@ -127,7 +127,8 @@ class RoomPrediction(RoomLevel, Displayed):
         """Verdict on the requirement of the room (its key `required`); None without one."""
         if not self.room.required:
             return None
-        return Requirement(self.room.required, self.rating, not self.source_notes)
+        verdict = VERDICTS[-1] if self.source_notes else self.verdict
+        return Requirement(self.room.required, self.rating, self.probability, verdict)
 
     @property
     def sentence(self) -> str:

@@ -67,6 +67,10 @@ class RoomLevel(Immutable):
         Frequency at which three modes of the room overlap, Hz.
     ratings : mapping of str to PredictedRating
         Single-number ratings: ``"octaves"``, ``"thirds"`` and ``"standardized"``.
+    probability : float
+        Probability that the rating is at most the required one; NaN if the room requires none.
+    verdict : str
+        Verdict on this requirement for a source that conforms; empty if the room requires none.
     floor_notes : tuple of Note
         Warnings on conditions in which the model of the floor is not valid.
     """
@@ -89,6 +93,8 @@ class RoomLevel(Immutable):
     n_modal: int
     crossover: float
     ratings: Mapping[RoomRating, PredictedRating]
+    probability: float
+    verdict: str
     floor_notes: tuple[Note, ...]
 
     @property
@@ -130,5 +136,7 @@ def new_room_level(answer: Bundle) -> RoomLevel | None:
             name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
             for name, level in zip(RATINGS, summary["level"], strict=True)
         },
+        probability=summary.get("probability", np.nan),
+        verdict=text(summary.get("verdict", b"")),
         floor_notes=notes(answer.get("room_warnings", {})),
     )

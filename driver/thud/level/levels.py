@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, get_args
 
 import numpy as np
@@ -50,10 +49,15 @@ class Bands(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        columns = vars(self)
-        rows = zip(*columns.values(), strict=True)
-        header = tuple(f"{name}, Hz" for name in columns)
+        rows = zip(*vars(self).values(), strict=True)
+        header = tuple(f"{name}, Hz" for name in vars(self))
         return [header, *(tuple(f"{f:.4g}" for f in row) for row in rows)]
+
+
+_BANDS = {
+    name: Bands(**{column: np.array(values) for column, values in columns.items()})
+    for name, columns in BANDS.items()
+}
 
 
 def get_bands(bands: BandSet = "octave") -> Bands:
@@ -70,13 +74,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
         If `bands` is unknown.
     """
     require_choice("bands", bands, BANDWIDTHS)
-    return _bands(bands)
-
-
-@lru_cache
-def _bands(name: BandSet) -> Bands:
-    """Return the bands of a name."""
-    return Bands(**{column: np.array(values) for column, values in BANDS[name].items()})
+    return _BANDS[bands]
 
 
 def force_exposure_levels(
@@ -116,7 +114,7 @@ def force_exposure_levels(
     """
     require_choice("bands", bands, BANDWIDTHS)
     require_choice("method", method, LEVEL_METHODS)
-    record = _record(force)
+    record = require_real("force", require_array("force", force, dimensions=(1,)))
     rate = to_float("sample_rate", sample_rate)
     answer = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
     return np.asarray(answer["levels"])
@@ -141,19 +139,20 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     Raise InputError if the force is empty, not finite or not one-dimensional, or the rate, Hz, is
     not positive.
     """
-    record = _record(force)
-    if not record.size or not np.isfinite(record).all():
-        reason = "holds a value that is not finite" if record.size else "has no samples"
-        refuse(f"force {reason}", "real numbers, N")
+    record = finite_array("force", force)
     rate = to_float("sample_rate", sample_rate)
     if not 0 < rate < np.inf:
         refuse_value("sample_rate", rate, "sample_rate > 0")
     return int(ask("peak_count", force=record, sample_rate=rate)["peak_count"])
 
 
-def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
-    """Return values as a contiguous array; raise InputError unless real and one-dimensional."""
-    return require_real(name, require_array(name, values, dimensions=(1,)))
+def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return an array of one dimension; raise InputError if it is empty or not finite."""
+    array = require_real(name, require_array(name, values, dimensions=(1,)))
+    if not array.size or not np.isfinite(array).all():
+        problem = "has a value that is not finite" if array.size else "is empty"
+        refuse(f"{name} {problem}", "finite numbers")
+    return array
 
 
 def to_float(name: str, value: object) -> float:

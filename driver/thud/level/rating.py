@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import CLASS_LIMITS, RATED_BANDS, VERDICTS
+from thud.base._schema import CLASS_LIMITS, RATED_BANDS
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_choice
 from thud.base.display import Displayed
-from thud.level.levels import BANDWIDTHS
+from thud.level.levels import BANDWIDTHS, finite_array, to_float
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,12 +21,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet, RoomRating
 
-# Probability from which a requirement is met.
-MET = 0.84
 # Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
-# Names of the Korean classes; the index is the class, 0 for none.
-CLASSES = ("none", *(f"{i}" for i in range(1, len(CLASS_LIMITS) + 1)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,11 +53,10 @@ class Rating(Displayed):
 
     def __repr__(self) -> str:
         """Return rating and class."""
+        level = f"L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f})"
         korean = self.korean_class
-        korea = "" if korean is None else f", {class_name(korean)} (KS F 2863-2)"
-        return (
-            f"<Rating, {self.bands}s: L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f}){korea}>"
-        )
+        class_ = "" if korean is None else f", class {korean or 'none'} (KS F 2863-2)"
+        return f"<Rating, {self.bands}s: {level}{class_}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -101,16 +95,7 @@ class PredictedRating:
     @property
     def rounded(self) -> int:
         """Level as it is stated and compared with limits, dB."""
-        return rounded(self.level)
-
-    def probability(self, limit: float) -> float:
-        """Return the probability that the level, rounded, is at most a limit, dB.
-
-        >>> rating = PredictedRating("thirds", 51.2, 3.0, {})
-        >>> rating, round(rating.probability(49), 2)
-        (51 dB, standard uncertainty 3.0 dB, 0.31)
-        """
-        return NormalDist(self.rounded, self.uncertainty).cdf(excess_level(limit))
+        return math.floor(self.level + 0.5)
 
     def __repr__(self) -> str:
         """Return level and standard uncertainty."""
@@ -127,29 +112,17 @@ class Requirement:
         Maximum rating, rounded, dB.
     rating : PredictedRating
         The rating.
-    conforms : bool
-        Whether the source conforms to the standards.
+    probability : float
+        Probability that the requirement is met.
+    verdict : str
+        ``"conforms"`` if the probability is at least 84 %, ``"does not conform"`` if it is at most
+        16 %, else, or if the source does not conform to the standards, ``"undecided"``.
     """
 
     limit: float
     rating: PredictedRating
-    conforms: bool = True
-
-    @property
-    def probability(self) -> float:
-        """Probability that the requirement is met."""
-        return self.rating.probability(self.limit)
-
-    @property
-    def verdict(self) -> str:
-        """``"conforms"`` from 84 % on, ``"does not conform"`` up to 16 %, else ``"undecided"``.
-
-        That of a source that does not conform is undecided, too.
-        """
-        conforms, fails, undecided = VERDICTS
-        if not self.conforms or 1 - MET < self.probability < MET:
-            return undecided
-        return conforms if self.probability >= MET else fails
+    probability: float
+    verdict: str
 
     @property
     def chance(self) -> str:
@@ -159,11 +132,6 @@ class Requirement:
     def __str__(self) -> str:
         """Return rating, limit and probability."""
         return f"{self.rating}; {self.chance}"
-
-
-def rounded(level: float) -> int:
-    """Return a level as it is stated and compared with limits: rounded, halves upwards."""
-    return math.floor(level + 0.5)
 
 
 def meets(level: ArrayLike, limit: float) -> NDArray[np.bool_]:
@@ -184,11 +152,6 @@ def excess_level(limit: float) -> float:
     return math.floor(limit) + 0.5
 
 
-def class_name(korean_class: int) -> str:
-    """Return a class of KS F 2863-2 in words; 0 is no class."""
-    return f"class {CLASSES[korean_class]}" if korean_class else "no class"
-
-
 def class_of(level: float) -> int:
     """Return the class of a level by KS F 2863-2; 0 is no class.
 
@@ -204,9 +167,9 @@ def class_text(korean_class: int) -> str:
     >>> class_text(4)
     'class 4 (at most 49 dB)'
     """
-    if korean_class:
-        return f"{class_name(korean_class)} (at most {CLASS_LIMITS[korean_class - 1]:g} dB)"
-    return f"{class_name(0)} (class {len(CLASS_LIMITS)}: at most {CLASS_LIMITS[-1]:g} dB)"
+    number = korean_class or len(CLASS_LIMITS)
+    limit = f"at most {CLASS_LIMITS[number - 1]:g} dB"
+    return f"class {number} ({limit})" if korean_class else f"no class (class {number}: {limit})"
 
 
 def rated_bands(bands: BandSet) -> NDArray[np.float64]:
@@ -242,7 +205,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     55
     """
     frequencies = rated_bands(bands)
-    values = _finite("levels", levels)
+    values = finite_array("levels", levels)
     if values.shape != frequencies.shape:
         refuse(
             f"levels have the shape {values.shape}",
@@ -290,7 +253,7 @@ def standardized_level(
         If a value is not finite, a time or the volume is not positive, or the lengths differ.
     """
     values, times = (
-        _finite(name, np.atleast_1d(require_array(name, entries, (0, 1))))
+        finite_array(name, np.atleast_1d(require_array(name, entries, (0, 1))))
         for name, entries in (("level", level), ("reverberation_time", reverberation_time))
     )
     if len(times) == 1:
@@ -306,22 +269,9 @@ def standardized_level(
     return np.asarray(answer["levels"])
 
 
-def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user
+def require_volume(volume: object) -> float:
     """Return a volume, m3; raise InputError if it is not positive and finite."""
-    try:
-        value = float(volume)
-    except (TypeError, ValueError, OverflowError):
-        value = np.nan
+    value = to_float("volume", volume)
     if not 0 < value < np.inf:
         refuse_value("volume", volume, "volume > 0, m3")
     return value
-
-
-def _finite(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return an array of finite numbers; raise InputError if it is empty or not finite."""
-    array = require_real(name, require_array(name, values, dimensions=(1,)))
-    if not array.size or not np.isfinite(array).all():
-        refuse(
-            f"{name} {'has a value that is not finite' if array.size else 'is empty'}", "numbers"
-        )
-    return array

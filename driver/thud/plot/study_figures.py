@@ -19,7 +19,7 @@ from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.level.assessment import octave_limits
 from thud.level.levels import FORCES, get_bands
-from thud.level.rating import CLASSES, excess_level
+from thud.level.rating import excess_level
 from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
@@ -393,7 +393,7 @@ def _rating_limits(result: Design) -> list[tuple[str, float]]:
     if result.rating_name == "octaves":
         limits += [
             (f"class {number}, {limit:g} dB", limit)
-            for number, limit in zip(CLASSES[1:], CLASS_LIMITS, strict=True)
+            for number, limit in enumerate(CLASS_LIMITS, 1)
             if limit != result.required
         ]
     return [(name, excess_level(limit)) for name, limit in limits]
