@@ -10,7 +10,7 @@ from thud.base.checks import refuse, refuse_unknown
 from thud.base.immutable import Plain
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
+    from collections.abc import Collection, Iterable, Iterator
 
 Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
 
@@ -62,7 +62,7 @@ class Group(Plain):
 
     def __new__(cls, *_: object, **keywords: object) -> Self:
         """Raise InputError if a keyword is not a field."""
-        require_keywords(f"{cls.__name__}()", keywords, _names(cls))
+        require_keywords(f"{cls.__name__}()", keywords, [field.name for field in fields(cls)])  # type: ignore[arg-type]
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
@@ -81,28 +81,22 @@ class Group(Plain):
                 refuse(f"{type(self).__name__}: {option.name} is empty", "one number or more")
 
 
-def _names(group: type[Group]) -> list[str]:
-    return [option.name for option in fields(group)]  # type: ignore[arg-type]
-
-
 def _groups(base: type[Group]) -> Iterator[type[Group]]:
     """Return the classes of groups below a base that have no class below them."""
     for group in base.__subclasses__():
-        if group.__subclasses__():
-            yield from _groups(group)
-        else:
-            yield group
+        yield from _groups(group) if group.__subclasses__() else (group,)
 
 
-def require_keywords(label: str, keywords: Collection[str], allowed: Collection[str]) -> None:
+def require_keywords(label: str, keywords: Iterable[str], allowed: Collection[str]) -> None:
     """Raise InputError for an unknown keyword; its message names the classes with that field."""
-    unknown = [word for word in keywords if word not in allowed]
-    keys = {group.__name__: _names(group) for group in _groups(Group)} if unknown else {}
-    for word in unknown:
+    for word in keywords:
+        if word in allowed:
+            continue
+        keys = {group.__name__: [field.name for field in fields(group)] for group in _groups(Group)}  # type: ignore[arg-type]
         if owners := [name for name, names in keys.items() if word in names]:
             refuse(
                 f"{label}: {word!r} is a key of {' and '.join(owners)}",
                 " or ".join(f"{name}({word}=...)" for name in owners),
             )
-    also = [word for name, names in keys.items() for word in (name.lower(), *names)]
-    refuse_unknown(label, unknown, allowed, also)
+        also = [near for name, names in keys.items() for near in (name.lower(), *names)]
+        refuse_unknown(label, [word], allowed, also)

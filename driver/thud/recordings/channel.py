@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
-from thud.base.extras import packages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -135,7 +134,7 @@ def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
     except (ImportError, OSError) as error:  # soundfile raises OSError without its library
         refuse(
             f"{kind} files need the package {name}, which is not installed",
-            f"pip install {' '.join(packages('recordings'))}",
+            "pip install 'thud[recordings]'",
             error,
         )
 
