@@ -21,7 +21,8 @@ from synthetic import half_sine, make_recording
 
 import thud
 from thud import cli
-from thud.recordings.budgets import AMPLITUDE_DECIBEL, average_estimates
+from thud.recordings.assumptions import AMPLITUDE_DECIBEL
+from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config
 from thud.recordings.plate import Plate
 from thud.recordings.signal import Signal

@@ -18,11 +18,11 @@ from synthetic import half_sine, make_drop
 import thud
 from thud import cli
 from thud.base.errors import InputError
-from thud.level.estimate import Estimate
-from thud.recordings.budgets import average_estimates, level_estimates
+from thud.level.estimate import Budget, Estimate
+from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config
 from thud.recordings.load_cells import add_signals, require_channels
-from thud.recordings.recorded_levels import average_levels, measure_levels, noise_exceeds
+from thud.recordings.recorded_levels import average_levels, measure_levels
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -343,15 +343,16 @@ def test_repeatability_is_not_below_the_noise(count: int) -> None:
 
 
 def test_noise_counts_in_bands_where_it_exceeds_the_scatter() -> None:
-    assert noise_exceeds([0.1, 1.0], [0.2, 0.2], 5).tolist() == [
+    budget = Budget.of_mean([0.2, 0.2], {}, [0.1, 1.0], 5)
+    assert budget.counted[budget.names.index("noise")].tolist() == [
         stats.t.ppf(0.975, 4) * 0.1 < 1.96 * 0.2, False,
     ]  # fmt: skip
     (entry,) = measure_levels([make_drop(3.0, seed=1)])
     average = average_levels([entry, entry, entry])
     noise = entry.contributions["noise"] / math.sqrt(3)
-    np.testing.assert_allclose(average.contributions["noise"], noise)
+    np.testing.assert_allclose(average.budget["noise"], noise)
     np.testing.assert_allclose(average.uncertainty, noise)
-    for estimate, expected in zip(level_estimates(average), noise, strict=True):
+    for estimate, expected in zip(average.estimates, noise, strict=True):
         counted = {part.name: part.counted for part in estimate.contributions}
         assert counted["noise"]
         assert not counted["repeatability"]

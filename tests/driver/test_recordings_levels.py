@@ -19,9 +19,9 @@ from synthetic import make_drop
 import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
-from thud.recordings.assumptions import assumed_contributions
+from thud.recordings.assumptions import instrument_contributions
 from thud.recordings.band_noise import band_noise
-from thud.recordings.budgets import average_estimates, find_deviant, level_estimates
+from thud.recordings.budgets import average_estimates, find_deviant
 from thud.recordings.config import Config
 from thud.recordings.contact import cells_between, uniform_bounds
 from thud.recordings.noise import Background
@@ -269,7 +269,7 @@ def test_average_is_that_of_energies() -> None:
     energies = np.array([10 ** (f.level / 10) for f in found])
     np.testing.assert_allclose(average.level, 10 * np.log10(energies.mean(axis=0)), atol=1e-9)
     np.testing.assert_allclose(average.spread, np.std([f.level for f in found], axis=0, ddof=1))
-    error = average.contributions["repeatability"]
+    error = average.budget["repeatability"]
     np.testing.assert_allclose(error, average.spread / math.sqrt(5), rtol=0.05)
     assert average.names == tuple(d.name for d in drops)
     # The scatter holds the noise.
@@ -278,11 +278,7 @@ def test_average_is_that_of_energies() -> None:
     np.testing.assert_allclose(single.level, found[0].level)
     np.testing.assert_allclose(single.uncertainty, found[0].uncertainty)
     assert np.isnan(single.spread).all()
-    assert "repeatability" not in single.contributions
-    with pytest.raises(thud.InputError, match=naming("drops")):
-        average_levels([])
-    with pytest.raises(thud.InputError, match=naming("bands", "method")):
-        average_levels([found[0], *measure_levels(drops, "third")])
+    assert "repeatability" not in single.budget.names
 
 
 def test_drops_that_differ_are_marked_and_kept() -> None:
@@ -313,7 +309,7 @@ def test_grubbs_critical_values_are_the_published_ones() -> None:
         (found,) = find_outliers(values, NAMES, "level")
         assert found.others["critical"] == pytest.approx(critical, abs=1e-3)
         assert found.others["critical"] == pytest.approx(grubbs(count, 0.05))
-        assert found.score == pytest.approx((100 - values.mean()) / values.std(ddof=1))
+        assert found.others["score"] == pytest.approx((100 - values.mean()) / values.std(ddof=1))
         assert (found.subject, found.value) == ("drop 1", 100.0)
 
 
@@ -551,7 +547,7 @@ def level_estimate(level: float, background: float, noise: float, method: float)
     parts = {"noise": np.array([noise]), "method": np.array([method])}
     one = np.array([level])
     return DropLevels(
-        "drop", "octave", "fft", one - 0.01, one, one, np.array([background]), np.array([""]),
+        "drop", "octave", "fft", one - 0.01, one, np.array([background]), np.array([""]),
         parts,
     )  # fmt: skip
 
@@ -567,11 +563,12 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
     estimates = [
         replace(e, **{
             name: np.repeat(getattr(e, name), 5)
-            for name in ("level", "uncertainty", "measured", "background", "flag")
+            for name in ("level", "measured", "background", "flag")
         }, contributions={name: np.repeat(part, 5) for name, part in e.contributions.items()})
         for e in estimates
     ]  # fmt: skip
-    found = average_levels(estimates)
+    calibration = {"calibration": np.full(5, 0.17)}
+    found = average_levels(estimates, calibration)
     energies = 10 ** (np.array(levels) / 10)
     below = np.mean(10 ** (np.array(backgrounds) / 10))
     energy = energies.mean() - below
@@ -580,15 +577,16 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
     np.testing.assert_allclose(found.spread, np.std(levels, ddof=1))
     decibel = 10 / math.log(10)
     repeated = decibel * energies.std(ddof=1) / math.sqrt(3) / energy
-    np.testing.assert_allclose(found.contributions["repeatability"], repeated)
+    np.testing.assert_allclose(found.budget["repeatability"], repeated)
     weights = energies / energies.sum()
     np.testing.assert_allclose(
-        found.contributions["noise"], np.sqrt(((weights * noise) ** 2).sum()), rtol=1e-12
+        found.budget["noise"], np.sqrt(((weights * noise) ** 2).sum()), rtol=1e-12
     )
     # What is wrong with the method is wrong alike.
-    np.testing.assert_allclose(found.contributions["method"], weights @ method)
-    np.testing.assert_allclose(found.uncertainty, math.hypot(repeated, weights @ method))
-    (one, *_) = level_estimates(found, calibration=0.02)
+    np.testing.assert_allclose(found.budget["method"], weights @ method)
+    combined = math.hypot(repeated, weights @ method, 0.17)
+    np.testing.assert_allclose(found.uncertainty, combined)
+    (one, *_) = found.estimates
     freedom = {part.name: (part.freedom, part.counted) for part in one.contributions}
     assert freedom == {
         "repeatability": (2, True), "noise": (math.inf, False), "method": (math.inf, True),
@@ -597,13 +595,13 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
     alone = average_levels(estimates[:1])
     assert np.isnan(alone.spread).all()
     np.testing.assert_allclose(alone.uncertainty, math.hypot(noise[0], method[0]))
-    (one, *_) = level_estimates(alone)
+    (one, *_) = alone.estimates
     assert all(part.counted and part.freedom == math.inf for part in one.contributions)
 
 
 def test_mean_of_estimates_has_its_budget() -> None:
     known = [Estimate(v, u) for v, u in ((1.0, 0.1), (2.0, 0.2), (4.0, 0.2))]
-    found = average_estimates([*known, Estimate.unknown()], Contribution("height", 0.5))
+    found = average_estimates([*known, Estimate.unknown()], {"height": 0.5})
     parts = {part.name: part for part in found.contributions}
     assert found.value == pytest.approx(7 / 3)
     assert parts["repeatability"].uncertainty == pytest.approx(stats.sem([1.0, 2.0, 4.0]))
@@ -618,19 +616,23 @@ def test_mean_of_estimates_has_its_budget() -> None:
     )
 
 
-def test_level_budget_has_calibration_and_plate() -> None:
-    average = average_levels(measure_levels([make_drop(1.0, seed=i) for i in range(3)]))
-    plate = np.full(5, 0.02)
-    levels = level_estimates(average, calibration=0.01, systematic={"plate": plate})
-    names = [c.name for c in levels[0].contributions]
-    assert names == [
-        "repeatability", "noise", "method", "offset step", "calibration", "plate",
-    ]  # fmt: skip
-    calibration = next(c for c in levels[0].contributions if c.name == "calibration")
-    assert calibration.uncertainty == pytest.approx(20 * math.log10(1.01), rel=0.01)
-    for band, level in enumerate(levels):
-        shared = math.hypot(calibration.uncertainty, 0.02)
-        assert level.uncertainty == pytest.approx(math.hypot(average.uncertainty[band], shared))
+def test_average_and_estimates_have_one_budget_with_calibration_and_plate() -> None:
+    drops = tuple(make_drop(1.0, seed=i) for i in range(3))
+    config = Config(plate=Plate(f0=1600.0, Q=20.0, f0_uncertainty=0.01))
+    recording = thud.Recording("three", drops, (), config, calibration_uncertainty=0.01)
+    average = recording.average()
+    assert recording.level_estimates() == average.estimates
+    alone = average_levels(measure_levels(drops))
+    plate = config.resonance.level_uncertainty()  # type: ignore[union-attr]
+    for band, level in enumerate(average.estimates):
+        assert average.uncertainty[band] == level.uncertainty
+        parts = {part.name: part for part in level.contributions}
+        calibration = parts["calibration"]
+        assert (calibration.size, calibration.sensitivity) == (0.01, pytest.approx(8.686, abs=1e-3))
+        assert parts["plate"].uncertainty == pytest.approx(plate[band])
+        shared = [p.uncertainty for name, p in parts.items() if name not in alone.budget.names]
+        expected = math.hypot(alone.uncertainty[band], *shared)
+        assert level.uncertainty == pytest.approx(expected)
         assert level.freedom > 2
 
 
@@ -638,7 +640,7 @@ def test_plate_of_unstated_uncertainty_is_no_line_of_zero() -> None:
     drops = [make_drop(1.0)]
     for uncertainty, stated in ((0.0, False), (0.01, True)):
         config = Config(plate=Plate(f0=1600.0, Q=20.0, f0_uncertainty=uncertainty))
-        assert ("plate" in assumed_contributions(drops, config)) == stated
+        assert ("plate" in instrument_contributions(drops, config, None)[0]) == stated
 
 
 def with_levels(level: Estimate, band: int = 0, **others: Any) -> str:  # noqa: ANN401
@@ -724,7 +726,7 @@ def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
         for _ in range(trials):
             drops = true + rng.normal(scale=scatter, size=5) + rng.normal(scale=calibration)
             quantity = average_estimates(
-                [Estimate(float(d), 0.0) for d in drops], Contribution("calibration", calibration)
+                [Estimate(float(d), 0.0) for d in drops], {"calibration": calibration}
             )
             covered += abs(quantity.value - true) <= quantity.expanded
             words[true].append(_assess_level(quantity))

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from thud.base.note import Note
+from thud.level.estimate import RECTANGULAR, Size
 from thud.level.levels import get_bands, low_pass
 from thud.recordings.plate import TOLERANCE, Plate
 from thud.recordings.recorder_filter import assumed_filter
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
     Gain = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
+# Change of a level per relative change of a force, dB.
+AMPLITUDE_DECIBEL = 20 / math.log(10)
 # Frequency up to which a plate is assumed to be flat if nothing is stated, Hz (ISO 10140-5).
 ASSUMED_FLAT = 1000.0
 # Effect on an octave above which an assumption is a warning, dB.
@@ -48,15 +51,19 @@ ASSUMED_PLATE, ASSUMED_SHARE, ASSUMED_FILTER = ASSUMED = (
 MIN_SHARE = 0.5
 
 
-def assumed_contributions(
-    drops: Sequence[Drop], config: Config, bands: BandSet = "octave"
-) -> dict[str, NDArray[np.float64]]:
-    """Return standard uncertainties due to the instruments by cause, dB, shape (n_band,).
+def instrument_contributions(
+    drops: Sequence[Drop], config: Config, calibration: float | None, bands: BandSet = "octave"
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, Size]]:
+    """Return standard uncertainties of levels due to the instruments, dB, shape (n_band,), by name.
 
+    Also return their sizes. `calibration` is the relative standard uncertainty of the force.
     An instrument that is not stated may change a level by any amount between zero and the given
     size: a rectangular distribution with this half-width.
     """
     contributions = {}
+    if calibration is not None:
+        change = AMPLITUDE_DECIBEL * calibration
+        contributions["calibration"] = np.full(len(get_bands(bands).nominal), change)
     pulses = PulseSpectra(drops)
     plate, stated = config.resonance, config.recorder_filter
     if plate is not None:
@@ -73,15 +80,17 @@ def assumed_contributions(
     }
     for name, gain in assumed.items():
         if gain is not None:
-            contributions[name] = np.abs(pulses.level_change(gain, bands)) / math.sqrt(3)
-    return {name: values for name, values in contributions.items() if values.any()}
+            contributions[name] = np.abs(pulses.level_change(gain, bands)) / RECTANGULAR
+    sizes = {name: Size(divisor=RECTANGULAR) for name in ASSUMED}
+    sizes["calibration"] = Size(math.nan if calibration is None else calibration)
+    return {name: values for name, values in contributions.items() if values.any()}, sizes
 
 
 def check_assumptions(drops: Sequence[Drop], config: Config) -> list[Note]:
     """Return a warning for each assumption on the instruments that matters."""
     plate, limit = config.resonance, _flat_limit(config)
     seen = [drop.plate_recorded for drop in drops]
-    contributions = assumed_contributions(drops, config)
+    contributions, _ = instrument_contributions(drops, config, None)
     rings = any(drop.ringing for drop in drops)
     assumed = {
         "plate_estimated": (ASSUMED_PLATE, plate is None and rings),
@@ -114,7 +123,7 @@ def check_assumptions(drops: Sequence[Drop], config: Config) -> list[Note]:
 
 def _size_note(code: str, uncertainty: NDArray[np.float64] | None, plate: Plate | None) -> Note:
     """Return a note with the largest half-width of a contribution, dB, shape (n_octave,)."""
-    half_widths = np.zeros(1) if uncertainty is None else math.sqrt(3) * uncertainty
+    half_widths = np.zeros(1) if uncertainty is None else RECTANGULAR * uncertainty
     band = int(np.nanargmax(half_widths))
     others = {
         "band": float(get_bands("octave").nominal[band]),

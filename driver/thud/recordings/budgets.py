@@ -4,31 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base.note import Note
-from thud.level.estimate import Contribution, Estimate
+from thud.level.estimate import RECTANGULAR, Budget, Contribution, Estimate, Size
 from thud.level.levels import RECORDED_BAND, peak_count
-from thud.recordings.assumptions import ASSUMED
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
-from thud.recordings.recorded_levels import NOISE, REPEATABILITY, noise_exceeds
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
-    from thud.recordings.recorded_levels import AverageLevels
 
-# Change of a level per relative change of a force, dB.
-AMPLITUDE_DECIBEL = 20 / math.log(10)
-# Uncertainties of levels that a laboratory may not have stated.
-LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
 # Prominence of a counted peak as a fraction of the peak force, and the minimum of this prominence
 # in standard deviations of the noise.
 PROMINENCE = 0.1
@@ -41,79 +32,25 @@ SEARCHED = (
 )
 
 
-def average_estimates(estimates: Sequence[Estimate], *systematic: Contribution) -> Estimate:
-    """Return the mean of one quantity over drops, without unknown values.
+def average_estimates(
+    estimates: Sequence[Estimate],
+    shared: Mapping[str, float] | None = None,
+    sizes: Mapping[str, Size] | None = None,
+) -> Estimate:
+    """Return the mean of one quantity over drops, without unknown values, with its budget.
 
-    The uncertainty of each estimate is its noise, which the repeatability of two or more drops
-    includes; the larger of both counts (`noise_exceeds`). Systematic contributions (calibration,
-    drop height) are shared by all drops; the average does not reduce them.
+    The uncertainty of each estimate is its noise. `shared` are standard uncertainties that all
+    drops share (calibration, drop height), by name, with their `sizes`.
     """
     known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
     if not known:
         return Estimate.unknown()
     count = len(known)
-    values = np.array([estimate.value for estimate in known])
-    noise = float(np.sqrt(np.sum([estimate.uncertainty**2 for estimate in known]))) / count
-    contributions = [Contribution(NOISE, noise)]
-    if count > 1:
-        error = float(values.std(ddof=1)) / math.sqrt(count)
-        exceeds = bool(noise_exceeds(error, noise, count))
-        contributions = [
-            Contribution(
-                REPEATABILITY, error, count - 1, counted=not exceeds, divisor=math.sqrt(count)
-            ),
-            Contribution(NOISE, noise, counted=exceeds),
-        ]
-    return Estimate.from_budget(float(values.mean()), *contributions, *systematic)
-
-
-def level_estimates(
-    levels: AverageLevels,
-    calibration: float | None = None,
-    systematic: Mapping[str, NDArray[np.float64]] | None = None,
-    not_stated: Sequence[str] = (),
-) -> tuple[Estimate, ...]:
-    """Return average levels with their budgets, dB, shape (n_band,).
-
-    `calibration` is the relative standard uncertainty of the force, None if not stated;
-    `systematic` are further standard uncertainties that all drops share, dB, shape (n_band,), by
-    name, and `not_stated` uncertainties of the recording.
-    """
-    lacking = tuple(name for name in not_stated if name in LEVEL_CAUSES)
-    count = len(levels.names)
-    contributions = dict(levels.contributions)
-    rectangular = ("method", "offset step", *ASSUMED)
-    sizes: dict[str, dict[str, Any]] = {name: {"divisor": math.sqrt(3)} for name in rectangular}
-    if count > 1:
-        sizes[REPEATABILITY] = {"divisor": math.sqrt(count)}
-    if calibration is not None:
-        contributions["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
-        sizes["calibration"] = {"size": calibration}
-    contributions |= systematic or {}
-    counted: dict[str, NDArray[np.bool_]] = {}
-    if count > 1:
-        exceeds = noise_exceeds(contributions[REPEATABILITY], contributions[NOISE], count)
-        counted = {REPEATABILITY: ~exceeds, NOISE: exceeds}
-    budgets = (
-        [
-            Contribution(
-                name,
-                float(values[band]),
-                count - 1 if name == REPEATABILITY else math.inf,
-                counted=name not in counted or bool(counted[name][band]),
-                **sizes.get(name, {}),
-            )
-            for name, values in contributions.items()
-        ]
-        for band in range(len(levels.level))
-    )
-    return tuple(
-        replace(
-            Estimate.from_budget(float(level), *budget, upper_bound=bool(flag == "background")),
-            not_stated=lacking,
-        )
-        for level, budget, flag in zip(levels.level, budgets, levels.flag, strict=True)
-    )
+    values = [estimate.value for estimate in known]
+    noise = math.hypot(*(estimate.uncertainty for estimate in known)) / count
+    scatter = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else math.nan
+    budget = Budget.of_mean(noise, shared or {}, scatter, count, sizes)
+    return budget.estimates(np.mean(values))[0]
 
 
 def drop_estimates(
@@ -130,7 +67,7 @@ def drop_estimates(
     times = [drop.contact_time for drop in drops]
     # The flanks of all drops have the same shape: its error does not average out.
     common = min(time.uncertainty for time in times)
-    edges = [Contribution("edges of the pulse", common)] if len(times) > 1 else []
+    edges = {"edges of the pulse": common} if len(times) > 1 else {}
     conditions = config.conditions(calibration)
     mass = _stated(config.mass, config.mass_uncertainty)
     by_impulse = any(IMPULSE in drop.restitutions for drop in drops)
@@ -140,7 +77,7 @@ def drop_estimates(
         "drop_height": ("drop height",),
     }
     estimates = {
-        "contact_time": average_estimates(times, *edges),
+        "contact_time": average_estimates(times, edges),
         "restitution": average_restitution(drops, conditions)[0],
         "peaks": Estimate(float(np.max([_count_peaks(drop) for drop in drops]))),
         "mass": average_mass(drops, conditions) if config.mass is None else mass,
@@ -184,19 +121,16 @@ def average_restitution(
     """
     known = [drop for drop in drops if drop.restitutions]
     causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
-    systematic = [
-        _mean_effect(cause, [drop.shared_effects.get(cause, 0.0) for drop in known], conditions)
+    shared = {
+        cause: _mean_size([drop.shared_effects.get(cause, 0.0) for drop in known])
         for cause in causes
-    ]
+    }
     comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
     difference = _difference(comparable, conditions)
     if abs(difference.value) > difference.expanded:
-        half_width = abs(difference.value)
-        contribution = half_width / math.sqrt(3)
-        systematic.append(
-            Contribution("impulse against bounces", contribution, divisor=math.sqrt(3))
-        )
-    return average_estimates([drop.restitution for drop in known], *systematic), difference
+        shared["impulse against bounces"] = abs(difference.value) / RECTANGULAR
+    restitutions = [drop.restitution for drop in known]
+    return average_estimates(restitutions, shared, conditions.sizes), difference
 
 
 def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
@@ -211,12 +145,12 @@ def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
         )
         for cause, effect in shared[IMPULSE].items():
             effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
-    systematic = [_mean_effect(cause, values, conditions) for cause, values in effects.items()]
-    return average_estimates(differences, *systematic)
+    sizes = {cause: _mean_size(values) for cause, values in effects.items()}
+    return average_estimates(differences, sizes, conditions.sizes)
 
 
-def _mean_effect(cause: str, effects: Sequence[float], conditions: DropConditions) -> Contribution:
-    return Contribution(cause, abs(float(np.mean(effects))), **conditions.sizes.get(cause, {}))
+def _mean_size(effects: Sequence[float]) -> float:
+    return abs(float(np.mean(effects)))
 
 
 def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
@@ -231,19 +165,12 @@ def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     height_effect /= 2 * conditions.height
     impulses = [(drop.impulse.value, drop.contact.quantization_impulse) for drop in known]
     impulse, quantization_impulse = np.mean(impulses, axis=0)
-    systematic = {
+    shared = {
         "calibration": value * conditions.calibration_uncertainty,
         "drop height": height_effect,
         "quantization": value * float(quantization_impulse / impulse),
     }
-    return average_estimates(
-        [drop.effective_mass for drop in known],
-        *(
-            _mean_effect(cause, [effect], conditions)
-            for cause, effect in systematic.items()
-            if effect
-        ),
-    )
+    return average_estimates([drop.effective_mass for drop in known], shared, conditions.sizes)
 
 
 def find_deviant(drops: Sequence[Drop]) -> tuple[Note, ...]:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len
 from scipy.signal import czt
-from scipy.special import stdtrit
 
-from thud.base.checks import refuse, require_choice
+from thud.base.checks import require_choice
 from thud.base.immutable import Immutable
-from thud.level.estimate import NORMAL_FACTOR
+from thud.level.estimate import NOISE, RECTANGULAR, Budget, Size
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels
@@ -21,12 +20,13 @@ from thud.recordings.offset_step import step_errors
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
     from thud.base.note import Note
+    from thud.level.estimate import Estimate
     from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
@@ -38,8 +38,8 @@ ENERGY_DECIBEL = 10 / math.log(10)
 # Length of a mean force in gates, and number of times that it is scaled to its levels: they then
 # differ by less than 0.01 dB.
 PADDING, N_SCALING = 4, 5
-# Contribution that is independent between drops: their scatter includes it.
-NOISE, REPEATABILITY = "noise", "repeatability"
+# Contributions that drops share: half widths of rectangular distributions.
+METHOD, OFFSET_STEP = "method", "offset step"
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,6 @@ class DropLevels(Immutable):
         Name of the drop, ``"octave"`` or ``"third"``, and method of measurement.
     level : ndarray, shape (n_band,)
         Force exposure levels, dB, corrected for the background.
-    uncertainty : ndarray, shape (n_band,)
-        Combined standard uncertainty by `contributions`, dB.
     measured, background : ndarray, shape (n_band,)
         Levels before the correction, and levels of the noise within the same gate, dB.
     flag : ndarray of str, shape (n_band,)
@@ -69,11 +67,16 @@ class DropLevels(Immutable):
     bands: BandSet
     method: str
     level: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
     measured: NDArray[np.float64]
     background: NDArray[np.float64]
     flag: NDArray[np.str_]
     contributions: dict[str, NDArray[np.float64]]
+
+    @property
+    def uncertainty(self) -> NDArray[np.float64]:
+        """Combined standard uncertainty by `contributions`, dB, shape (n_band,)."""
+        squares = [value**2 for value in self.contributions.values()]
+        return np.asarray(np.sqrt(np.sum(squares, axis=0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +93,14 @@ class AverageLevels(Immutable):
         Level of each drop, dB.
     level, background : ndarray, shape (n_band,)
         Level of the mean energy, corrected for the background, and the mean background, dB.
-    uncertainty : ndarray, shape (n_band,)
-        Combined standard uncertainty, dB.
     flag : ndarray of str, shape (n_band,)
         As in `DropLevels`, from the mean energies.
     spread : ndarray, shape (n_band,)
         Standard deviation of the drops' levels, dB; NaN for a single drop.
-    contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties of the average, dB. The repeatability, with ``n_drop - 1`` degrees of
-        freedom, includes the noise, which is independent between drops; `noise_exceeds` tells
-        which of the two counts.
+    budget : Budget
+        Contributions to the uncertainty of the average, dB.
+    estimates : tuple of Estimate, shape (n_band,)
+        The levels with this budget.
     outliers : tuple of Note
         Drops that differ from the others.
     """
@@ -110,11 +111,16 @@ class AverageLevels(Immutable):
     drops: NDArray[np.float64]
     level: NDArray[np.float64]
     background: NDArray[np.float64]
-    uncertainty: NDArray[np.float64]
     flag: NDArray[np.str_]
     spread: NDArray[np.float64]
-    contributions: dict[str, NDArray[np.float64]]
-    outliers: tuple[Note, ...] = field(default=())
+    budget: Budget
+    estimates: tuple[Estimate, ...]
+    outliers: tuple[Note, ...]
+
+    @property
+    def uncertainty(self) -> NDArray[np.float64]:
+        """Combined standard uncertainty of `estimates`, dB, shape (n_band,)."""
+        return np.array([estimate.uncertainty for estimate in self.estimates])
 
 
 def measure_levels(
@@ -145,16 +151,13 @@ def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.floa
         background = 10 * np.log10(expected)
     level, flag = _corrected(measured, background)
     contributions = {
-        "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
-        "method": np.abs(measured - exact) / math.sqrt(3),
-        "offset step": _step_uncertainty(drop, bands),
+        NOISE: ENERGY_DECIBEL * deviation / 10 ** (level / 10),
+        METHOD: np.abs(measured - exact) / RECTANGULAR,
+        OFFSET_STEP: _step_uncertainty(drop, bands),
     }
     if offset.any():
         contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
-    return DropLevels(
-        drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
-        contributions,
-    )  # fmt: skip
+    return DropLevels(drop.name, bands, method, level, measured, background, flag, contributions)
 
 
 def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
@@ -167,7 +170,7 @@ def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
         _levels(force + error, drop.sample_rate, bands, "exact")
         for error in step_errors(drop.offset_step, len(force))
     ]
-    return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / math.sqrt(3))
+    return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / RECTANGULAR)
 
 
 def compare_methods(drop: Drop, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
@@ -176,48 +179,44 @@ def compare_methods(drop: Drop, bands: BandSet = "octave") -> dict[str, NDArray[
     return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
 
 
-def average_levels(estimates: Sequence[DropLevels]) -> AverageLevels:
-    """Return the energy average of the levels of drops, their spread and their outliers.
+def average_levels(
+    levels: Sequence[DropLevels],
+    shared: Mapping[str, NDArray[np.float64]] | None = None,
+    sizes: Mapping[str, Size] | None = None,
+    not_stated: Sequence[str] = (),
+) -> AverageLevels:
+    """Return the energy average of the levels of drops, its budget, and outliers.
 
-    Raise InputError if there are no drops, or their bands or methods differ.
+    `shared` are standard uncertainties that all drops share, dB, shape (n_band,), by name, with
+    their `sizes`; `not_stated` are uncertainties that are not stated.
     """
-    if len({(e.bands, e.method) for e in estimates}) != 1:
-        refuse(
-            "the drops differ in bands or method, or there are none",
-            "levels in the same bands by the same method",
-        )
-    first, count = estimates[0], len(estimates)
-    drops = np.array([e.level for e in estimates])
-    energies = np.array([10 ** (e.measured / 10) for e in estimates])
+    first, count = levels[0], len(levels)
+    drops = np.array([entry.level for entry in levels])
+    energies = np.array([10 ** (entry.measured / 10) for entry in levels])
     with np.errstate(divide="ignore"):
-        background = 10 * np.log10(np.mean([10 ** (e.background / 10) for e in estimates], axis=0))
+        noise = np.mean([10 ** (entry.background / 10) for entry in levels], axis=0)
+        background = 10 * np.log10(noise)
     level, flag = _corrected(10 * np.log10(energies.mean(axis=0)), background)
-    unknown = np.full(level.shape, np.nan)
     weights = 10 ** (drops / 10)
     weights /= weights.sum(axis=0)
-    contributions = {}
     none = np.zeros(len(level))
-    for name in dict.fromkeys(name for e in estimates for name in e.contributions):
-        weighted = weights * np.array([e.contributions.get(name, none) for e in estimates])
-        contributions[name] = (
-            np.sqrt((weighted**2).sum(axis=0)) if name == NOISE else weighted.sum(axis=0)
-        )
-    if count > 1:
-        error = energies.std(axis=0, ddof=1) / math.sqrt(count)
-        error *= ENERGY_DECIBEL / 10 ** (level / 10)
-        contributions = {REPEATABILITY: error, **contributions}
-        exceeds = noise_exceeds(error, contributions[NOISE], count)
-        counted = {
-            **contributions,
-            REPEATABILITY: np.where(exceeds, 0.0, error),
-            NOISE: np.where(exceeds, contributions[NOISE], 0.0),
-        }
-    else:
-        counted = contributions
+    weighted = {
+        name: weights * [entry.contributions.get(name, none) for entry in levels]
+        for name in dict.fromkeys(name for entry in levels for name in entry.contributions)
+    }
+    single = np.full(level.shape, np.nan)
+    scatter = energies.std(axis=0, ddof=1) / math.sqrt(count) if count > 1 else single
+    budget = Budget.of_mean(
+        np.sqrt((weighted.pop(NOISE) ** 2).sum(axis=0)),
+        {name: values.sum(axis=0) for name, values in weighted.items()} | dict(shared or {}),
+        scatter * ENERGY_DECIBEL / 10 ** (level / 10),
+        count,
+        {name: Size(divisor=RECTANGULAR) for name in (METHOD, OFFSET_STEP)} | dict(sizes or {}),
+    )
     return AverageLevels(
-        first.bands, first.method, tuple(e.name for e in estimates), drops, level, background,
-        _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown,
-        contributions, _level_outliers(estimates, drops),
+        first.bands, first.method, tuple(entry.name for entry in levels), drops, level, background,
+        flag, drops.std(axis=0, ddof=1) if count > 1 else single, budget,
+        budget.estimates(level, flag == "background", not_stated), _level_outliers(levels, drops),
     )  # fmt: skip
 
 
@@ -247,17 +246,6 @@ def mean_force(drops: Sequence[Drop], level: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(np.fft.irfft(spectrum, count))
 
 
-def noise_exceeds(scatter: ArrayLike, noise: ArrayLike, count: int) -> NDArray[np.bool_]:
-    """Whether the expanded uncertainty of a mean by noise exceeds that by scatter.
-
-    Both are standard uncertainties of the mean over a number of drops, above 1; the scatter has one
-    degree of freedom less. The scatter includes the noise, but may be small by chance.
-    """
-    return np.asarray(
-        NORMAL_FACTOR * np.asarray(noise) > stdtrit(count - 1, 0.975) * np.asarray(scatter)
-    )
-
-
 def _levels(
     force: NDArray[np.float64], rate: float, bands: BandSet, method: str
 ) -> NDArray[np.float64]:
@@ -282,17 +270,13 @@ def _corrected(
     return level, np.where(np.isnan(measured), "rate", flag)
 
 
-def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-    return np.asarray(np.sqrt(np.sum([value**2 for value in contributions.values()], axis=0)))
-
-
 def _level_outliers(
     estimates: Sequence[DropLevels], drops: NDArray[np.float64]
 ) -> tuple[Note, ...]:
     """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
     nominal = get_bands(estimates[0].bands).nominal
     names = [e.name for e in estimates]
-    noise = np.array([e.contributions["noise"] for e in estimates])
+    noise = np.array([e.contributions[NOISE] for e in estimates])
     return tuple(
         outlier
         for band, middle in enumerate(nominal)

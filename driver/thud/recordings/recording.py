@@ -17,8 +17,8 @@ from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
 from thud.level.impact_result import DropForce
-from thud.recordings.assumptions import assumed_contributions, check_assumptions
-from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant, level_estimates
+from thud.recordings.assumptions import check_assumptions, instrument_contributions
+from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
 from thud.recordings.measure_drops import measure_signals
 from thud.recordings.measured_drop import ESTIMATES
@@ -45,6 +45,9 @@ if TYPE_CHECKING:
     from thud.recordings.measure_drops import Origin
     from thud.recordings.measured_drop import Drop
     from thud.recordings.recorded_levels import AverageLevels
+
+# Uncertainties of levels that a laboratory may not have stated.
+LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +77,6 @@ class Recording(Displayed):
     config: Config = field(default_factory=Config)
     calibration_uncertainty: float | None = None
     _averages: dict[tuple[str, str], AverageLevels] = field(
-        default_factory=dict, init=False, repr=False
-    )
-    _level_estimates: dict[str, tuple[Estimate, ...]] = field(
         default_factory=dict, init=False, repr=False
     )
 
@@ -299,10 +299,17 @@ class Recording(Displayed):
         return self.peak_force
 
     def average(self, bands: BandSet = "octave", method: str = "exact") -> AverageLevels:
-        """Return the energy average of the levels by ``"exact"``, ``"fft"`` or ``"filter"``."""
+        """Return the energy average of the levels by ``"exact"``, ``"fft"`` or ``"filter"``.
+
+        Its budget includes calibration and instruments.
+        """
         if (bands, method) not in self._averages:
             levels = measure_levels(self.drops, bands, method)
-            self._averages[bands, method] = average_levels(levels)
+            shared, sizes = instrument_contributions(
+                self.drops, self.config, self.calibration_uncertainty, bands
+            )
+            lacking = [name for name in self.not_stated if name in LEVEL_CAUSES]
+            self._averages[bands, method] = average_levels(levels, shared, sizes, lacking)
         return self._averages[bands, method]
 
     def levels(
@@ -339,14 +346,7 @@ class Recording(Displayed):
 
     def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
         """Return the average levels with their uncertainty budgets, dB, shape (n_band,)."""
-        if bands not in self._level_estimates:
-            self._level_estimates[bands] = level_estimates(
-                self.average(bands),
-                self.calibration_uncertainty,
-                assumed_contributions(self.drops, self.config, bands),
-                self.not_stated,
-            )
-        return self._level_estimates[bands]
+        return self.average(bands).estimates
 
     def assess(
         self,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from thud.base._schema import Drop
 from thud.base.note import Note
-from thud.level.estimate import Estimate
+from thud.level.estimate import RECTANGULAR, Estimate, Size
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,17 +47,15 @@ class DropConditions:
         return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
 
     @property
-    def sizes(self) -> dict[str, dict[str, Any]]:
-        """Size, unit and divisor of a `Contribution` by the cause of a shared effect.
-
-        They are standard uncertainties, or half widths of rectangular distributions.
-        """
+    def sizes(self) -> dict[str, Size]:
+        """Standard uncertainties, or half widths of rectangular distributions, by contribution."""
         return {
-            "calibration": {"size": self.calibration_uncertainty},
-            "mass": {"size": self.mass_uncertainty, "unit": "kg"},
-            "drop height": {"size": self.height_uncertainty, "unit": "m"},
-            "slow release": {"size": SLOW_RELEASE, "unit": "s", "divisor": math.sqrt(3)},
-            "deformed ball": {"size": DEFORMATION, "unit": "m", "divisor": math.sqrt(3)},
+            "calibration": Size(self.calibration_uncertainty),
+            "mass": Size(self.mass_uncertainty, "kg"),
+            "drop height": Size(self.height_uncertainty, "m"),
+            "slow release": Size(SLOW_RELEASE, "s", RECTANGULAR),
+            "deformed ball": Size(DEFORMATION, "m", RECTANGULAR),
+            "impulse against bounces": Size(divisor=RECTANGULAR),
         }
 
     def restitutions(
@@ -103,7 +101,7 @@ class DropConditions:
                 "calibration": ratio * self.calibration_uncertainty,
                 "mass": -ratio * self.mass_uncertainty / (self.mass or math.nan),
                 "drop height": -(1 + methods[IMPULSE].value) * relative_speed_uncertainty,
-                "slow release": GRAVITY * SLOW_RELEASE / self.speed / math.sqrt(3),
+                "slow release": GRAVITY * SLOW_RELEASE / self.speed / RECTANGULAR,
                 "quantization": ratio * quantization_impulse / impulse.value,
             }
         if BOUNCES in methods:
@@ -112,7 +110,7 @@ class DropConditions:
             lift = GRAVITY * DEFORMATION / (2 * value * self.speed**2)
             effects[BOUNCES] = {
                 "drop height": -value * relative_speed_uncertainty,
-                "deformed ball": lift / math.sqrt(3),
+                "deformed ball": lift / RECTANGULAR,
             }
         return effects
 

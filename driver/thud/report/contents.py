@@ -10,11 +10,10 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.level.assessment import get_criteria
-from thud.level.estimate import CONFIDENCE
+from thud.level.estimate import CONFIDENCE, NOISE, REPEATABILITY
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.config import Instrument
 from thud.recordings.measured_drop import ESTIMATES
-from thud.recordings.recorded_levels import NOISE, REPEATABILITY
 from thud.recordings.times import read_date
 from thud.report.notes import processing, warnings
 from thud.report.rows import SCATTER
@@ -227,14 +226,14 @@ def _without_outliers(recording: Recording) -> dict[str, Any] | None:
 
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
-    average, budgets = recording.average(bands), recording.level_estimates(bands)
+    average = recording.average(bands)
     columns = ("background", "spread", "flag", "drops")
     return {
         "band": get_bands(bands).nominal.tolist(),
         "method": average.method,
-        "level": [estimate.value for estimate in budgets],
-        "uncertainty": [estimate.uncertainty for estimate in budgets],
-        "expanded_uncertainty": [estimate.expanded for estimate in budgets],
+        "level": average.level.tolist(),
+        "uncertainty": average.uncertainty.tolist(),
+        "expanded_uncertainty": [estimate.expanded for estimate in average.estimates],
         **{name: getattr(average, name).tolist() for name in columns},
     }
 

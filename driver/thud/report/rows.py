@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.level.assessment import criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR
-from thud.recordings.budgets import AMPLITUDE_DECIBEL
+from thud.recordings.assumptions import AMPLITUDE_DECIBEL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
