@@ -25,9 +25,9 @@ module thud_registry
    character(len=24), parameter :: model_names(*) = [character(len=24) :: 'modal_ball', 'finite_element', &
       'hollow_sphere', 'measured_modes', 'hunt_crossley', 'two_mass']
 
-   !> Modulus of elasticity of the standard ball in each of them, Pa; 0 for models that do not use the wall: [n_model].
+   !> Modulus of elasticity of the standard ball in each of them, Pa; 0 for the others, which do not use the wall: [n_model].
    real(wp), parameter :: standard_moduli(size(model_names)) = [modal_ball_modulus, finite_element_modulus, &
-      hollow_sphere_modulus, 0.0_wp, 0.0_wp, 0.0_wp]
+      hollow_sphere_modulus, spread(0.0_wp, 1, size(model_names) - 3)]
 
    !> Names of the floors and of their namelist groups; the first, the default, is rigid.
    character(len=24), parameter :: floor_names(*) = [character(len=24) :: 'rigid', 'infinite_plate', 'oscillator', &

@@ -22,7 +22,7 @@ module thud_validity_limit
       !> Value of the quantity, and range in which the theory holds.
       real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
       !> Reason for the limit, as the end of a message.
-      character(len=96) :: reason = ''
+      character(len=128) :: reason = ''
       !> What holds inside the range.
       character(len=16) :: subject = 'the theory holds'
       !> Key that is the quantity; blank if it is none.

@@ -351,7 +351,7 @@ contains
             error_quantity = get_quantity(trim(name)//'_error')
             quantity = error_quantity
             if (i > octave_count) quantity = get_quantity(name)
-            if (i <= octave_count) quantity%title = get_level_title(octaves(i))
+            if (i <= octave_count) quantity%title = get_level_title(octaves(min(i, octave_count)))
             line = quantity_row(quantity, finer)
             change = (finer - values(i))*quantity%display_scale
             stated = errors(i)*quantity%display_scale
