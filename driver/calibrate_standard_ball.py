@@ -104,7 +104,7 @@ def residuals(model: str, sets: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
     """
     drops = solve(model, sets)
     columns = [
-        *((drops.levels["floor", "octave"] - NOMINAL) / TOLERANCE).T,
+        *((drops.floor_octave - NOMINAL) / TOLERANCE).T,
         (drops.contact_time - CONTACT_TIME[0]) / CONTACT_TIME[1],
         (drops.restitution - RESTITUTION[0]) / RESTITUTION[1],
     ]
@@ -161,7 +161,7 @@ def round_point(model: str, point: Mapping[str, float]) -> tuple[dict[str, float
 
 def accept(drops: thud.Ensemble) -> NDArray[np.bool_]:
     """Return whether each drop is one of a standard ball; False for drops that failed."""
-    levels = drops.levels["floor", "octave"]
+    levels = drops.floor_octave
     return (
         ((levels >= LOWER) & (levels <= UPPER)).all(axis=1)
         & (np.abs(drops.contact_time - CONTACT_TIME[0]) <= CONTACT_TIME[1])

@@ -232,7 +232,7 @@ def stream(count: int, path: Path, chunk: int = 50_000) -> None:
                 found.contact_time,
                 found.peak_elastic_force,
                 found.restitution,
-                *found.elastic_octaves.T,
+                *found.elastic_octave.T,
             ]
             np.column_stack(rows).tofile(file)
     print(time.perf_counter() - start, peak_memory())

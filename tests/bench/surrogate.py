@@ -35,7 +35,7 @@ def main() -> None:
     direct = thud.solve_many(columns, trained.case, progress=True)
     found = trained.predict(trained.case, columns)
     errors = np.column_stack([
-        found["floor_level"] - direct.floor_octaves,
+        found["floor_octave"] - direct.floor_octave,
         *(20 * np.log10(found[n] / getattr(direct, n)) for n in ("contact_time", "restitution")),
     ])  # fmt: skip
     print("levels, contact time, restitution; 95 % of drops within, dB:")

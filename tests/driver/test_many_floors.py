@@ -37,17 +37,17 @@ def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelOpti
     for i, thickness in enumerate(THICKNESSES):
         floor = thud.Plate(thickness=thickness)
         found = thud.predict_level(blocked, floor, thud.Room())
-        assert many.room_level is not None
+        assert many.room_third is not None
         assert many.room_rating is not None
         assert many.floor_work is not None
-        assert many.room_level[i] == pytest.approx(found.level, abs=1e-9)
+        assert many.room_third[i] == pytest.approx(found.level, abs=1e-9)
         assert many.room_rating[i] == pytest.approx(found.rating.level, abs=1e-9)
         moved = thud.solve(model=model, floor=floor).on_floor
         assert moved is not None
         assert many.floor_work[i] == pytest.approx(moved.floor_work, rel=1e-12)
         for bands in ("octave", "third"):
             levels = moved.levels(bands, force="floor")
-            assert many.contact_levels[bands][i] == pytest.approx(levels, abs=1e-9)
+            assert getattr(many, f"contact_{bands}")[i] == pytest.approx(levels, abs=1e-9)
         assert many.peak_force[i] == pytest.approx(blocked.peak_force)
 
 
@@ -56,8 +56,8 @@ def test_each_air_has_the_numbers_of_a_single_prediction() -> None:
         thickness=0.03, density=500.0, wave_speed=2500.0, subceiling_thickness=0.0125
     )
     many = thud.solve_many({"air_density": [0.5, 2.0]}, replace(CASE, floor=floor))
-    assert many.room_level is not None
-    for level, density in zip(many.room_level, [0.5, 2.0], strict=True):
+    assert many.room_third is not None
+    for level, density in zip(many.room_third, [0.5, 2.0], strict=True):
         found = thud.predict_level(floor=floor, room=thud.Room(air_density=density))
         assert level == pytest.approx(found.level, abs=1e-9)
 
@@ -67,9 +67,9 @@ def test_blocked_drop_is_kept_only_while_it_is_the_same(many: thud.Ensemble) -> 
     order = [3, 0, 2, 1]
     parameters = {name: values[order] for name, values in many.parameters.items()}
     again = thud.solve_many(parameters, CASE, threads=1)
-    assert again.room_level is not None
-    assert many.room_level is not None
-    assert np.array_equal(again.room_level, many.room_level[order])
+    assert again.room_third is not None
+    assert many.room_third is not None
+    assert np.array_equal(again.room_third, many.room_third[order])
     assert np.array_equal(again.peak_force, many.peak_force[order])
     alone = thud.solve_many({"height": [1.0]}, CASE, threads=1)
     assert alone.peak_force[0] == again.peak_force[0]
@@ -81,9 +81,9 @@ def test_failed_floors_have_a_reason_and_no_numbers() -> None:
     found = thud.solve_many({"thickness": [0.1, -1.0]}, CASE)
     assert found.status.tolist() == [0, 1]
     assert re.search(naming("&plate: thickness", "-1.0"), found.reason[1])
-    assert found.room_level is not None
-    assert np.isnan(found.room_level[1]).all()
-    assert np.isfinite(found.room_level[0]).all()
+    assert found.room_third is not None
+    assert np.isnan(found.room_third[1]).all()
+    assert np.isfinite(found.room_third[0]).all()
 
 
 def test_keys_of_one_name_are_told_apart_by_their_group() -> None:
@@ -113,7 +113,7 @@ def test_table_of_floors_has_the_same_numbers(
     assert found.floor_work is not None
     assert float(first["room_rating_dB"]) == found.room_rating[0]
     assert float(first["floor_work_J"]) == found.floor_work[0]
-    assert float(first["contact_octave_63_Hz_dB"]) == found.contact_levels["octave"][0, 1]
+    assert float(first["contact_octave_63_Hz_dB"]) == found.contact_octave[0, 1]
     assert second["room_rating_dB"] == ""
     assert "thickness" in second["reason"]
 
@@ -131,14 +131,14 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     assert (rating.values[:, 0] > rating.values[:, 1]).all()
     assert ("lowest rating, dB", f"{float(rating.min()):.2f}") in found.rows()
     thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
-    assert found.dataset["room_level"].dims[-1] == "room_third"
+    assert found.dataset["room_third"].dims[-1] == "rated_third"
     draws = {"kind": "random", "size": 4}
     parameters = {"reverberation_time(1)": {"low": 0.4, "high": 0.6}}
     spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
     assert any(row[0] == "rating of the room" for row in spread.rows())
     dataset = many.to_xarray()
-    assert dataset["room_level"].shape == (4, 12)
-    assert dataset["contact_third_level"].shape == (4, 15)
+    assert dataset["room_third"].shape == (4, 12)
+    assert dataset["contact_third"].shape == (4, 15)
 
 
 def test_surrogates_refuse_floors(tmp_path: Path) -> None:

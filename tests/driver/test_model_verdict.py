@@ -98,7 +98,7 @@ def test_drops_are_those_of_the_sets(monkeypatch: pytest.MonkeyPatch) -> None:
     sets["youngs_modulus"] = 1.1 * sets["youngs_modulus"]
     drops = thud.solve_many(sets)
     assert verdict.counts == (drops.conforms.sum(), 32)
-    level = drops.floor_octaves[:, 4]
+    level = drops.floor_octave[:, 4]
     criterion = verdict.criteria[4]
     assert criterion.range == (level.min(), level.max())
     inside = (level >= criterion.lower) & (level <= criterion.upper)

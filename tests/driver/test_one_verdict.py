@@ -55,7 +55,7 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     near = BATCH if isinstance(case.model, thud.HollowSphere) else 0.0
     assert swept[peak].item() == pytest.approx(impact.peak(), rel=near, abs=0)
     np.testing.assert_allclose(
-        swept[f"{case.levels.force}_level"].values.ravel(), levels, rtol=0, atol=1e3 * near
+        swept[f"{case.levels.force}_octave"].values.ravel(), levels, rtol=0, atol=1e3 * near
     )
     meets_all = all(c.lower <= c.value <= c.upper for c in conformity.criteria)
     assert swept["conforms"].item() == meets_all

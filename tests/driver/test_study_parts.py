@@ -15,7 +15,6 @@ from scipy.stats import norm
 
 import thud
 from thud.base._schema import KEYS
-from thud.impact.quantities import ROOM_RATING
 from thud.studies import sampling
 from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
@@ -315,7 +314,7 @@ def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
     levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
     # A set without result has no rating.
     rating = draw.normal(50, 20, 201)
-    rated = xr.Dataset({ROOM_RATING: ("sample", rating), "status": ("sample", [0] * 200 + [1])})
+    rated = xr.Dataset({"room_rating": ("sample", rating), "status": ("sample", [0] * 200 + [1])})
 
     def spread(level: np.ndarray) -> tuple[str, ...]:
         ordered = np.sort(level)
@@ -391,11 +390,11 @@ MISFIT: dict[str, Any] = {
 class _Answers:
     """A surrogate of the force on the floor."""
 
-    outputs = {"floor_level": 5, "contact_time": 1, "restitution": 1}  # noqa: RUF012
+    outputs = {"floor_octave": 5, "contact_time": 1, "restitution": 1}  # noqa: RUF012
 
 
 def test_surrogates_without_the_force_are_refused() -> None:
-    with pytest.raises(thud.InputError, match="elastic_level"):
+    with pytest.raises(thud.InputError, match="elastic_octave"):
         SurrogateLevels(
             SimpleNamespace(**{**MISFIT, "kind": "elastic"}),  # type: ignore[arg-type]
             _Answers(), thud.Case(),  # type: ignore[arg-type]
@@ -426,7 +425,7 @@ def test_search_stays_within_the_region(
 
 def answering() -> Surrogate:
     """Return a surrogate whose weights are 0: it answers the means."""
-    names = {"floor_level": 5, "elastic_level": 5, "contact_time": 1, "restitution": 1}
+    names = {"floor_octave": 5, "elastic_octave": 5, "contact_time": 1, "restitution": 1}
     mean = np.array(
         [39.0, 31, 23, 17, 12.5, 1, 2, 3, 4, 5, 20 * np.log10(0.02), 20 * np.log10(0.8)]
     )
@@ -447,7 +446,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     found = surrogate.predict(case, {"height": height, "mass": 2.5})
     assert found["status"].tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
     good = found["status"] == 0
-    assert found["floor_level"][good] == pytest.approx(np.tile(surrogate.mean[:5], (6, 1)))
+    assert found["floor_octave"][good] == pytest.approx(np.tile(surrogate.mean[:5], (6, 1)))
     assert found["contact_time"][good] == pytest.approx(0.02)
     assert found["restitution"][good] == pytest.approx(0.8)
     assert found["conforms"].tolist() == [True] + [False] * 7
@@ -460,7 +459,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     ]
     place = next(n for n, share in enumerate(below) if share >= 0.95)
     assert surrogate.errors.tolist() == sizes[place].tolist()
-    assert surrogate.error_of("elastic_level").tolist() == sizes[place][5:10].tolist()
+    assert surrogate.error_of("elastic_octave").tolist() == sizes[place][5:10].tolist()
     assert surrogate.mean_square("contact_time") == pytest.approx(
         (surrogate.residuals[:, 10] ** 2).mean()
     )
@@ -488,7 +487,7 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
     [
         {"bound": 0.0}, {"bound": -0.1}, {"peaks": 1.5}, {"identity": {}}, {"length": np.zeros(2)},
         {"region": np.array([[1.1, 0.9], [2.0, 3.0]])}, {"length": np.ones(3)},
-        {"case": thud.Case(model=None)}, {"outputs": {"elastic_level": 5, "peak_force": 7}},
+        {"case": thud.Case(model=None)}, {"outputs": {"elastic_octave": 5, "peak_force": 7}},
         *({name: np.full(shape, np.nan)} for name, shape in (
             ("points", (64, 2)), ("length", 2), ("weights", (64, 12)), ("mean", 12),
             ("residuals", (64, 12)))),

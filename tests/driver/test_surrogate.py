@@ -69,8 +69,8 @@ def test_held_out_drops_lie_within_the_stated_error(
     trained: thud.Surrogate, direct: thud.Uncertainty
 ) -> None:
     answered = thud.uncertainty(TOLERANCES, surrogate=trained).dataset
-    found = np.abs(answered["floor_level"] - direct.dataset["floor_level"]).values
-    outside = (found > trained.error_of("floor_level")).sum(axis=0)
+    found = np.abs(answered["floor_octave"] - direct.dataset["floor_octave"]).values
+    outside = (found > trained.error_of("floor_octave")).sum(axis=0)
     # 5 % of the drops may lie outside; as many as this by chance once in 1000 times.
     assert (outside <= binom.ppf(0.999, len(found), 0.05)).all()
     for name in ("contact_time", "restitution"):
@@ -101,7 +101,7 @@ def test_probability_lies_in_the_range_that_is_stated(
 def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -> None:
     known = direct.dataset
     values = (
-        known["floor_level"].values, known["contact_time"].values, known["restitution"].values,
+        known["floor_octave"].values, known["contact_time"].values, known["restitution"].values,
         np.array([1]), np.array([2.5]), known["height"].values,
     )  # fmt: skip
     none = (np.zeros((1, 5)), *[np.zeros(1)] * 5)
@@ -148,7 +148,7 @@ def test_what_exceeds_the_bound_is_withheld() -> None:
     assert coarse.withheld == ["peak force"]
     found = thud.sensitivity({**LUMPED, "design": {"size": 8}}, surrogate=coarse)
     assert np.isnan(found.dataset["peak_force"]).all()
-    assert np.isfinite(found.dataset["floor_level"]).all()
+    assert np.isfinite(found.dataset["floor_octave"]).all()
     assert np.isnan(found.indices["total"].sel(output="peak force")).all()
     assert found.dataset.attrs["surrogate"].endswith("above 0.1 dB: peak force")
 
@@ -194,14 +194,14 @@ def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
 
     def jump(columns: dict[str, Any], *rest: Any, **words: Any) -> thud.Ensemble:  # noqa: ANN401
         found = smooth(columns, *rest, **words)
-        levels = {key: v.copy() for key, v in found.levels.items()}
-        levels["floor", "octave"][:, 4] += columns["mass"] > 2.5
-        return replace(found, levels=levels)
+        levels = found.floor_octave.copy()
+        levels[:, 4] += columns["mass"] > 2.5
+        return replace(found, floor_octave=levels)
 
     study = {**LUMPED, "surrogate": {"size": 128}}
     assert thud.surrogate(study).worst[1] < 0.01
     monkeypatch.setattr(samples, "solve_many", jump)
-    words = naming("floor level 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
+    words = naming("floor octave 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
     with pytest.raises(thud.NumericalError, match=words):
         thud.surrogate(study)
 
@@ -235,7 +235,7 @@ def test_points_outside_the_region_are_refused(trained: thud.Surrogate) -> None:
     reasons = found["reason"].values.tolist()
     assert re.search(naming("height", 0.9, 0.98, 1.02), reasons[0])
     assert not reasons[1]
-    assert np.isnan(found["floor_level"].values[0]).all()
+    assert np.isnan(found["floor_octave"].values[0]).all()
     assert np.isnan(found["contact_time"].values[0])
     assert not found["conforms"].values[0]
 
@@ -337,9 +337,9 @@ def test_results_that_are_written_hold_the_errors(trained: thud.Surrogate, tmp_p
     one = thud.uncertainty(TOLERANCES, surrogate=trained)
     thud.uncertainty(TOLERANCES, tmp_path, surrogate=trained)
     other = thud.read_sweep(tmp_path / "tolerances.nc").dataset
-    np.testing.assert_array_equal(one.dataset["floor_level"], other["floor_level"])
+    np.testing.assert_array_equal(one.dataset["floor_octave"], other["floor_octave"])
     np.testing.assert_array_equal(
-        other["floor_level"].attrs["surrogate_error"], trained.error_of("floor_level")
+        other["floor_octave"].attrs["surrogate_error"], trained.error_of("floor_octave")
     )
     # The model itself has other results.
     with pytest.raises(thud.InputError, match=naming("tolerances.nc", "surrogate")):

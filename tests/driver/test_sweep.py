@@ -20,10 +20,9 @@ from scipy.stats import qmc
 import thud
 from thud import cli
 from thud.base import tables, units
-from thud.base._schema import MODELS
+from thud.base._schema import MODELS, SAMPLE_QUANTITIES
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, with_values
-from thud.impact.quantities import SCALAR_QUANTITIES
 from thud.studies import directory, fit, samples, sampling, sweep
 
 if TYPE_CHECKING:
@@ -57,11 +56,11 @@ def test_grid_holds_what_single_drops_give() -> None:
                 cell = found.sel(
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
-                for name in SCALAR_QUANTITIES:
+                for name in SAMPLE_QUANTITIES:
                     assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
                     np.testing.assert_allclose(
-                        cell[f"{force}_level"], impact.levels(force=force), rtol=0, atol=1e-6
+                        cell[f"{force}_octave"], impact.levels(force=force), rtol=0, atol=1e-6
                     )
                 verdict = impact.assess()
                 assert bool(cell["conforms"]) == bool(verdict)
@@ -77,12 +76,12 @@ def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
         "parameters": {"height": {"values": [0.5, 1.0]}, "mass": {"values": [2.4, 2.5, 2.6]}},
     }
     found = thud.sweep(study, tmp_path).dataset
-    assert found["floor_third_level"].dims == ("height", "mass", "third")
+    assert found["floor_third"].dims == ("height", "mass", "third")
     assert found["third"].values.tolist() == thud.get_bands("third").nominal.tolist()
-    assert found["elastic_level"].dims == ("height", "mass", "octave")
+    assert found["elastic_octave"].dims == ("height", "mass", "octave")
     impact = thud.solve(thud.Ball(mass=2.6), thud.Drop(height=0.5), model)
     for force in ("elastic", "floor"):
-        for name, kind in ((f"{force}_level", "octave"), (f"{force}_third_level", "third")):
+        for name, kind in ((f"{force}_octave", "octave"), (f"{force}_third", "third")):
             cell = found[name].sel(height=0.5, mass=2.6)
             np.testing.assert_allclose(cell, impact.levels(kind, force=force), atol=1e-6)
     assert thud.plot.draw_sweep(thud.Sweep(found)).axes
@@ -320,7 +319,7 @@ def test_failing_samples_say_why_and_disturb_no_other() -> None:
     assert found["peak_force"].values[0] == pytest.approx(
         thud.solve(model="hollow_sphere").peak_force, rel=1e-9
     )
-    assert np.isnan(found["elastic_level"].values[1:]).all()
+    assert np.isnan(found["elastic_octave"].values[1:]).all()
 
 
 @pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
@@ -345,7 +344,7 @@ def test_samples_give_what_single_drops_give(fixed: dict[str, str]) -> None:
             assert float(one[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
         for force in ("elastic", "floor"):
             levels = impact.levels(force=force)
-            np.testing.assert_allclose(one[f"{force}_level"], levels, rtol=0, atol=1e-6)
+            np.testing.assert_allclose(one[f"{force}_octave"], levels, rtol=0, atol=1e-6)
         verdict = impact.assess(study.case.limits.source, study.case.levels.force)
         assert bool(one["conforms"]) == bool(verdict)
 

@@ -112,7 +112,7 @@ spread: thud.Uncertainty = thud.uncertainty(tolerances, surrogate=trained)
 shares: thud.Sensitivity = thud.sensitivity({"design": {"size": 4}, "parameters": mass})
 targets = (
     thud.ForceTarget(impacts["hollow_sphere"]),
-    thud.LevelTarget(many.floor_octaves[1].tolist()),
+    thud.LevelTarget(many.floor_octave[1].tolist()),
 )
 exported: thud.BlockedForce = thud.blocked_force(impacts["hollow_sphere"])
 exported.save(folder / "force.csv")

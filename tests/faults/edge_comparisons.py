@@ -130,7 +130,7 @@ def _among_many(impact: thud.Impact, _: random.Random) -> str:
     if found.status[0] != 0:
         return f"solve_many refuses: {found.reason[0]}"
     change = abs(found.restitution[0] - impact.restitution)
-    levels = np.abs(found.levels["floor", "octave"][0] - impact.levels(force="floor"))
+    levels = np.abs(found.floor_octave[0] - impact.levels(force="floor"))
     total = 10 * np.log10(np.sum(impact.floor_force**2) / impact.sample_rate)
     counts = impact.levels(force="floor", method="exact") > total - 80
     if change > 1e-8 or (levels[counts] > 1e-5).any():

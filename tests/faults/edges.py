@@ -57,7 +57,7 @@ def _many(cases: list[thud.Case]) -> Iterable[Finding]:
         velocity = (2 * case.drop.gravity * case.drop.height) ** 0.5
         rebound = many.impulse[i] / (case.ball.mass * velocity) - 1
         numbers = (many.contact_time[i], many.peak_force[i], many.max_deflection[i])
-        levels = many.levels["floor", "octave"][i]
+        levels = many.floor_octave[i]
         right = (
             all(0 < number < np.inf for number in numbers)
             and many.restitution[i] >= -BALANCE

@@ -55,7 +55,7 @@ def fast_calls(folder: Path) -> Calls:
         ),
         "solve of a case": lambda: thud.solve(case).elastic_force,
         "on a floor": lambda: thud.solve(floor=thud.Oscillator()).on_floor.floor_velocity,  # type: ignore[union-attr]
-        "solve_many": lambda: thud.solve_many({"height": [0.5, 1.0, 1.5]}, threads=2).floor_octaves,
+        "solve_many": lambda: thud.solve_many({"height": [0.5, 1.0, 1.5]}, threads=2).floor_octave,
         "levels": lambda: impact.levels("third"),
         "force_exposure_levels": lambda: thud.force_exposure_levels(impact.floor_force, rate),
         "verdict": lambda: [one.value for one in impact.assess().criteria],

@@ -36,7 +36,7 @@ def test_band_of_the_laws_is_that_of_the_independent_code(
     found = found.set_index(sample="fractional_order").sel(sample=REFERENCE[:, 0])
     # Release is a glancing contact: two samples of the record, and the digits of the reference.
     np.testing.assert_allclose(1e3 * found["contact_time"], REFERENCE[:, 1], atol=0.06)
-    levels = found["floor_level"].sel(octave=[63, 250, 500])
+    levels = found["floor_octave"].sel(octave=[63, 250, 500])
     # The default mesh, and four digits of the loss factor.
     oracle(
         "damping laws by quadratic elements: 63, 250 and 500 Hz",

@@ -47,6 +47,10 @@ PROCESSING = {
     ),
     "bounce_ignored": "a bounce of an earlier drop at {time:.2f} s is no drop and has no number",
     "pulse_ignored": "a pulse of {value:.0f} N at {time:.2f} s is no drop and has no number",
+    # Samples.
+    "no_numerical_errors": (
+        "The samples state no numerical errors; a run of a single case states its own."
+    ),
 }
 
 # What may be wrong.
@@ -192,5 +196,13 @@ WARNINGS = {
     "source_off_nominal": (
         "the source does not conform ({octaves} from the nominal levels): the level in the room is "
         "not that of a standard source"
+    ),
+    # Samples.
+    "samples_failed": (
+        "{value:.0f} of {high:.0f} samples have no results; most frequent reason: {reason}"
+    ),
+    "samples_not_standard": (
+        "the sources of {value:.0f} of {high:.0f} samples do not conform: their levels in the room "
+        "are not those of a standard source"
     ),
 }

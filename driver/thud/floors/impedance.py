@@ -13,7 +13,7 @@ from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text, impact_only
-from thud.impact.floor_impact import new_floor_impact
+from thud.impact.compute import new_floor_impact
 from thud.impact.impact import Impact
 from thud.level.levels import force_exposure_levels, get_bands
 

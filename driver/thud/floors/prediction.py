@@ -17,8 +17,8 @@ from thud.base.note import Note
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 from thud.floors.survey import RoomLevels
-from thud.impact.compute import compute
-from thud.impact.floor_impact import FloorImpact, new_floor_impact
+from thud.impact.compute import compute, new_floor_impact
+from thud.impact.floor_impact import FloorImpact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.impact_result import ImpactResult
 from thud.level.levels import BANDWIDTHS, SOURCES, force_exposure_levels

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import KEYS, SAMPLE_QUANTITIES, Limits
+from thud.base._schema import KEYS, Limits
 from thud.base.arguments import check_arguments
 from thud.base.bridge import ask, text
 from thud.base.checks import (
@@ -26,8 +26,7 @@ from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key, key_owners
 from thud.impact.outcomes import Ensemble
-from thud.impact.quantities import ROOM_BAND, ROOM_RATING
-from thud.level.levels import BANDWIDTHS, FORCES, get_bands
+from thud.level.levels import FORCES, get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -173,31 +172,15 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         size += f" with forces of {length} values" if forces else ""
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
     # Forces may fill the memory; `Ensemble` does not copy frozen arrays.
-    force = freeze(results["force"])
+    force = freeze(results.pop("force"))
     return Ensemble(
         case=base,
         parameters=columns,
-        status=results["status"],
-        reason=results["reason"],
-        **{name: results[name] for name in SAMPLE_QUANTITIES},
-        levels={
-            (force, kind): results[f"{force}_{kind}"]
-            for kind in BANDWIDTHS for force in FORCES if f"{force}_{kind}" in results
-        },
-        margin=results["margin"],
-        conforms=results["conforms"] != 0,
-        elastic_conforms=results["elastic_conforms"] != 0,
-        floor_conforms=results["floor_conforms"] != 0,
         elastic_force=force[:, 0] if forces else None,
         floor_force=force[:, 1] if forces else None,
         sample_rate=base.sampling.sample_rate,
-        contact_levels={
-            kind: results[f"contact_{kind}"] for kind in BANDWIDTHS if f"contact_{kind}" in results
-        },
-        floor_work=results.get("floor_work"),
-        room_level=results.get(ROOM_BAND),
-        room_rating=results.get(ROOM_RATING),
-    )  # fmt: skip
+        **results,
+    )
 
 
 def _compute(  # noqa: PLR0913 - the arguments of the library
@@ -215,14 +198,15 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
         "samples", case=content, keys=",".join(names).encode("ascii", "replace"),
         key_count=len(names), values=numbers.T, threads=threads, levels=levels, forces=forces,
     )  # fmt: skip
-    status = answer["status"].astype(np.int32)
-    reason = np.full(len(numbers), "", dtype=object)
-    reason[status != 0] = text(answer["reasons"]).split("\n")[:-1]
-    del answer["reasons"]
-    return {name: values.T for name, values in answer.items()} | {
-        "status": status,
-        "reason": reason,
+    reasons = text(answer.pop("reasons")).split("\n")[:-1]
+    results = {
+        name: values.T != 0 if name.endswith("conforms") else values.T
+        for name, values in answer.items()
     }
+    results["status"] = results["status"].astype(np.int32)
+    results["reason"] = np.full(len(numbers), "", dtype=object)
+    results["reason"][results["status"] != 0] = reasons
+    return results
 
 
 def _columns(

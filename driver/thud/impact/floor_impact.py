@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.bridge import ask, without_units
+from thud.base.bridge import ask
 from thud.base.checks import require_choice, require_pair
-from thud.base.extras import require_extra
 from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
-from thud.impact.impact import Impact, impact_fields
-from thud.impact.mobility import mobility
-from thud.impact.quantities import FLOOR_QUANTITIES
+from thud.impact.impact import Impact
 from thud.level.levels import BANDWIDTHS, force_exposure_levels
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, FloorOptions, LevelsMethod
-    from thud.base.bridge import Bundle
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +59,12 @@ class FloorImpact(Impact):
         Displacement, m, and velocity, m/s, of the floor under the source, downwards.
     floor_work : float
         Energy that the source transfers to the floor, J.
-    point_velocity : ndarray, shape (n_point, n_sample)
-        Velocity at the points ``point_x``, ``point_y`` of the floor, m/s.
     """
 
     blocked_force: NDArray[np.float64]
     floor_displacement: NDArray[np.float64]
     floor_velocity: NDArray[np.float64]
     floor_work: float
-    point_velocity: NDArray[np.float64]
 
     def __repr__(self) -> str:
         """Return the main numbers of the impact, without its arrays."""
@@ -92,7 +84,7 @@ class FloorImpact(Impact):
         self, bands: BandSet = "octave", method: LevelsMethod | None = None
     ) -> NDArray[np.float64]:
         """Return the levels of the force on a rigid floor, dB, shape (n_band,); see `levels`."""
-        method = method or self.level_method
+        method = method or self.case.levels.method
         return force_exposure_levels(self.blocked_force, self.sample_rate, bands, method)
 
     def difference(
@@ -110,12 +102,6 @@ class FloorImpact(Impact):
         )  # fmt: skip
         return FloorEnergy(**answer)
 
-    def mobility(
-        self, frequency: ArrayLike, point: tuple[float, float] | None = None
-    ) -> NDArray[np.complex128]:
-        """Return the mobility at the source or a point; see `thud.impact.mobility.mobility`."""
-        return mobility(self.floor, frequency, point)
-
     def velocity_at(self, x: float, y: float) -> NDArray[np.float64]:
         """Return the velocity at a point of a rectangular floor, m/s, shape (n_sample,).
 
@@ -127,6 +113,13 @@ class FloorImpact(Impact):
         )  # fmt: skip
         return np.asarray(answer["velocity"])
 
+    @property
+    def point_velocity(self) -> NDArray[np.float64]:
+        """Velocities at ``point_x`` and ``point_y`` of the floor, m/s, (n_point, n_sample)."""
+        points = zip(*(getattr(self.floor, f"point_{axis}", ()) for axis in "xy"), strict=True)
+        velocities = [self.velocity_at(x, y) for x, y in points]
+        return np.array(velocities).reshape(-1, len(self.time))
+
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each octave."""
         energy = self.injected_energy()
@@ -136,52 +129,18 @@ class FloorImpact(Impact):
         energies = [f"{value:.3g}" for value in energy.energy]
         return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
-    def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the force on a rigid floor and the motion of the mobile floor."""
+    def histories(self) -> dict[str, NDArray[np.float64]]:
+        """Return the histories, also the force on a rigid floor and the motion of the floor."""
         points = enumerate(self.point_velocity, 1)
-        return {
+        return super().histories() | {
             "blocked_force_N": self.blocked_force,
             "floor_displacement_m": self.floor_displacement,
             "floor_velocity_m_per_s": self.floor_velocity,
             **{f"point_{i}_velocity_m_per_s": velocity for i, velocity in points},
         }
 
-    def to_xarray(self) -> xr.Dataset:
-        """Return the dataset of an impact, see `Impact.to_xarray`, with the work on the floor."""
-        with require_extra("studies"):
-            from thud.impact.datasets import attributes
-
-        attrs = attributes(FLOOR_QUANTITIES["floor_work"])
-        return super().to_xarray().assign(floor_work=((), self.floor_work, attrs))
-
     def plot(self) -> Figure:
         """Return a figure of contact and blocked force, their levels and the floor mobility."""
         from thud.plot.floor_figures import draw_floor
 
         return draw_floor(self)
-
-
-def new_floor_impact(
-    case: Case, answer: Bundle, blocked_force: NDArray[np.float64]
-) -> FloorImpact | None:
-    """Return the impact on a mobile floor from an answer of the library; None if it has none."""
-    if "floor_force" not in answer:
-        return None
-    columns = without_units(answer["floor_force"])
-    velocities = [values for name, values in columns.items() if name.startswith("point_")]
-    impact = FloorImpact(
-        **impact_fields(case, answer, "floor_"),
-        notes=(),
-        blocked_force=blocked_force,
-        floor_displacement=columns["floor_displacement"],
-        floor_velocity=columns["floor_velocity"],
-        floor_work=answer["floor_summary"]["floor_work"],
-        point_velocity=np.array(velocities),
-    )
-    if velocities:
-        return impact
-    points = zip(
-        getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()), strict=True
-    )
-    velocities = [impact.velocity_at(x, y) for x, y in points]
-    return replace(impact, point_velocity=np.array(velocities).reshape(-1, len(blocked_force)))

@@ -5,41 +5,38 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import IMPACT_QUANTITIES, ImpactQuantities
-from thud.base.bridge import without_units
+from thud.base._schema import ImpactQuantities
 from thud.base.checks import require_choice, require_whole
 from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
 from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
-from thud.impact.motion import Motion, new_motion
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Estimate
 from thud.level.impact_result import DropForce
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
-    from thud.base.bridge import Bundle
     from thud.base.note import Note
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
+    from thud.impact.motion import Motion
     from thud.impact.room_level import RoomLevel
     from thud.level.assessment import Verdict
 
 
-# Columns of every history; components of the force follow the motion, which are the first ones.
-_COLUMNS = ("time", "deflection", "velocity", "elastic_force", "floor_force")
-_N_MOTION = 3
 OCTAVE_NAMES = ("octave_31_5", "octave_63", "octave_125", "octave_250", "octave_500")
 
 
@@ -59,11 +56,6 @@ class ImpactNumbers:
     contact_time: float
     restitution: float
     peak_force: float
-
-    @property
-    def assessed(self) -> NDArray[np.float64]:
-        """Levels, contact time and restitution, shape (7,)."""
-        return np.array([*self.level, self.contact_time, self.restitution])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -142,25 +134,14 @@ class Impact(ImpactQuantities, Displayed):
 
         They are NaN if no other resolution can be computed.
         """
-        return ImpactNumbers(
-            level=np.array([getattr(self, f"{name}_error") for name in OCTAVE_NAMES]),
-            contact_time=self.contact_time_error,
-            restitution=self.restitution_error,
-            peak_force=self.peak_force_error,
-        )
+        return _numbers(lambda name: getattr(self, f"{name}_error"))
 
     @property
     def finer(self) -> ImpactNumbers | None:
         """Numbers at a finer resolution; None without the key `verify`."""
-        quantities = self.model_quantities
-        if "finer_contact_time" not in quantities:
+        if "finer_contact_time" not in self.model_quantities:
             return None
-        return ImpactNumbers(
-            level=np.array([quantities[f"finer_{name}"] for name in OCTAVE_NAMES]),
-            contact_time=quantities["finer_contact_time"],
-            restitution=quantities["finer_restitution"],
-            peak_force=quantities["finer_peak_force"],
-        )
+        return _numbers(lambda name: self.model_quantities[f"finer_{name}"])
 
     @property
     def contact_time_as_recorded(self) -> float:
@@ -187,27 +168,6 @@ class Impact(ImpactQuantities, Displayed):
         """Return header and rows of text."""
         warnings = [("warning", warning, "", "", "") for warning in self.warnings]
         return [*self.assess().rows(), *warnings]
-
-    @property
-    def shell_force(self) -> NDArray[np.float64]:
-        """Force of the shell F_B, N, shape (n_sample,)."""
-        return self._component("shell_force")
-
-    @property
-    def gas_force(self) -> NDArray[np.float64]:
-        """Force of the enclosed gas F_G, N, shape (n_sample,)."""
-        return self._component("gas_force")
-
-    @property
-    def flux_force(self) -> NDArray[np.float64]:
-        """Force F_M by the momentum flux of the wall into the floor, N, shape (n_sample,)."""
-        return self._component("flux_force")
-
-    def _component(self, name: str) -> NDArray[np.float64]:
-        if name not in self.components:
-            message = f"this model has no {name}; available: {', '.join(self.components)}"
-            raise AttributeError(message)
-        return self.components[name]
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return the ``"floor"`` or ``"elastic"`` force, N, by default the assessed force."""
@@ -255,7 +215,7 @@ class Impact(ImpactQuantities, Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default the assessed force.
         """
-        method = method or self.level_method
+        method = method or self.case.levels.method
         return force_exposure_levels(self.force(force), self.sample_rate, bands, method)
 
     def assess(
@@ -312,9 +272,11 @@ class Impact(ImpactQuantities, Displayed):
         Snapshots are not included. Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
-            from thud.impact.datasets import impact_dataset
+            from thud.impact.datasets import case_attributes, impact_dataset
 
-        return impact_dataset(self, self.histories())
+        return impact_dataset(
+            self, self.histories(), case_attributes(self.case) | self.model_quantities
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return a table of the columns of ``force.csv`` and `model_histories`, indexed by time.
@@ -328,40 +290,15 @@ class Impact(ImpactQuantities, Displayed):
         return {
             "deflection_m": self.deflection,
             "velocity_m_per_s": self.velocity,
+            **{f"{name}_N": values for name, values in self.components.items()},
             "elastic_force_N": self.elastic_force,
             "floor_force_N": self.floor_force,
-            **self._floor_histories(),
-            **{f"{name}_N": values for name, values in self.components.items()},
             **self.model_histories,
         }
 
-    def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the additional histories of a mobile floor."""
-        return {}
 
-
-def impact_fields(case: Case, answer: Bundle, prefix: str = "") -> dict[str, Any]:
-    """Return arguments of `Impact` or `FloorImpact` from results of the library by name.
-
-    The names of the groups begin with a prefix.
-    """
-    columns = without_units(answer[f"{prefix}force"])
-    names = list(columns)
-    histories = answer.get(f"{prefix}model_histories", {})
-    snapshots = answer.get(f"{prefix}snapshots")
-    summary = answer[f"{prefix}summary"]
-    return {
-        "case": case,
-        **{name: columns[name] for name in _COLUMNS},
-        "components": {
-            name: columns[name] for name in names[_N_MOTION : names.index("elastic_force")]
-        },
-        "model_histories": {name: values for name, values in histories.items() if name != "time_s"},
-        "model_quantities": dict(answer.get(f"{prefix}model_quantities", {})),
-        "motion": new_motion(without_units(snapshots)) if snapshots else None,
-        # Files have no unknown errors.
-        **{
-            name: summary.get(name, math.nan) if name.endswith("_error") else summary[name]
-            for name in IMPACT_QUANTITIES
-        },
-    }
+def _numbers(value: Callable[[str], float]) -> ImpactNumbers:
+    """Return numbers whose values are those of their names."""
+    names = ("contact_time", "restitution", "peak_force")
+    level = np.array([value(name) for name in OCTAVE_NAMES])
+    return ImpactNumbers(level=level, **{name: value(name) for name in names})

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.base._schema import SampleQuantities
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
-from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL, SAMPLE_RESULTS, SCALAR_QUANTITIES
-from thud.impact.sample_messages import NO_ERRORS, sample_warnings
-from thud.level.levels import BANDWIDTHS
+from thud.base.note import Note
+from thud.impact.quantities import RESULTS
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from thud.base._schema import BandSet, LevelsForce
     from thud.case.case import Case
+
+NO_ERRORS = Note("no_numerical_errors")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,9 +39,11 @@ class Ensemble(SampleQuantities, Displayed):
         0, or the exit code of the error: 1 invalid input, 2 numerical failure.
     reason : ndarray of str, shape (n_sample,)
         Message of the error; empty without an error.
-    levels : dict of (force, bands) to ndarray, shape (n_sample, n_band)
-        Force exposure levels, dB, of the ``"elastic"`` and the ``"floor"`` force: octaves, which
-        are assessed, and other requested bands.
+    elastic_octave, floor_octave : ndarray, shape (n_sample, 5)
+        Force exposure levels of the octaves, which are assessed, dB: those of the elastic force and
+        of the force on a rigid floor.
+    elastic_third, floor_third : ndarray, shape (n_sample, 15), or None
+        Levels of the one-third-octave bands, dB; None unless requested.
     margin : ndarray, shape (n_sample,)
         Minimum distance of the octave levels of the assessed force from their limits, dB; negative
         outside the limits.
@@ -52,12 +55,12 @@ class Ensemble(SampleQuantities, Displayed):
         Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
-    contact_levels : dict of bands to ndarray, shape (n_sample, n_band)
+    contact_octave, contact_third : ndarray, shape (n_sample, n_band), or None
         Levels of the force on the floor of the case, dB; equal to those on a rigid floor if the
-        model has no other force. Empty without a floor.
+        model has no other force. None without a floor, or if the bands are not requested.
     floor_work : ndarray, shape (n_sample,), or None
         Energy that the source transfers to the floor, J; None without a floor.
-    room_level : ndarray, shape (n_sample, 12), or None
+    room_third : ndarray, shape (n_sample, 12), or None
         Maximum Fast levels in the room, dB re 20 uPa, in the one-third-octave bands 50 to 630 Hz;
         None without a room.
     room_rating : ndarray, shape (n_sample,), or None
@@ -68,17 +71,21 @@ class Ensemble(SampleQuantities, Displayed):
     parameters: dict[str, NDArray[np.generic]]
     status: NDArray[np.int32]
     reason: NDArray[np.object_]
-    levels: dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]
+    elastic_octave: NDArray[np.float64]
+    floor_octave: NDArray[np.float64]
     margin: NDArray[np.float64]
     conforms: NDArray[np.bool_]
     elastic_conforms: NDArray[np.bool_]
     floor_conforms: NDArray[np.bool_]
-    elastic_force: NDArray[np.float64] | None
-    floor_force: NDArray[np.float64] | None
     sample_rate: float
-    contact_levels: dict[BandSet, NDArray[np.float64]] = field(default_factory=dict)
+    elastic_third: NDArray[np.float64] | None = None
+    floor_third: NDArray[np.float64] | None = None
+    contact_octave: NDArray[np.float64] | None = None
+    contact_third: NDArray[np.float64] | None = None
+    elastic_force: NDArray[np.float64] | None = None
+    floor_force: NDArray[np.float64] | None = None
     floor_work: NDArray[np.float64] | None = None
-    room_level: NDArray[np.float64] | None = None
+    room_third: NDArray[np.float64] | None = None
     room_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
@@ -95,31 +102,33 @@ class Ensemble(SampleQuantities, Displayed):
         return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def results(self) -> dict[str, NDArray[Any]]:
+        """Results that were computed, by their names in `thud.impact.quantities.RESULTS`."""
+        values = {name: getattr(self, name, None) for name in RESULTS}
+        return {name: array for name, array in values.items() if array is not None}
+
+    @property
+    def warnings(self) -> tuple[Note, ...]:
         """Samples without results and the most frequent reason, and sources without conformity."""
         # Without levels, nothing is known of the source.
         conforms = None if self.room_rating is None else self.conforms | np.isnan(self.margin)
         return sample_warnings(self.status, self.reason, conforms)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """That samples state no numerical errors."""
         return (NO_ERRORS,)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
+        """Return header and rows of text: the range of each number that every sample has."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
-        shown = SCALAR_QUANTITIES | {"margin": SAMPLE_RESULTS["margin"]} | FLOOR_QUANTITIES
-        for name, quantity in shown.items():
-            values = getattr(self, name)
-            if name == ROOM_LEVEL or values is None:
+        for name, values in self.results.items():
+            if values.ndim > 1 or values.dtype.kind != "f":
                 continue
-            computed = values[self.status == 0]
-            computed = computed[np.isfinite(computed)]
-            if not computed.size:
-                continue
-            quantiles = np.quantile(computed, [0, 0.5, 1])
-            rows.append((quantity.label, *map(quantity.show, quantiles)))
+            computed = values[(self.status == 0) & np.isfinite(values)]
+            if computed.size:
+                quantiles = np.quantile(computed, [0, 0.5, 1])
+                rows.append((RESULTS[name].label, *map(RESULTS[name].show, quantiles)))
         return rows
 
     def to_xarray(self) -> xr.Dataset:
@@ -132,12 +141,26 @@ class Ensemble(SampleQuantities, Displayed):
 
         return ensemble_dataset(self)
 
-    @property
-    def elastic_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the elastic force, dB, shape (n_sample, 5)."""
-        return self.levels["elastic", BANDWIDTHS[0]]
 
-    @property
-    def floor_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the force on the floor, dB, shape (n_sample, 5)."""
-        return self.levels["floor", BANDWIDTHS[0]]
+def sample_warnings(
+    status: NDArray[np.integer], reason: NDArray[np.object_], conforms: NDArray[np.bool_] | None
+) -> tuple[Note, ...]:
+    """Return warnings of samples without results, and of sources that do not conform.
+
+    Parameters
+    ----------
+    status, reason
+        Exit code and message of each sample, as in `Ensemble`, of any shape.
+    conforms
+        Whether each source conforms, of the same shape; None if levels in a room are not rated.
+    """
+    failed = status != 0
+    result = []
+    if failed.any():
+        ((cause, _),) = Counter(reason[failed]).most_common(1)
+        count = float(failed.sum())
+        others = {"reason": cause}
+        result.append(Note("samples_failed", value=count, high=failed.size, others=others))
+    if conforms is not None and (unlike := ~failed & ~conforms).any():
+        result.append(Note("samples_not_standard", value=float(unlike.sum()), high=failed.size))
+    return tuple(result)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import f90nml.scanner
+import f90nml
 import numpy as np
 
 from thud.base.checks import refuse
@@ -22,16 +21,8 @@ if TYPE_CHECKING:
 
     from thud.impact.impact import Impact
 
-# The scanner of f90nml prints its tables on the screen before it raises an error.
-f90nml.scanner.print = lambda *_: None
-
 # Endings of the files that are read.
 _ENDINGS = (".nml", ".csv")
-# Tables of a drop; those on a mobile floor have a prefix.
-_TABLES = [
-    f"{prefix}{name}" for prefix in ("", "floor_")
-    for name in ("force", "model_histories", "snapshots")
-]  # fmt: skip
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -52,52 +43,59 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     InputError
         If the directory does not hold the results of an impact.
     """
+    folder = Path(directory)
     try:
-        return _new_impact(_Files(Path(directory)))
+        files = _read_texts(folder)
+        for name in ("summary.nml", "effective.nml"):
+            _require(folder, name, files)
+        return _new_impact(folder, files)
     except ThudError:
         raise
     except FileNotFoundError as error:
-        refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
+        refuse(f"{folder}: there is no such directory", "the results of an impact", error)
     except Exception as error:  # noqa: BLE001 - parsers of damaged files raise various errors
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
-        refuse(f"{directory}: cannot be read ({reason})", "the results of an impact", error)
+        refuse(f"{folder}: cannot be read ({reason})", "the results of an impact", error)
 
 
-class _Files(dict[str, str]):
-    """Texts of the files of a result directory by name.
+def _read_texts(folder: Path) -> dict[str, str]:
+    """Return the texts of the files of a result directory by name.
 
     The directory is opened once: a run that replaces it meanwhile adds no file of its own.
     """
+    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
+    def opener(name: str, flags: int) -> int:
+        # Opening a pipe could block.
+        return os.open(name, flags | os.O_NONBLOCK, dir_fd=directory)
 
-            def opener(name: str, flags: int) -> int:
-                # Opening a pipe could block.
-                return os.open(name, flags | os.O_NONBLOCK, dir_fd=directory)
-
-            for name in os.listdir(directory):  # noqa: PTH208 - by its descriptor
-                if name.endswith(_ENDINGS):
-                    with open(name, encoding="utf-8", opener=opener) as file:
-                        self[name] = file.read()
-        finally:
-            os.close(directory)
-
-    def __missing__(self, name: str) -> str:
-        raise FileNotFoundError(errno.ENOENT, "missing", str(self.folder / name))
+    texts = {}
+    try:
+        for name in os.listdir(directory):  # noqa: PTH208 - by its descriptor
+            if name.endswith(_ENDINGS):
+                with open(name, encoding="utf-8", opener=opener) as file:
+                    texts[name] = file.read()
+    finally:
+        os.close(directory)
+    return texts
 
 
-def _new_impact(files: _Files) -> Impact:
+def _require(folder: Path, name: str, files: dict[str, str]) -> None:
+    """Raise InputError if a file is missing."""
+    if name not in files:
+        refuse(f"{folder / name}: there is no such file", "the results of an impact")
+
+
+def _new_impact(folder: Path, files: dict[str, str]) -> Impact:
     """Return the impact of a result directory, whose files are the groups of the library."""
     answer: dict[str, Any] = dict(f90nml.reads(files["summary.nml"]))
     if "warnings" in answer:
         answer["warnings"] = _warnings(answer["warnings"])
-    required = ("force", "floor_force") if "floor_summary" in answer else ("force",)
-    for name in _TABLES:
-        if name in required or f"{name}.csv" in files:
-            answer[name] = _table(files[f"{name}.csv"])
+    for prefix in ("", "floor_") if "floor_summary" in answer else ("",):
+        _require(folder, f"{prefix}force.csv", files)
+        for name in (f"{prefix}force", f"{prefix}model_histories", f"{prefix}snapshots"):
+            if f"{name}.csv" in files:
+                answer[name] = _table(files[f"{name}.csv"])
     return new_impact(Case.from_text(files["effective.nml"]), answer)
 
 

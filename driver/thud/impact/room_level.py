@@ -103,10 +103,8 @@ class RoomLevel(Immutable):
         return bool((self.simple_level != self.clamped_level).any())
 
 
-def new_room_level(answer: Bundle) -> RoomLevel | None:
-    """Return the level from a bundle of the library; None without one."""
-    if "room" not in answer:
-        return None
+def new_room_level(answer: Bundle) -> RoomLevel:
+    """Return the level from a bundle of the library that has one."""
     bands, room = without_units(answer["room_levels"]), answer["room"]
     frequency = bands.pop("nominal")
     shares = [bands.pop(name) for name in list(bands) if name.endswith("_share")]

@@ -1,5 +1,5 @@
 """`thud.solve`; the stub ``solve.pyi`` declares its keywords for each model."""
 
-from thud.impact.solve_case import solve
+from thud.impact.compute import solve
 
 __all__ = ["solve"]

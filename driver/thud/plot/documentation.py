@@ -202,7 +202,7 @@ def _draw_standard_ball() -> Figure:
         radial_elements=MESH["radial_elements"], polar_elements=MESH["polar_elements"]
     )
     drops = solve_many(sets, Case(model=model))
-    level = drops.levels["floor", "octave"][:, -1]
+    level = drops.floor_octave[:, -1]
     figure = new_figure(1.8 * WIDTH)
     panels = (
         ("Order of the damping law", sets["fractional_order"], "Loss factor at 74 Hz",

@@ -168,11 +168,11 @@ def _draw_mobility(axes: Axes, impact: FloorImpact) -> None:
     bands = get_bands(THIRDS)
     low, high = bands.lower[0], bands.upper[-1]
     frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
-    mobility = impact.mobility(frequency)
+    values = mobility(impact.floor, frequency)
     # A thin line on a thick one: the mobility of an infinite plate is real.
-    axes.loglog(frequency, abs(mobility), label="$|Y|$", color="0.7", linewidth=2.4)
+    axes.loglog(frequency, abs(values), label="$|Y|$", color="0.7", linewidth=2.4)
     axes.loglog(
-        frequency, mobility.real, label=r"$\mathrm{Re}\,Y$", color="black", linewidth=0.8,
+        frequency, values.real, label=r"$\mathrm{Re}\,Y$", color="black", linewidth=0.8,
     )  # fmt: skip
     axes.set_ylabel("Mobility $Y$,\nm/(N s)")
     axes.set_xlabel("Frequency, Hz")

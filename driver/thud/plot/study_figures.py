@@ -198,7 +198,7 @@ def _columns(dataset: xr.Dataset) -> Columns:
 def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _Curves:
     """Return the levels of the assessed force relative to the nominal levels of the source."""
     levels = {
-        force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
+        force: dataset[f"{force}_octave"].values.reshape(-1, len(dataset["octave"]))
         for force in FORCES
     }
     count = len(dataset["status"].values.ravel())

@@ -373,9 +373,10 @@ class Recording(Displayed):
         Raise InputError if xarray is not installed.
         """
         with require_extra("studies"):
-            from thud.impact.datasets import recording_dataset
+            from thud.impact.datasets import impact_dataset
 
-        return recording_dataset(self)
+        histories = {"floor_force_N": self.force()}
+        return impact_dataset(self, histories, {"recording": self.name})
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the force of the first drop over time.

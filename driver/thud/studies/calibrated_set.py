@@ -202,7 +202,7 @@ def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
     others = [columns.get(key, value_in(case, key)) for key in ("mass", "height")]
     return np.column_stack(
         [
-            drops.levels[force, "octave"], drops.contact_time, drops.restitution, peaks,
+            getattr(drops, f"{force}_octave"), drops.contact_time, drops.restitution, peaks,
             *(np.broadcast_to(np.asarray(other, dtype=float), failed.size) for other in others),
         ]
     )  # fmt: skip

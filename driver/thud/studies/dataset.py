@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from thud.impact.datasets import attributes, case_attributes, sample_variables
-from thud.impact.quantities import ALL_QUANTITIES, BANDS
+from thud.impact.quantities import FREQUENCIES, RESULTS
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.sampling import sampler_versions
 
@@ -84,10 +84,8 @@ def provenance(study: SampleStudy) -> dict[str, str]:
 
 def _in_order(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset with its variables in the usual order."""
-    results = {
-        name: dataset.variables[name] for name in ALL_QUANTITIES if name in dataset.data_vars
-    }
-    names = [*BANDS, *dataset.attrs["parameters"].split()]
+    results = {name: dataset.variables[name] for name in RESULTS if name in dataset.data_vars}
+    names = [*FREQUENCIES, *dataset.attrs["parameters"].split()]
     coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
     return xr.Dataset(results, coordinates, dataset.attrs)
 
@@ -96,7 +94,7 @@ def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
     """Return a complete dataset; a grid gets a dimension for each parameter."""
     if study.design != "grid":
         return dataset
-    coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}
+    coordinates = {name: dataset[name] for name in FREQUENCIES if name in dataset.coords}
     names = [parameter.coordinate_name for parameter in study.parameters]
     axes = {
         name: (name, _objects(parameter.grid()), dataset[name].attrs)

@@ -10,7 +10,6 @@ from thud.base._schema import CLASS_LIMITS, RATINGS, Room
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import DENSITY, value_in
-from thud.impact.quantities import ROOM_RATING
 from thud.level.rating import meets
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study import wall_volume
@@ -73,7 +72,7 @@ class Design(SampleResult):
     @property
     def room_rating(self) -> xr.DataArray | None:
         """The rating `rating_name` of the levels in the room, dB; None without a room."""
-        return self.dataset.get(ROOM_RATING)
+        return self.dataset.get("room_rating")
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: how many samples conform, and the best sample."""

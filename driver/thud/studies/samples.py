@@ -12,7 +12,6 @@ from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.keys import DENSITY
 from thud.impact.ensemble import solve_many
-from thud.impact.quantities import sample_results
 from thud.level.levels import peak_count
 from thud.studies.sampling import sampler_versions, unit_samples
 from thud.studies.study import Study, wall_volume
@@ -143,7 +142,7 @@ class Block:
 
 
 def evaluate(block: Block) -> Columns:
-    """Return the results of a block by names as in `ALL_QUANTITIES`; NaN for a failed sample.
+    """Return the results of a block by names as in `RESULTS`; NaN for a failed sample.
 
     Raise InputError if the block requires another version of thud.
     """
@@ -155,7 +154,7 @@ def evaluate(block: Block) -> Columns:
     if block.surrogate:
         return block.surrogate.predict(block.case, block.columns)
     result = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
-    columns = sample_results(result)
+    columns = result.results
     columns["status"] = columns["status"].astype("int8")
     if block.counts_peaks:
         forces = getattr(result, f"{block.case.levels.force}_force")

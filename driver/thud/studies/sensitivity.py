@@ -10,7 +10,6 @@ import numpy as np
 import xarray as xr
 
 from thud.base.checks import refuse
-from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
 from thud.studies.sample_kind import SampleKind
 from thud.studies.sampling import MIN_BASE_SAMPLES
@@ -139,15 +138,13 @@ def sensitivity(
 
 def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
     force = study.case.levels.force
-    levels = dataset[f"{force}_level"].to_numpy()
+    levels = dataset[f"{force}_octave"].to_numpy()
     peak = "peak_elastic_force" if force == "elastic" else "peak_force"
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in ("contact_time", peak)}
     # Quantities of drops on a floor.
-    floor_quantities = (
-        name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1
-    )
-    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in floor_quantities}
+    on_floor = (name for name in ("floor_work", "room_rating") if name in dataset)
+    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in on_floor}
     dimension = len(study.parameters)
     usable = (dataset["status"].to_numpy() == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_BASE_SAMPLES:
@@ -167,9 +164,8 @@ def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
             "units": "1",
             "long_name": "variance of the surrogate's errors divided by that of the output",
         }
-        errors = np.concatenate(
-            [study.surrogate.mean_square(name) for name in (f"{force}_level", "contact_time", peak)]
-        )
+        learned = (f"{force}_octave", "contact_time", peak)
+        errors = np.concatenate([study.surrogate.mean_square(name) for name in learned])
         # The errors of all quantities are in dB.
         spread = np.array(
             [

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from thud.base.display import Displayed
 from thud.base.tables import format_rows
-from thud.impact.sample_messages import NO_ERRORS, sample_warnings
+from thud.impact.outcomes import NO_ERRORS, sample_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from thud.base.note import Note
 
 
 class StudyResult(Displayed):
@@ -19,14 +21,14 @@ class StudyResult(Displayed):
 
     Attributes
     ----------
-    warnings : tuple of str
+    warnings : tuple of Note or str
         Reasons why numbers may be wrong or missing.
     """
 
-    warnings: tuple[str, ...]
+    warnings: tuple[Note | str, ...]
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note | str, ...]:
         """Notes on what was done."""
         return ()
 
@@ -60,7 +62,7 @@ class SampleResult(StudyResult):
     dataset: xr.Dataset
 
     @property
-    def warnings(self) -> tuple[str, ...]:  # type: ignore[override]
+    def warnings(self) -> tuple[Note, ...]:  # type: ignore[override]
         """Samples without results and the most frequent reason, and sources without conformity."""
         data = self.dataset
         conforms = data["conforms"].values if "room_rating" in data else None

@@ -10,7 +10,6 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.case.keys import value_in
-from thud.level.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
 
 if TYPE_CHECKING:
@@ -36,9 +35,7 @@ class SurrogateLevels(LevelMisfit):
     def __init__(self, misfit: LevelMisfit, surrogate: Surrogate, case: Case) -> None:
         vars(self).update(vars(misfit))
         self.surrogate = surrogate
-        self.name = f"{self.kind or case.levels.force}_level"
-        if self.bands != BANDWIDTHS[0]:
-            self.name = self.name.replace("_", f"_{self.bands}_")
+        self.name = f"{self.kind or case.levels.force}_{self.bands}"
         if self.name not in surrogate.outputs:
             refuse(f"the surrogate has no {self.name}", f"{', '.join(surrogate.outputs)}")
 

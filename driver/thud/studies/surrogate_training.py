@@ -11,11 +11,12 @@ import numpy as np
 from scipy.linalg import cho_solve
 from threadpoolctl import threadpool_limits
 
+from thud.base._schema import SAMPLE_QUANTITIES
 from thud.base.checks import refuse
 from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
 from thud.case.keys import find_key
-from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
+from thud.impact.quantities import LEVELS
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.directory import StudyDirectory, require_version
 from thud.studies.parameter import Parameter
@@ -153,9 +154,8 @@ def _learn(
             f"the number of peaks differs among the drops of the surrogate ({listed} drops)",
             "ranges in which it is the same: a count cannot be interpolated",
         )
-    quantities = {
-        str(n): _decibels(str(n), v) for n, v in results.items() if n in SCALAR_QUANTITIES | LEVELS
-    }
+    learned = {*SAMPLE_QUANTITIES, *LEVELS}
+    quantities = {str(n): _decibels(str(n), v) for n, v in results.items() if n in learned}
     region = np.array([(p.low, p.high) for p in drops.parameters])
     points = unit_samples(drops.design, len(region), drops.size, drops.seed, 0, drops.size)
     points[:, region[:, 0] == region[:, 1]] = 0.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from thud.impact.quantities import ALL_QUANTITIES, BANDS
+from thud.impact.quantities import FREQUENCIES, RESULTS
 from thud.studies.blocks import read_dataset
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study_result import SampleResult
@@ -45,8 +45,8 @@ class Sweep(SampleResult):
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         for name, variable in self.dataset.data_vars.items():
             if variable.dtype.kind == "f":
-                quantity = ALL_QUANTITIES[str(name)]
-                bands = next((name for name in BANDS if name in variable.dims), None)
+                quantity = RESULTS[str(name)]
+                bands = next((name for name in FREQUENCIES if name in variable.dims), None)
                 for band in self.dataset[bands].values if bands else [None]:
                     values = variable.sel({bands: band}) if bands else variable
                     at = "" if band is None else f" {band:g} Hz"

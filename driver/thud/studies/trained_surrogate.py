@@ -152,7 +152,7 @@ class Surrogate(StudyResult):
     @property
     def assessed(self) -> NDArray[np.bool_]:
         """Whether the verdict depends on each number, shape (n_number,)."""
-        names = {f"{self.case.levels.force}_level", "contact_time", "restitution"}
+        names = {f"{self.case.levels.force}_octave", "contact_time", "restitution"}
         return np.repeat([name in names for name in self.outputs], list(self.outputs.values()))
 
     @property
@@ -287,7 +287,7 @@ class Surrogate(StudyResult):
             n: 10 ** (columns[:, 0] / 20) for n, columns in quantities.items()
         } | levels
         names = ("contact_time", "restitution")
-        level = f"{case.levels.force}_level"
+        level = f"{case.levels.force}_octave"
         mass_and_height = [
             samples.get(n, np.asarray(value_in(case, n))) for n in ("mass", "height")
         ]

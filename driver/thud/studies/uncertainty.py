@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.impact.quantities import ROOM_RATING
 from thud.level.assessment import octave_limits, wilson_interval
 from thud.level.levels import get_bands
 from thud.studies.sample_kind import SampleKind
@@ -96,8 +95,8 @@ class Uncertainty(SampleResult):
             share = np.mean((level >= lower[i]) & (level <= upper[i]))
             spread = f"{level.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
             rows.append((f"{band:g}", f"{level.mean():.2f}", *spread, f"{100 * share:.1f} %"))
-        if ROOM_RATING in self.dataset:
-            rating = self.dataset[ROOM_RATING].values[self.dataset["status"].values == 0]
+        if "room_rating" in self.dataset:
+            rating = self.dataset["room_rating"].values[self.dataset["status"].values == 0]
             low, high = np.quantile(rating, [0.025, 0.975])
             spread = f"{rating.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
             rows.append(("rating of the room", f"{rating.mean():.2f}", *spread, ""))
@@ -147,7 +146,7 @@ class UncertaintyKind(SampleKind[Uncertainty]):
             )
         return Uncertainty(
             dataset,
-            dataset[f"{study.case.levels.force}_level"].values[computed],
+            dataset[f"{study.case.levels.force}_octave"].values[computed],
             study.case.limits.source,
             int(dataset["conforms"].values[computed].sum()),
             int(computed.sum()),
