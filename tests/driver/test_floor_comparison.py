@@ -16,6 +16,7 @@ import thud
 from thud.base.bridge import ask
 from thud.case.case import case_text
 from thud.cli import main
+from thud.floors.prediction_text import rating_title
 from thud.floors.tapping import FREQUENCY
 
 if TYPE_CHECKING:
@@ -140,7 +141,7 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
     rows = {row[0]: row[1:] for row in found.rows()}
     assert rows[""] == ("thin", "thick")
     for name, rating in thin.ratings.items():
-        title = f"{thin.title_of(name)}, dB (standard uncertainty)"
+        title = f"{rating_title(thin, name)}, dB (standard uncertainty)"
         assert rows[title][0] == f"{rating.rounded} ({rating.uncertainty:.1f})"
     assert rows["class (KS F 2863-2)"] == ("no class", "no class")
     assert rows["63 Hz octave, dB"] == tuple(
@@ -295,13 +296,13 @@ def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:
     low = thud.predict_level(thud.solve(replace(case, drop=thud.Drop(height=0.1))))
     assert low.requirement is not None
     assert low.requirement.verdict == "undecided"
-    assert low.class_text == ""
+    assert low.korean_class is None
     assert "does not conform" in repr(low)
     assert "does not conform" not in repr(conforming)
     page = thud.compare_floors({"low": low, "standard": conforming})
     rows = {row[0]: row[1:] for row in page.rows()}
     assert rows["source"] == ("the source does not conform", "")
-    assert rows["class (KS F 2863-2)"] == ("", conforming.class_text.partition(" (")[0])
+    assert rows["class (KS F 2863-2)"] == ("", f"class {conforming.korean_class}")
     assert rows["required, dB"][0].startswith("49 (octaves): undecided")
     text = html.unescape(page.html())
     assert all(f"<li>{warning}</li>" in text for warning in page.warnings)

@@ -23,7 +23,6 @@ from thud.cli import main
 from thud.floors.prediction import _force_change
 from thud.impact.room_level import new_room_level
 from thud.level.assessment import octave_limits
-from thud.level.rating import class_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -597,7 +596,7 @@ def test_class_is_that_of_the_rating_of_octaves() -> None:
         found = thud.predict_level(floor=name, room=room)
         sums = 10 * np.log10((10 ** (found.level.reshape(4, 3) / 10)).sum(axis=1))
         assert found.rating.level == pytest.approx(thud.rating(sums).a_weighted, abs=0.03)
-        assert found.class_text == class_text(korean)
+        assert found.korean_class == korean
 
 
 @pytest.mark.parametrize("function", [thud.predict_level, thud.tapping_level, thud.solve])

@@ -201,7 +201,7 @@ def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     study = {**LUMPED, "surrogate": {"size": 128}}
     assert thud.surrogate(study).worst[1] < 0.01
     monkeypatch.setattr(samples, "solve_many", jump)
-    words = naming("floor octave 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
+    words = naming("floor level 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
     with pytest.raises(thud.NumericalError, match=words):
         thud.surrogate(study)
 

@@ -715,5 +715,5 @@ def test_samples_state_sources_that_do_not_conform() -> None:
         "parameters": {"plate.thickness": {"low": 0.14, "high": 0.2, "count": 2}},
     }
     shell = thud.sweep({"case": {**case, "model": {"name": "hollow_sphere"}}, **study})
-    assert "2 of 2 samples do not conform" in " ".join(shell.warnings)
+    assert "2 of 2 samples do not conform" in " ".join(map(str, shell.warnings))
     assert thud.sweep({"case": case, **study}).warnings == ()

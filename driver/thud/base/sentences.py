@@ -197,6 +197,40 @@ WARNINGS = {
         "the source does not conform ({octaves} from the nominal levels): the level in the room is "
         "not that of a standard source"
     ),
+    # Measured levels in rooms.
+    "few_positions": (
+        "levels of {value:g} of the {low:g} positions of the source that ISO 16283-2 asks for"
+    ),
+    "positions_differ": (
+        "the levels of two positions differ by {value:.0f} {unit} on average (up to {high:g} "
+        "{unit} is plausible)"
+    ),
+    "background_unknown": "the background is not known: levels are not corrected for it",
+    "near_background": (
+        "less than {low:g} {unit} above the background at {bands} Hz: levels there and the ratings "
+        "are upper bounds"
+    ),
+    "not_standardized": "not standardized: {missing} not stated",
+    # Fits of mobilities.
+    "mobility_implausible": (
+        "the mean mobility, {value:.2g} {unit}, is not that of a floor ({low:g} to {high:g} "
+        "{unit}): check the units (m and N, not mm or kN), and whether the values are of another "
+        "quantity, or an impedance"
+    ),
+    "real_part_negative": (
+        "the measured real part is negative at {value:.2g} {unit} of the frequencies, which is not "
+        "possible for a floor: the fit is nowhere negative"
+    ),
+    "mobility_misfit": "the fit differs from the measurement by {value:.0f} {unit}",
+    "passivity_misfit": (
+        "the condition of a passive floor increases the error of the fit from {low:.2g} {unit} to "
+        "{value:.2g} {unit}"
+    ),
+    # Sounds.
+    "sound_deviates": (
+        "the sound deviates from the prediction by {value:.1f} {unit} in an octave or in the "
+        "A-weighted level"
+    ),
     # Samples.
     "samples_failed": (
         "{value:.0f} of {high:.0f} samples have no results; most frequent reason: {reason}"

@@ -23,6 +23,7 @@ from thud.explorer.models import MODEL_FACTS
 from thud.explorer.motion import motion_of
 from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
+from thud.floors.prediction_text import class_text, rating_title
 from thud.impact.compute import compute
 from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
@@ -120,7 +121,7 @@ def answer_case(case: Case) -> Answer:
         answer["room"] = _room(prediction) | {"source": answer["headline"]}
         answer["headline"] = room_headline(prediction)
         known = answer["warnings"]
-        answer["warnings"] += [text for text in prediction.warnings if text not in known]
+        answer["warnings"] += [text for text in map(str, prediction.warnings) if text not in known]
     answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
     return answer
 
@@ -228,5 +229,7 @@ def _ratings_text(prediction: RoomPrediction) -> str:
     """Return the ratings, the class, and the levels of octaves."""
     octaves = zip(rated_bands("octave"), prediction.octave_level, strict=True)
     levels = ", ".join(f"{level:.1f} dB at {frequency:g} Hz" for frequency, level in octaves)
-    ratings = [f"{prediction.title_of(name)} {entry}" for name, entry in prediction.ratings.items()]
-    return "; ".join(filter(None, [*ratings, prediction.class_text, f"octaves {levels}"]))
+    ratings = [
+        f"{rating_title(prediction, name)} {entry}" for name, entry in prediction.ratings.items()
+    ]
+    return "; ".join(filter(None, [*ratings, class_text(prediction), f"octaves {levels}"]))

@@ -13,6 +13,7 @@ from scipy.special import exprel
 
 from thud.base.checks import refuse_value, require_whole
 from thud.base.immutable import Immutable
+from thud.base.note import Note
 from thud.export.sound_levels import (
     RATE,
     REFERENCE_PRESSURE,
@@ -20,7 +21,6 @@ from thud.export.sound_levels import (
     band_sections,
     fast_histories,
     fast_history,
-    get_deviation,
     maximum_levels,
     measured_levels,
 )
@@ -96,15 +96,11 @@ class FloorSound(Immutable):
         return f"<FloorSound {self.name}: {duration:.1f} s, L_AFmax {self.level.a_weighted:.1f} dB>"
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences on the prediction and on levels that deviate from it."""
-        result = list(self.prediction.warnings)
-        if (deviation := get_deviation(self.level, self.reference)) > MAX_DEVIATION:
-            result.append(
-                f"the sound deviates from the prediction by {deviation:.1f} dB in an octave or in "
-                "the A-weighted level"
-            )
-        return tuple(f"{self.name}: {sentence}" for sentence in result)
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings of the prediction, and of levels that deviate from it."""
+        deviation = self.level.deviation(self.reference)
+        note = Note("sound_deviates", value=deviation, high=MAX_DEVIATION, unit="dB")
+        return self.prediction.notes + (note,) * (deviation > MAX_DEVIATION)
 
     @property
     def description(self) -> str:
@@ -150,7 +146,7 @@ def _realization(
     for i in range(MAX_REALIZATIONS if len(envelopes) else 1):
         pressure = _with_noise(modal, envelopes, reference, (seed, i))
         level = measured_levels(pressure)
-        tried.append((get_deviation(level, reference), pressure, level))
+        tried.append((level.deviation(reference), pressure, level))
         if tried[-1][0] < TOLERANCE:
             break
     _, pressure, level = min(tried, key=itemgetter(0))

@@ -18,6 +18,7 @@ from thud.base.arguments import check_arguments
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
+from thud.export.wav import wav_file
 from thud.level.impact_result import DropForce, ImpactResult
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.channel import library
@@ -167,7 +168,6 @@ def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     exact. The comment of the WAV file and the text state it. Raise InputError if the sample rate is
     not a whole number.
     """
-    soundfile = library("soundfile", "WAV")
     rate = round(force.sample_rate)
     if rate != force.sample_rate:
         refuse(
@@ -177,13 +177,8 @@ def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     peak = float(np.abs(force.force).max())
     scale = 2.0 ** math.ceil(math.log2(peak)) if peak > 0 else 1.0
     lines = (f"Scale: {scale:g} N per full scale (calibration = {scale:g})", *force.header_lines())
-    content = io.BytesIO()
-    with soundfile.SoundFile(
-        content, "w", samplerate=rate, channels=1, subtype="FLOAT", format="WAV"
-    ) as file:
-        file.comment = "; ".join(lines)
-        file.write((force.force / scale).astype(np.float32))
-    return {path: content.getvalue(), f"{path}.txt": _lines(lines)}
+    content = wav_file(force.force / scale, rate, "; ".join(lines))
+    return {path: content, f"{path}.txt": _lines(lines)}
 
 
 def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_kind, require_number, require_whole
 from thud.base.display import Displayed
 from thud.base.files import replace_file
 from thud.export.floor_sound import SAMPLE_RATE, FloorSound, new_floor_sound
-from thud.export.sound_levels import REFERENCE_PRESSURE, summary
+from thud.export.sound_levels import REFERENCE_PRESSURE
 from thud.export.wav import wav_file
 from thud.floors.prediction import RoomPrediction
 from thud.level.levels import get_bands
@@ -67,7 +66,7 @@ class RoomSound(Displayed):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on the validity of the sounds, with the names of the floors."""
-        return tuple(sentence for sound in self.sounds for sentence in sound.warnings)
+        return tuple(f"{sound.name}: {note}" for sound in self.sounds for note in sound.notes)
 
     @property
     def comment(self) -> str:
@@ -88,16 +87,16 @@ class RoomSound(Displayed):
         rows = []
         for start, name in zip(self.starts, self.order, strict=True):
             sound = sounds[name]
-            pairs = zip(summary(sound.level), summary(sound.reference), strict=True)
+            pairs = zip(sound.level.shown, sound.reference.shown, strict=True)
             cells = [f"{level:.1f} ({level - reference:+z.1f})" for level, reference in pairs]
             place = "-" if sound.position is None else "{}, {}".format(*sound.position)
             rows.append((f"{start:.2f}", name, place, *cells))
         return [("start, s", "floor", "ball, microphone", *octaves, "L_AFmax, dB"), *rows]
 
     def wav(self) -> bytes:
-        """Return the content of the WAV file: one channel of 24 bit."""
+        """Return the content of the WAV file, of 24 bit; raise InputError without soundfile."""
         samples = self.pressure / self.full_scale
-        return wav_file(samples, self.sample_rate, self.comment, f"thud {version()}")
+        return wav_file(samples, self.sample_rate, self.comment, whole=True)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the WAV file, replacing an existing one; raise OSError if that is not possible."""

@@ -48,6 +48,15 @@ class SoundLevels(Immutable):
     octave: Array
     a_weighted: float
 
+    @property
+    def shown(self) -> Array:
+        """Levels of the octaves and the A-weighted level, dB, shape (5,)."""
+        return np.append(self.octave, self.a_weighted)
+
+    def deviation(self, reference: SoundLevels) -> float:
+        """Return the largest difference of octaves and A-weighted levels, dB."""
+        return float(abs(self.shown - reference.shown).max())
+
     def __repr__(self) -> str:
         """Return the A-weighted level."""
         return f"<SoundLevels: L_AFmax {self.a_weighted:.1f} dB>"
@@ -120,13 +129,3 @@ def maximum_levels(histories: Array, pressure: Array, n_known: int) -> SoundLeve
 def _level(history: Array) -> Array:
     """Return the maximum levels of histories of the squared pressure, dB."""
     return np.asarray(10 * np.log10(history.max(axis=-1) / REFERENCE_PRESSURE**2))
-
-
-def summary(level: SoundLevels) -> Array:
-    """Return the levels of the octaves and the A-weighted level, dB."""
-    return np.append(level.octave, level.a_weighted)
-
-
-def get_deviation(level: SoundLevels, reference: SoundLevels) -> float:
-    """Return the largest difference of octaves and A-weighted levels, dB."""
-    return float(abs(summary(level) - summary(reference)).max())

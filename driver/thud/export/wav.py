@@ -1,36 +1,42 @@
-"""WAV files of sound pressure: one channel of 24 bit with a comment."""
+"""WAV files of one channel, by soundfile."""
 
 from __future__ import annotations
 
-import struct
+import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base.bridge import version
+from thud.recordings.channel import library
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-BYTES = 3
-# Counts at full scale.
-COUNTS = 2 ** (8 * BYTES - 1)
-PCM = 1
+# Counts at full scale of 24 bit.
+_COUNTS = 2**23
+# Maximum number of bytes of a comment; libsndfile leaves out longer ones as a whole.
+_MAX_COMMENT = 32_000
 
 
-def wav_file(samples: NDArray[np.float64], sample_rate: int, comment: str, software: str) -> bytes:
-    """Return the content of a WAV file.
+def wav_file(
+    samples: NDArray[np.float64], sample_rate: int, comment: str, *, whole: bool = False
+) -> bytes:
+    """Return a WAV file with a comment, of floats of 32 bit or whole numbers of 24 bit.
 
-    The samples, shape (n_sample,), are fractions of full scale, between -1 and 1; the highest
-    code is one count below 1. Comment and software are the entries ICMT and ISFT of the INFO list,
-    in UTF-8.
+    The samples, shape (n_sample,), are fractions of full scale, between -1 and 1; the highest whole
+    number is one count below 1. Raise InputError if soundfile is not installed.
     """
-    counts = np.minimum(np.round(samples * COUNTS), COUNTS - 1).astype("<i4")
-    data = counts.view(np.uint8).reshape(-1, 4)[:, :BYTES].tobytes()
-    form = struct.pack("<HHIIHH", PCM, 1, sample_rate, BYTES * sample_rate, BYTES, 8 * BYTES)
-    info = _chunk(b"ICMT", comment.encode() + b"\0") + _chunk(b"ISFT", software.encode() + b"\0")
-    chunks = _chunk(b"fmt ", form) + _chunk(b"LIST", b"INFO" + info) + _chunk(b"data", data)
-    return _chunk(b"RIFF", b"WAVE" + chunks)
-
-
-def _chunk(name: bytes, content: bytes) -> bytes:
-    """Return a chunk: name, length, content, and a byte that makes an odd length even."""
-    return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
+    content = io.BytesIO()
+    with library("soundfile", "WAV").SoundFile(
+        content, "w", sample_rate, 1, "PCM_24" if whole else "FLOAT", format="WAV"
+    ) as file:
+        file.comment = comment.encode()[:_MAX_COMMENT].decode(errors="ignore")
+        file.software = f"thud {version()}"
+        if whole:
+            # soundfile writes the upper 24 of 32 bit.
+            counts = np.minimum(np.round(samples * _COUNTS), _COUNTS - 1)
+            file.write(counts.astype(np.int32) << 8)
+        else:
+            file.write(samples.astype(np.float32))
+    return content.getvalue()

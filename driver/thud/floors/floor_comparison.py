@@ -15,6 +15,7 @@ from thud.base.files import Page
 from thud.case.case import Case
 from thud.case.constructions import Construction, with_floor
 from thud.floors.prediction import RoomPrediction, predict_level
+from thud.floors.prediction_text import rating_text, rating_title, source_note
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
 from thud.level.rating import rated_bands
@@ -47,7 +48,7 @@ class FloorComparison(Displayed, Page):
         floors: dict[str, list[str]] = {}
         for name, prediction in self.predictions.items():
             for warning in prediction.warnings:
-                floors.setdefault(warning, []).append(name)
+                floors.setdefault(str(warning), []).append(name)
         return [f"{', '.join(names)}: {warning}" for warning, names in floors.items()]
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -56,7 +57,7 @@ class FloorComparison(Displayed, Page):
         titled = min(self.predictions.values(), key=lambda prediction: prediction.is_ball)
         titles = (
             "", "floor", "force", "source",
-            *(f"{titled.title_of(name)}, dB (standard uncertainty)" for name in RATINGS),
+            *(f"{rating_title(titled, name)}, dB (standard uncertainty)" for name in RATINGS),
             "class (KS F 2863-2)", "required, dB",
             *(f"{frequency:g} Hz octave, dB" for frequency in rated_bands("octave")),
             "energy into the bearing floor, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
@@ -85,11 +86,8 @@ class FloorComparison(Displayed, Page):
 
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
-        items = self.predictions.items()
-        result = (
-            ", ".join(filter(None, (f"{name} {p.sentence}", p.source_note))) for name, p in items
-        )
-        return f"<FloorComparison: {', '.join(result)}>"
+        floors = (f"{name} {rating_text(entry)}" for name, entry in self.predictions.items())
+        return f"<FloorComparison: {', '.join(floors)}>"
 
 
 def compare_floors(
@@ -141,8 +139,7 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
         prediction.force,
         _source(prediction),
         *(f"{rating.rounded} ({rating.uncertainty:.1f})" for rating in prediction.ratings.values()),
-        # In few words, as the columns are as wide as their cells.
-        prediction.class_text.partition(" (")[0],
+        _class(prediction),
         _required(prediction),
         *(f"{level:.1f}" for level in prediction.octave_level),
         f"{1e3 * prediction.energy.sum():.3g}",
@@ -150,11 +147,16 @@ def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
     )
 
 
+def _class(prediction: RoomPrediction) -> str:
+    """Return the class in few words, as columns are as wide as their cells; empty without one."""
+    korean = prediction.korean_class
+    return "" if korean is None else f"class {korean}" if korean else "no class"
+
+
 def _source(prediction: RoomPrediction) -> str:
     """Return the source, or what is wrong with it; empty for a ball that conforms."""
-    if prediction.is_ball:
-        return prediction.source_note
-    return ", ".join(filter(None, (str(prediction.source.limits_source), prediction.source_note)))
+    name = "" if prediction.is_ball else str(prediction.source.limits_source)
+    return ", ".join(filter(None, (name, source_note(prediction))))
 
 
 def _required(prediction: RoomPrediction) -> str:

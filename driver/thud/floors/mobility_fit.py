@@ -26,6 +26,7 @@ from thud.base.checks import (
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import data_frame
+from thud.base.note import Note
 from thud.base.units import UNITS, find_unit
 from thud.case.case import Case
 from thud.impact.mobility import mobility
@@ -149,22 +150,16 @@ class MobilityFit(Displayed):
         return result
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences on possible faults of the fit."""
+    def warnings(self) -> tuple[Note, ...]:
+        """Possible faults of the measurement and the fit."""
         result = _unit_warnings(self.measured)
-        negative = np.mean(self.measured.real < 0)
-        if negative > 0:
-            result.append(
-                f"the measured real part is negative at {100 * negative:.2g} % of the frequencies, "
-                "which is not possible for a floor: the fit is nowhere negative"
-            )
+        error, free_error = 100 * self.error, 100 * self.free_error
+        if (negative := 100 * float(np.mean(self.measured.real < 0))) > 0:
+            result.append(Note("real_part_negative", value=negative, unit="%"))
         if self.error > _MAX_ERROR:
-            result.append(f"the fit differs from the measurement by {100 * self.error:.0f} %")
+            result.append(Note("mobility_misfit", value=error, high=100 * _MAX_ERROR, unit="%"))
         elif self.error > _MAX_INCREASE * self.free_error and self.error > _MIN_ERROR:
-            result.append(
-                f"the condition of a passive floor increases the error of the fit from "
-                f"{100 * self.free_error:.2g} % to {100 * self.error:.2g} %"
-            )
+            result.append(Note("passivity_misfit", value=error, low=free_error, unit="%"))
         return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -267,7 +262,7 @@ def fit_mobility(
             return _best_fit(name, frequency, values)
         return _fit(name, frequency, values, order)
     except ThudError as error:
-        message = "; ".join([f"{label}: {error}", *_unit_warnings(values)])
+        message = "; ".join([f"{label}: {error}", *map(str, _unit_warnings(values))])
         raise type(error)(message) from error
 
 
@@ -295,18 +290,13 @@ def _require_octave(label: str, frequency: Array) -> None:
         )
 
 
-def _unit_warnings(values: NDArray[np.complex128]) -> list[str]:
+def _unit_warnings(values: NDArray[np.complex128]) -> list[Note]:
     """Return a warning of mobilities, m/(N s), that no floor has; otherwise nothing."""
-    mean = np.exp(np.mean(np.log(np.abs(values))))
+    mean = float(np.exp(np.mean(np.log(np.abs(values)))))
     low, high = _PLAUSIBLE
-    if low <= mean <= high:
-        return []
-    message = (
-        f"the mean mobility, {mean:.2g} m/(N s), is not that of a floor ({low:g} to {high:g} "
-        "m/(N s)): check the units (m and N, not mm or kN), and whether the values are of another "
-        "quantity, or an impedance"
-    )
-    return [message]
+    is_plausible = low <= mean <= high
+    note = Note("mobility_implausible", value=mean, low=low, high=high, unit="m/(N s)")
+    return [] if is_plausible else [note]
 
 
 def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:

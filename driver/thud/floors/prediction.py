@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base._schema import RATINGS, VERDICTS, Room
+from thud.base._schema import LIMITS, VERDICTS, Room
 from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
@@ -16,17 +16,18 @@ from thud.base.display import Displayed
 from thud.base.note import Note
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
+from thud.floors import prediction_text
 from thud.floors.survey import RoomLevels
 from thud.impact.compute import compute, new_floor_impact
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.room_level import RoomLevel, new_room_level
+from thud.level.assessment import criterion_quantity
 from thud.level.impact_result import ImpactResult
-from thud.level.levels import BANDWIDTHS, SOURCES, force_exposure_levels
+from thud.level.levels import BANDWIDTHS, SOURCES
 from thud.level.rating import (
     PredictedRating,
     Requirement,
     class_of,
-    class_text,
     rating,
     standardized_level,
 )
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import FloorOptions, RoomRating
+    from thud.base._schema import FloorOptions
 
     Array = NDArray[np.float64]
 
@@ -85,21 +86,12 @@ class RoomPrediction(RoomLevel, Displayed):
         """Whether the source is the rubber ball, for which the standards define L_iA,Fmax."""
         return self.source.limits_source in {None, SOURCES[0]}
 
-    def title_of(self, name: RoomRating) -> str:
-        """Return the title of a rating, with its standard if the source is the ball."""
-        return RATINGS[name] if self.is_ball else f"A-weighted level ({name})"
-
     @property
-    def source_note(self) -> str:
-        """``"the source does not conform"``, which belongs beside each rating, or empty."""
-        return "the source does not conform" if self.source_notes else ""
-
-    @property
-    def class_text(self) -> str:
-        """Class of the rating of octaves (KS F 2863-2); empty unless for a ball that conforms."""
+    def korean_class(self) -> int | None:
+        """Class of the rating of octaves (KS F 2863-2), 0 for none; None unless a ball conforms."""
         if not self.is_ball or self.source_notes:
-            return ""
-        return class_text(class_of(self.ratings["octaves"].level))
+            return None
+        return class_of(self.ratings["octaves"].level)
 
     @property
     def radiated_share(self) -> Array:
@@ -129,11 +121,6 @@ class RoomPrediction(RoomLevel, Displayed):
             return None
         verdict = VERDICTS[-1] if self.source_notes else self.verdict
         return Requirement(self.room.required, self.rating, self.probability, verdict)
-
-    @property
-    def sentence(self) -> str:
-        """The rating with its uncertainty and, with a requirement, the probability to meet it."""
-        return str(self.requirement or self.rating)
 
     @property
     def standardized(self) -> Array:
@@ -197,9 +184,8 @@ class RoomPrediction(RoomLevel, Displayed):
 
     def __repr__(self) -> str:
         """Return rating, requirement and what is wrong with the source."""
-        title = self.title_of(self.room.rating)
-        text = ", ".join(filter(None, (self.sentence, self.source_note)))
-        return f"<RoomPrediction: {title} {text}>"
+        title = prediction_text.rating_title(self, self.room.rating)
+        return f"<RoomPrediction: {title} {prediction_text.rating_text(self)}>"
 
 
 @check_arguments
@@ -255,9 +241,9 @@ def predict_level(
         assert level is not None  # noqa: S101 - the answer of this question has a room
     if impact:
         blocked = (
-            source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
+            source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak_force
         )
-        change = 20 * math.log10(impact.peak("floor") / blocked)
+        change = 20 * math.log10(impact.peak_force / blocked)
     else:
         change = _force_change(source.mass, source.contact_time, 1 / level.conductance.max())
     return RoomPrediction(
@@ -272,17 +258,16 @@ def predict_level(
 
 
 def _source_notes(source: ImpactResult) -> tuple[Note, ...]:
-    """Return a note if octave levels of the force on a rigid floor do not conform."""
+    """Return a note if octave levels of the force on a rigid floor do not conform to standards."""
     levels = (
-        force_exposure_levels(source.blocked_force, source.sample_rate)
-        if isinstance(source, FloorImpact)
-        else source.levels(BANDWIDTHS[0], force="floor")
+        source.blocked_levels() if isinstance(source, FloorImpact) else source.levels(force="floor")
     )
-    octaves = [c for c in source.assess(force="floor").criteria if c.name.startswith("octave_")]
+    # The octaves are the first criteria.
+    octaves = zip(LIMITS[source.limits_source or SOURCES[0]], levels, strict=False)
     outside = [
-        f"{octave.quantity.title} {level - (octave.lower + octave.upper) / 2:.1f} dB"
-        for octave, level in zip(octaves, levels, strict=True)
-        if not octave.lower <= level <= octave.upper
+        f"{criterion_quantity(name).title} {level - (lower + upper) / 2:.1f} dB"
+        for (name, _, lower, upper), level in octaves
+        if not lower <= level <= upper
     ]
     if not outside:
         return ()
@@ -295,19 +280,16 @@ def _on_floor(source: ImpactResult, case: Case) -> tuple[FloorImpact | None, Roo
     Also return the level in its room if the impact is computed again.
     """
     existing = source if isinstance(source, FloorImpact) else source.on_floor
-    known = source.case
-    if known.model is None or (known.floor, _air(known)) == (case.floor, _air(case)):
+    known, room = source.case, source.case.room or Room()
+    air = room.air_density, room.sound_speed
+    assert case.room is not None  # noqa: S101 - for the type checker
+    is_same = (known.floor, *air) == (case.floor, case.room.air_density, case.room.sound_speed)
+    if known.model is None or is_same:
         return existing, None
     plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
     answer = ask("floor_impact", case=case_text(plain))
     return new_floor_impact(case, answer, blocked), new_room_level(answer)
-
-
-def _air(case: Case) -> tuple[float, float]:
-    """Return density, kg/m3, and speed of sound, m/s, of the air around the floor of a case."""
-    room = case.room or Room()
-    return room.air_density, room.sound_speed
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from thud.base.bridge import ask
 from thud.base.checks import refuse
 from thud.base.display import Displayed
+from thud.base.note import Note
 from thud.level.levels import BANDWIDTHS
 from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
 from thud.recordings.table import read_table
@@ -34,8 +35,10 @@ if TYPE_CHECKING:
 # Rounded mid frequencies in a decade (ISO 3, R10), and the relative tolerance of frequencies.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
 FREQUENCY_TOLERANCE = 0.03
-# Minimum number of positions (ISO 16283-2).
+# Minimum number of positions, and distance to the background, dB, below which a level is an upper
+# bound (ISO 16283-2).
 MIN_POSITIONS = 4
+MIN_DISTANCE = 6.0
 # Titles of the kinds of columns in English, German, Korean and Japanese, in lower case, letters
 # only; those of positions may have a number. A column of a mean stands for all positions.
 WORDS = {
@@ -149,34 +152,27 @@ class RoomLevels(Displayed):
         return float(10 / math.log(10) * error)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences on possible faults of the levels and ratings."""
+    def warnings(self) -> tuple[Note, ...]:
+        """Possible faults of the levels and ratings."""
         result = []
-        if len(self.positions) < MIN_POSITIONS:
-            result.append(
-                f"levels of {self._count}; ISO 16283-2 asks for {MIN_POSITIONS} positions of the "
-                "source or more"
-            )
+        if (count := len(self.positions)) < MIN_POSITIONS:
+            result.append(Note("few_positions", value=count, low=MIN_POSITIONS))
         difference = float(np.ptp(self.positions.mean(axis=1)))
         if difference > MAX_DIFFERENCE:
-            result.append(f"the levels of two positions differ by {difference:.0f} dB on average")
+            result.append(
+                Note("positions_differ", value=difference, high=MAX_DIFFERENCE, unit="dB")
+            )
         if self.background is None:
-            result.append("the background is not known: levels are not corrected for it")
+            result.append(Note("background_unknown"))
         elif self.is_upper_bound.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_upper_bound])
             result.append(
-                f"less than 6 dB above the background at {bands} Hz: levels there and the ratings "
-                "are upper bounds"
+                Note("near_background", low=MIN_DISTANCE, unit="dB", others={"bands": bands})
             )
-        missing = [
-            name
-            for name, value in (
-                ("reverberation times", self.reverberation_time), ("the volume", self.volume)
-            )
-            if value is None
-        ]  # fmt: skip
-        if missing:
-            result.append(f"not standardized: {' and '.join(missing)} not stated")
+        stated = {"reverberation times": self.reverberation_time, "the volume": self.volume}
+        if missing := [name for name, value in stated.items() if value is None]:
+            others = {"missing": " and ".join(missing)}
+            result.append(Note("not_standardized", others=others))
         return tuple(result)
 
     def rows(self) -> list[tuple[str, ...]]:

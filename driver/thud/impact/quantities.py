@@ -20,9 +20,10 @@ DIMENSIONS = LEVELS | {"room_third": "rated_third"}
 
 def _level(name: str) -> Quantity:
     """Return the declaration of the levels of a force."""
-    force, _, _ = name.partition("_")
+    force, bands = name.split("_")
     meaning = f"force exposure level of the {force} force, re 1 N and 1 s"
-    return Quantity(name, f"{force} level", "L_{FE}", "dB", "dB", 1.0, 2, meaning)
+    title = f"{force} level" if bands == "octave" else f"{force} {bands} level"
+    return Quantity(name, title, "L_{FE}", "dB", "dB", 1.0, 2, meaning)
 
 
 def _number(name: str, meaning: str) -> Quantity:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.display import html_text
+from thud.floors.prediction_text import rating_title
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
@@ -348,6 +349,8 @@ def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:
     )  # fmt: skip
     axes.set_yticks(y, [escape_label(fill(name, _NAME)) for name in comparison.predictions])
     axes.set_ylim(len(y) - 0.4, -0.6)
-    titles = {p.title_of(p.room.rating).replace("L_iA,Fmax", RATING_SYMBOL) for p in predictions}
+    titles = {
+        rating_title(p, p.room.rating).replace("L_iA,Fmax", RATING_SYMBOL) for p in predictions
+    }
     title = titles.pop() if len(titles) == 1 else "Ratings that the rooms ask for"
     axes.set_xlabel("\n(".join(title.split(" (")) + ", dB")

@@ -11,6 +11,7 @@ from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text
 from thud.base.workbooks import workbook
+from thud.floors.prediction_text import source_note
 from thud.level.rating import rated_bands
 from thud.report.predicted_floor import CAVEAT, sheets, tables, verdict_text
 
@@ -34,7 +35,7 @@ def screen_text(floor: PredictedFloor) -> str:
     octaves = zip(rated_bands("octave"), prediction.octave_level, strict=True)
     lines = [
         floor.name,
-        f"  {title}: {', '.join(filter(None, (text, prediction.source_note)))}",
+        f"  {title}: {', '.join(filter(None, (text, source_note(prediction))))}",
         *([f"  {verdict}"] if (verdict := verdict_text(prediction)) else []),
         f"  {CAVEAT.capitalize()}",
         *(f"    {title}: {text}" for title, _, _, text in others),

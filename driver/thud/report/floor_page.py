@@ -9,6 +9,7 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.case.keys import humanize
+from thud.floors.prediction_text import class_text, rating_title, source_note
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.report.fonts import FAMILY
 from thud.report.markup import css_string, escaped, inline_svg, labeled, notes, pair_rows, symbols
@@ -183,7 +184,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         resonances=escaped(_about_resonances(prediction)),
         computation=escaped(_about_computation(floor)),
         model=escaped(ABOUT_MODEL),
-        warnings=notes("Warnings", prediction.warnings or ["none"]),
+        warnings=notes("Warnings", [*map(str, prediction.warnings or ["none"])]),
         footer=escaped(f"thud {version()} · predicted, not measured · end of report"),
     )
     return PAGE.substitute(
@@ -208,9 +209,9 @@ def _box(floor: PredictedFloor) -> list[str]:
     name = prediction.room.rating
     lines = [
         verdict_text(prediction),
-        f"{prediction.title_of(name)} in the room below, 50 to 630 Hz",
-        prediction.class_text * (name == "octaves"),
-        prediction.source_note.capitalize(),
+        f"{rating_title(prediction, name)} in the room below, 50 to 630 Hz",
+        class_text(prediction) * (name == "octaves"),
+        source_note(prediction).capitalize(),
         CAVEAT.capitalize(),
     ]
     return [*filter(None, lines)]

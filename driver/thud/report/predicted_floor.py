@@ -25,6 +25,7 @@ from thud.base.units import display_unit
 from thud.case.constructions import Layer
 from thud.case.keys import humanize
 from thud.floors.prediction import BANDS, predict_level
+from thud.floors.prediction_text import class_text, rating_title, source_note
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.levels import get_bands
 from thud.level.rating import rated_bands
@@ -141,11 +142,12 @@ class PredictedFloor:
     def ratings(self) -> list[tuple[str, float, float, str]]:
         """Title, value, standard uncertainty, dB, and text of each rating, the asked one first."""
         prediction = self.prediction
-        classes = prediction.class_text and f"; KS F 2863-2: {prediction.class_text}"
+        korean = class_text(prediction)
+        classes = korean and f"; KS F 2863-2: {korean}"
         ratings = sorted(prediction.ratings.values(), key=lambda entry: entry != prediction.rating)
         return [
             (
-                prediction.title_of(entry.name), entry.level, entry.uncertainty,
+                rating_title(prediction, entry.name), entry.level, entry.uncertainty,
                 f"{entry}{classes if entry.name == 'octaves' else ''}",
             )
             for entry in ratings
@@ -262,7 +264,7 @@ def verdict_text(prediction: RoomPrediction) -> str:
     text = f"{required.chance}: {required.verdict}"
     if required.verdict != "undecided":
         return text
-    return f"{text}; {prediction.source_note or f'to decide it: {remedy(prediction)}'}"
+    return f"{text}; {source_note(prediction) or f'to decide it: {remedy(prediction)}'}"
 
 
 def difference_text(change: Change) -> str:
@@ -346,7 +348,7 @@ def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
     warnings: list[Cells] = [("floor", "warning")]
     for floor in floors:
         assumptions += [(floor.name, *row) for row in floor.assumptions[1:]]
-        warnings += [(floor.name, warning) for warning in floor.prediction.warnings]
+        warnings += [(floor.name, str(warning)) for warning in floor.prediction.warnings]
     return {"assumptions": assumptions, "warnings": warnings}
 
 

@@ -27,8 +27,8 @@ from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OUTPUT_GROUP, value_in, with_values
+from thud.impact.quantities import FREQUENCIES, LEVELS, RESULTS
 from thud.level.assessment import get_criteria
-from thud.level.levels import get_bands
 from thud.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
@@ -144,9 +144,8 @@ class Surrogate(StudyResult):
         """Labels of all numbers."""
         result = []
         for name, count in self.outputs.items():
-            words = name.replace("_", " ")
-            bands = get_bands("third" if "third" in name else "octave").nominal
-            result += [f"{words} {band:g} Hz" for band in bands] if count > 1 else [words]
+            title, bands = RESULTS[name].title, FREQUENCIES.get(LEVELS.get(name, ""), ())
+            result += [f"{title} {band:g} Hz" for band in bands] if count > 1 else [title]
         return result
 
     @property
