@@ -64,15 +64,15 @@ MAX_DEVIATION = 0.5
 class FloorSound(Immutable):
     """Sound of one impact in the room below a floor.
 
+    That of the first `RoomPrediction.n_modal` bands is the sound of the modes of floor and room,
+    that of the others is noise.
+
     Attributes
     ----------
     name : str
         Name of the floor.
     prediction : RoomPrediction
         The prediction that the sound represents.
-    n_modal : int
-        Number of bands, from the lowest, whose sound is that of the modes of floor and room; the
-        sound of the others is noise.
     position : tuple of int or None
         Numbers of the positions of ball and microphone, from 1; None without modal bands.
     pressure : ndarray, shape (n_sample,)
@@ -84,7 +84,6 @@ class FloorSound(Immutable):
 
     name: str
     prediction: RoomPrediction
-    n_modal: int
     position: tuple[int, int] | None
     pressure: Array
     level: SoundLevels
@@ -105,15 +104,15 @@ class FloorSound(Immutable):
     @property
     def description(self) -> str:
         """Bands of the modal sound and of the noise."""
-        bands = rated_bands(BANDS)
+        bands, n_modal = rated_bands(BANDS), self.prediction.n_modal
         parts = []
         if self.position is not None:
             parts.append(
-                f"modes of floor and room from {bands[0]:g} to {bands[self.n_modal - 1]:g} Hz at "
+                f"modes of floor and room from {bands[0]:g} to {bands[n_modal - 1]:g} Hz at "
                 "ball position {} and microphone position {}".format(*self.position)
             )
-        if self.n_modal < len(bands):
-            parts.append(f"noise from {bands[self.n_modal]:g} to {bands[-1]:g} Hz")
+        if n_modal < len(bands):
+            parts.append(f"noise from {bands[n_modal]:g} to {bands[-1]:g} Hz")
         return ", ".join(parts)
 
 
@@ -135,7 +134,7 @@ def new_floor_sound(
     envelopes = np.sqrt(square)
     pressure, level = _realization(modal, envelopes, reference, seed)
     pressure = resample(pressure, RATIO * len(pressure))
-    return FloorSound(name, prediction, n_modal, position, pressure, level, reference)
+    return FloorSound(name, prediction, position, pressure, level, reference)
 
 
 def _realization(

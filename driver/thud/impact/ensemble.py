@@ -138,9 +138,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         columns, numbers = _columns(varied, base)
     except MemoryError as error:
         refuse("the parameters do not fit in memory", "fewer samples", error)
-    for name in columns:
-        if name in keywords or (name == "source" and source is not None):
-            refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
+    for name in {*keywords, *(["source"] if source else [])} & columns.keys():
+        refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
     n_thread = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", n_thread, 1, MAX_THREADS)
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
@@ -162,15 +161,12 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
                 rate = len(block) / (time.perf_counter() - began)
                 block_size = int(np.clip(_CALL_TIME * rate, 1, max(1, max_count)))
                 bar.update(len(block))
-        results = (
-            blocks[0]
-            if len(blocks) == 1
-            else {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
-        )
+        results, *more = blocks
+        if more:
+            results = {name: np.concatenate([block[name] for block in blocks]) for name in results}
     except MemoryError as error:
-        size = f"{len(numbers)} samples"
-        size += f" with forces of {length} values" if forces else ""
-        refuse(f"forces = {forces} for {size} does not fit in memory", "fewer samples", error)
+        size = f"{len(numbers)} samples with forces of {length} values"
+        refuse(f"forces = {forces}: {size} do not fit in memory", "fewer samples", error)
     # Forces may fill the memory; `Ensemble` does not copy frozen arrays.
     force = freeze(results.pop("force"))
     return Ensemble(
@@ -232,9 +228,9 @@ def _columns(
 def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
     """Return the numbers of a parameter; a choice is represented by its index, from 1."""
     if key.kind == "choice":
-        choices, index = np.unique(array.astype(str), return_inverse=True)
-        for choice in choices:
-            require_choice(key.name, str(choice), key.choices)
-        indices = np.array([key.choices.index(choice) + 1.0 for choice in choices])
-        return indices[index].reshape(array.shape)
+        words = array.astype(str)
+        for word in np.unique(words):
+            require_choice(key.name, str(word), key.choices)
+        numbers = np.arange(1.0, len(key.choices) + 1)
+        return np.select([words == word for word in key.choices], list(numbers))
     return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")

@@ -11,12 +11,11 @@ import numpy as np
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.arguments import check_arguments
 from thud.base.bridge import ask, notes, without_units
-from thud.base.checks import refuse, require_kind
+from thud.base.checks import refuse, require_array, require_kind, require_real
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
-from thud.base.files import replace_file
 from thud.case.case import Case, case_text
-from thud.impact.mesh_files import require_ending, vtu_file
+from thud.impact.mesh_files import write_vtu
 
 if TYPE_CHECKING:
     import os
@@ -81,8 +80,7 @@ class FreeModes(Displayed):
             If the file cannot be written.
         """
         names = (f"mode {i}, {f:.3f} Hz" for i, f in enumerate(self.frequency, 1))
-        shapes = dict(zip(names, self.shape, strict=True))
-        replace_file(require_ending(path, ".vtu"), vtu_file(self.start, shapes))
+        write_vtu(path, self.start, dict(zip(names, self.shape, strict=True)))
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -163,11 +161,8 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
         Loss modulus divided by storage modulus.
     """
     require_kind("model", model, FiniteElement)
-    try:
-        frequencies = np.ascontiguousarray(frequency, dtype=np.float64)
-    except (TypeError, ValueError):
-        frequencies = np.array([])
-    if frequencies.ndim != 1 or not frequencies.size or not np.all(frequencies > 0):
+    frequencies = require_real("frequency", require_array("frequency", frequency, (1,)))
+    if not frequencies.size or not (frequencies > 0).all():
         refuse("frequency is not allowed", "a list of frequencies above 0, Hz")
     answer = ask("loss_factors", case=case_text(Case(model=model)), frequency=frequencies)
     return np.asarray(answer["loss_factors"])

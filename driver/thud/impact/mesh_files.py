@@ -10,6 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.extras import require_extra
+from thud.base.files import replace_file
 
 if TYPE_CHECKING:
     import os
@@ -18,33 +19,36 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def vtu_file(position: NDArray[np.float64], values: Mapping[str, NDArray[np.float64]]) -> bytes:
-    """Return a VTU file of quadrilaterals; distance from the axis and height become x and y.
+def write_vtu(
+    path: str | os.PathLike[str],
+    position: NDArray[np.float64],
+    values: Mapping[str, NDArray[np.float64]],
+) -> None:
+    """Write a VTU file of quadrilaterals; distance from the axis and height become x and y.
 
     Parameters
     ----------
+    path
+        Path of the file, which ends with ``.vtu``; raise InputError otherwise.
     position : ndarray, shape (n_line, n_ring, 2)
         Positions of the nodes, m.
     values
         Values at the nodes by name, shape (n_line, n_ring) or, of vectors, (n_line, n_ring, 2).
     """
+    target = require_ending(path, ".vtu")
     with require_extra("meshes"):
         import meshio
     node = np.arange(position[..., 0].size).reshape(position.shape[:2])
     corners = (node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1])
-    cells = np.stack(corners, axis=-1).reshape(-1, 4)
-    mesh = meshio.Mesh(
-        _in_space(position),
-        [("quad", cells)],
-        point_data={
-            name: _in_space(field) if field.ndim > position.ndim - 1 else field.ravel()
-            for name, field in values.items()
-        },
-    )
+    fields = {
+        name: _in_space(field) if field.ndim == position.ndim else field.ravel()
+        for name, field in values.items()
+    }
+    cells = [("quad", np.stack(corners, axis=-1).reshape(-1, 4))]
     with TemporaryDirectory() as folder:
         file = Path(folder, "mesh.vtu")
-        mesh.write(file)
-        return file.read_bytes()
+        meshio.Mesh(_in_space(position), cells, point_data=fields).write(file)
+        replace_file(target, file.read_bytes())
 
 
 def require_ending(path: str | os.PathLike[str], ending: str) -> Path:

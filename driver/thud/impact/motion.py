@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.files import replace_file
 from thud.base.immutable import Immutable
-from thud.impact.mesh_files import require_ending, vtu_file
+from thud.impact.mesh_files import require_ending, write_vtu
 
 if TYPE_CHECKING:
     import os
@@ -87,7 +87,7 @@ class Motion(Immutable):
                 "cavity_pressure": self._on_ring(self.cavity_pressure[i], 0),
                 "floor_displacement": np.full(self.start.shape[:2], self.floor_displacement[i]),
             }
-            replace_file(file, vtu_file(self.position[i], values))
+            write_vtu(file, self.position[i], values)
         collection = ET.Element("VTKFile", type="Collection", version="0.1")
         times = ET.SubElement(collection, "Collection")
         for time, file in zip(self.time, files, strict=True):

@@ -63,8 +63,6 @@ class RoomLevel(Immutable):
         Length, width and height of the room, m.
     n_modal : int
         Number of bands, from the lowest, that are computed by the modes.
-    crossover : float
-        Frequency at which three modes of the room overlap, Hz.
     ratings : mapping of str to PredictedRating
         Single-number ratings: ``"octaves"``, ``"thirds"`` and ``"standardized"``.
     probability : float
@@ -91,7 +89,6 @@ class RoomLevel(Immutable):
     volume: float
     size: tuple[float, float, float]
     n_modal: int
-    crossover: float
     ratings: Mapping[RoomRating, PredictedRating]
     probability: float
     verdict: str
@@ -129,7 +126,6 @@ def new_room_level(answer: Bundle) -> RoomLevel:
         volume=room["volume"],
         size=(length, width, height),
         n_modal=int(room["n_modal"]),
-        crossover=room["crossover"],
         ratings={
             name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
             for name, level in zip(RATINGS, summary["level"], strict=True)
