@@ -66,7 +66,7 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     )
     assert exact.floor.direct == pytest.approx(2e-6, rel=1e-6)
     assert exact.error < 1e-10
-    assert not exact.warnings
+    assert not exact.notes
     assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
     assert exact.values["damping_ratio(2)"] == exact.floor.damping_ratio[1]
     table = exact.to_dataframe()
@@ -77,7 +77,7 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
 def test_plausible_floors_raise_no_warning_of_units(name: str) -> None:
     frequency = np.linspace(20.0, 700.0, 200)
     values = thud.mobility(thud.construction(name).floor, frequency)
-    found = thud.fit_mobility((frequency, values)).warnings
+    found = thud.fit_mobility((frequency, values)).notes
     assert "mobility_implausible" not in [note.code for note in found]
 
 
@@ -85,7 +85,7 @@ def test_plausible_floors_raise_no_warning_of_units(name: str) -> None:
 def test_implausible_unit_raises_a_warning(factor: float) -> None:
     frequency = np.linspace(20.0, 700.0, 200)
     values = factor * thud.mobility(thud.construction("concrete 180").floor, frequency)
-    warnings = thud.fit_mobility((frequency, values), order=8).warnings
+    warnings = thud.fit_mobility((frequency, values), order=8).notes
     assert warnings[0].code == "mobility_implausible"
     assert not warnings[0].low <= warnings[0].value <= warnings[0].high
 
@@ -271,7 +271,7 @@ def test_orders_that_fail_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> No
 def test_negative_lines_raise_a_warning_and_left_out() -> None:
     values = MOBILITY - 2 * MOBILITY.real * (np.arange(300) % 10 == 0)
     found = thud.fit_mobility((FREQUENCY, values), order=8)
-    assert (found.warnings[0].code, found.warnings[0].value) == ("real_part_negative", 10.0)
+    assert (found.notes[0].code, found.notes[0].value) == ("real_part_negative", 10.0)
     assert found.mobility(np.geomspace(0.1, 1e6, 5000)).real.min() >= 0
 
 
@@ -469,7 +469,7 @@ def test_fits_that_miss_raise_a_warning(
     exact: thud.MobilityFit, factor: float, free_error: float, count: int
 ) -> None:
     found = replace(scaled_fit(exact, np.full(300, factor)), free_error=free_error)
-    assert len(found.warnings) == count
+    assert len(found.notes) == count
 
 
 def test_number_of_poles_has_the_least_information_criterion(

@@ -167,7 +167,7 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
     energy = np.array([10 ** (thud.rating(one).a_weighted / 10) for one in levels])
     error = energy.std(ddof=1) / np.sqrt(6) / energy.mean() * 10 / np.log(10)
     assert found.position_uncertainty == pytest.approx(error)
-    assert "near_background" in [note.code for note in found.warnings]
+    assert "near_background" in [note.code for note in found.notes]
 
 
 @pytest.mark.parametrize(
@@ -245,7 +245,7 @@ def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
 def test_column_that_hardly_is_a_position_raises_a_warning(tmp_path: Path) -> None:
     rows = "".join(f"{f},60,30\n" for f in (63, 125, 250, 500))
     (tmp_path / "levels.csv").write_text(f"frequency,P1,P2\n{rows}")
-    warnings = thud.read_room_levels(tmp_path / "levels.csv").warnings
+    warnings = thud.read_room_levels(tmp_path / "levels.csv").notes
     assert ("positions_differ", 30.0) in [(note.code, note.value) for note in warnings]
     # A known title is no position.
     rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
@@ -296,7 +296,7 @@ def test_class_is_the_best_one_whose_limit_is_kept() -> None:
     ],
 )
 def test_each_weakness_of_a_survey_raises_a_warning(change: dict[str, object], count: int) -> None:
-    assert len(replace(GOOD, **change).warnings) == count  # type: ignore[arg-type]
+    assert len(replace(GOOD, **change).notes) == count  # type: ignore[arg-type]
 
 
 def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:

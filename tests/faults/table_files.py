@@ -142,7 +142,7 @@ def _read_sets(path: Path, _: random.Random) -> str:
 def _read_mobility(path: Path, chance: random.Random) -> str:
     order = chance.choice([2, 4, 8, 8, 8, None if chance.random() < 0.1 else 1])
     found = fit_mobility(path, order=order)
-    said = format_rows(found.rows()) + "".join(found.warnings) + repr(found)
+    said = format_rows(found.rows()) + "".join(map(str, found.notes)) + repr(found)
     ask("check", case=f"&ball / &drop / &model / {found.namelist()}")
     return said if INNER.search(said) else ""
 
@@ -150,7 +150,7 @@ def _read_mobility(path: Path, chance: random.Random) -> str:
 def _read_levels(path: Path, chance: random.Random) -> str:
     found = read_room_levels(path, volume=chance.choice([None, 41.4, 1e5]))
     said = levels_csv(found).decode() + format_rows(found.rows()) + format_rows(rating_table(found))
-    return said if INNER.search(said + "".join(found.warnings)) else ""
+    return said if INNER.search(said + "".join(map(str, found.notes))) else ""
 
 
 def _read_force(path: Path, _: random.Random) -> str:

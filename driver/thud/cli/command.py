@@ -153,7 +153,7 @@ def save_result(  # noqa: PLR0913, PLR0917 - all differ between commands
     results.write(contents)
     if not options.quiet:
         print_results(shown)
-    print_notes(result.warnings)
+    print_notes(result.notes)
     if not options.quiet:
         print_path("Results", results.folder)
     return 0

@@ -121,7 +121,7 @@ def answer_case(case: Case) -> Answer:
         answer["room"] = _room(prediction) | {"source": answer["headline"]}
         answer["headline"] = room_headline(prediction)
         known = answer["warnings"]
-        answer["warnings"] += [text for text in map(str, prediction.warnings) if text not in known]
+        answer["warnings"] += [text for text in prediction.warnings if text not in known]
     answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
     return answer
 

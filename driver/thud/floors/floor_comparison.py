@@ -48,7 +48,7 @@ class FloorComparison(Displayed, Page):
         floors: dict[str, list[str]] = {}
         for name, prediction in self.predictions.items():
             for warning in prediction.warnings:
-                floors.setdefault(str(warning), []).append(name)
+                floors.setdefault(warning, []).append(name)
         return [f"{', '.join(names)}: {warning}" for warning, names in floors.items()]
 
     def rows(self) -> list[tuple[str, ...]]:

@@ -150,8 +150,8 @@ class MobilityFit(Displayed):
         return result
 
     @property
-    def warnings(self) -> tuple[Note, ...]:
-        """Possible faults of the measurement and the fit."""
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings on the measurement and the fit."""
         result = _unit_warnings(self.measured)
         error, free_error = 100 * self.error, 100 * self.free_error
         if (negative := 100 * float(np.mean(self.measured.real < 0))) > 0:

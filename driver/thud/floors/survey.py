@@ -152,8 +152,8 @@ class RoomLevels(Displayed):
         return float(10 / math.log(10) * error)
 
     @property
-    def warnings(self) -> tuple[Note, ...]:
-        """Possible faults of the levels and ratings."""
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings on the levels and ratings."""
         result = []
         if (count := len(self.positions)) < MIN_POSITIONS:
             result.append(Note("few_positions", value=count, low=MIN_POSITIONS))

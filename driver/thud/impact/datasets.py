@@ -54,7 +54,7 @@ def impact_dataset(
     conforms = impact.assess().conforms == VERDICTS[0]
     variables["conforms"] = ((), conforms, attributes(RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **_frequencies(BANDS)}
-    warnings = {"warnings": "\n".join(map(str, impact.warnings))}
+    warnings = {"warnings": "\n".join(impact.warnings)}
     return xr.Dataset(variables, coordinates, {**provenance, **warnings}).copy(deep=True)
 
 

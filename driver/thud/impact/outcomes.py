@@ -108,16 +108,11 @@ class Ensemble(SampleQuantities, Displayed):
         return {name: array for name, array in values.items() if array is not None}
 
     @property
-    def warnings(self) -> tuple[Note, ...]:
-        """Samples without results and the most frequent reason, and sources without conformity."""
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings of samples without results or conformity; that none states numerical errors."""
         # Without levels, nothing is known of the source.
         conforms = None if self.room_rating is None else self.conforms | np.isnan(self.margin)
-        return sample_warnings(self.status, self.reason, conforms)
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        """That samples state no numerical errors."""
-        return (NO_ERRORS,)
+        return (*sample_warnings(self.status, self.reason, conforms), NO_ERRORS)
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the range of each number that every sample has."""

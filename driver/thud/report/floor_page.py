@@ -184,7 +184,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
         resonances=escaped(_about_resonances(prediction)),
         computation=escaped(_about_computation(floor)),
         model=escaped(ABOUT_MODEL),
-        warnings=notes("Warnings", [*map(str, prediction.warnings or ["none"])]),
+        warnings=notes("Warnings", prediction.warnings or ["none"]),
         footer=escaped(f"thud {version()} · predicted, not measured · end of report"),
     )
     return PAGE.substitute(

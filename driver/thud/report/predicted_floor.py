@@ -348,7 +348,7 @@ def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
     warnings: list[Cells] = [("floor", "warning")]
     for floor in floors:
         assumptions += [(floor.name, *row) for row in floor.assumptions[1:]]
-        warnings += [(floor.name, str(warning)) for warning in floor.prediction.warnings]
+        warnings += [(floor.name, warning) for warning in floor.prediction.warnings]
     return {"assumptions": assumptions, "warnings": warnings}
 
 
