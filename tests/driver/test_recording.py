@@ -156,7 +156,7 @@ def test_blanks_beside_separators_change_no_number(
 
 
 @pytest.mark.parametrize("read", READERS)
-@pytest.mark.parametrize("end", ["", ";", " ;", "\t", " "])
+@pytest.mark.parametrize("end", ["", "sep", " sep", " "])
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
@@ -173,7 +173,7 @@ def test_ends_of_lines_change_no_number(
     tmp_path: Path,
 ) -> None:
     path = tmp_path / "plate.csv"
-    path.write_text(f"{line}{end}\n" * 8)
+    path.write_text(f"{line}{end}\n".replace("sep", ";" if ";" in line else ",") * 8)
     np.testing.assert_array_equal(read(path), [expected] * 8)
 
 
@@ -228,12 +228,12 @@ def test_numbers_that_may_be_two_are_refused(
         ("a,b\nc,d\n", naming("no numbers")),
         ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
         ("0.0,1,5,2\n0.0,2,5\n", naming("line 2", 3, 4)),
-        ("1,0\n2,\n", naming("line 2", "''")),
+        ("1.5,0\n2,\n", naming("line 2", "''")),
         ("0,1\n1,2\0\n", naming("line 2", "zero")),
         ("0,1\n" + "1" * 70_000 + ",2\n", naming("line 2", "65536 characters")),
         ("0.0,1\n1,2\n", naming("2 rows", 8)),
         ("".join(f"{i},1.0,2\n" for i in range(9)), naming("9 rows", 3)),
-        ("".join(f"{i},nan\n" for i in range(9)), naming("finite")),
+        ("".join(f"{i}.0,nan\n" for i in range(9)), naming("finite")),
         ("".join(f"{i**2},1.0\n" for i in range(9)), naming("row", "0.12")),
         ("".join(f"{-i},1.0\n" for i in range(9)), naming("-1 s", "1000 s")),
         ("".join("0,1.0\n" for _ in range(9)), naming("0 s", "1000 s")),

@@ -382,7 +382,7 @@ def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:
         ("Sampling Frequency (Hz): 8000\nForce (kN)\n", "{v}"),
         ("// dt [us]: 125\n// unit: kN\n", "{v}"),
         ("; Abtastrate = 8,0 kHz\n; Einheit = kN\n", "{k};"),
-        ("fs\t8000\nForce\n[kN]\n", "{k}\t"),
+        ("fs\t8000\nForce\n[kN]\n", "{k};"),
         ("t_ms F_kN\n", "{ms} {v}"),
         ("Sample rate in Hz\t8000\nKraft in kN\n", "{v}"),
         ("Zeit / s;Kraft / kN\n", "{t};{k}"),
@@ -499,6 +499,14 @@ def table_of(row: Callable[[int, float, float], str]) -> str:
             naming("line 2", "decimal marks"),
         ),
         (
+            "fs: 8000\nunit: N\n" + table_of(lambda _, _t, v: f"{v:.3f}".replace(".", ",")),
+            naming("line 3", "decimal marks", "semicolons"),
+        ),
+        (
+            "fs: 8000\n" + table_of(lambda _, _t, v: f"{v:.0f},-1,-2"),
+            naming("line 2", "decimal marks"),
+        ),
+        (
             "fs: 8000\n" + table_of(lambda _, _t, v: f'"{1 + v // 10:.0f}.000"'),
             naming("line 2", "'1.000'", 1000),
         ),
@@ -520,11 +528,9 @@ def test_tables_that_may_be_read_in_two_ways_are_refused(
 @pytest.mark.parametrize(
     "text",
     [
-        "fs: 8000\n" + table_of(lambda _, _t, v: f"{v:.3f}".replace(".", ",")),
-        "fs: 8000\n" + table_of(lambda _, _t, v: f"{v:.1f}".replace(".", ",").removesuffix(",0")),
+        "fs: 8000\nF [N];\n" + table_of(lambda _, _t, v: f"{v:.3f};".replace(".", ",")),
         "fs: 8000\nF [N],G\n" + table_of(lambda _, _t, v: f"{v:.0f},0"),
-        "fs: 8000\n" + table_of(lambda _, _t, v: f"{v:.0f},-1,-2"),
-        "fs: 8.000 Hz\n" + table_of(lambda _, _t, v: f"{v:.3f}".replace(".", ",")),
+        "fs: 8.000 Hz\n" + table_of(lambda _, _t, v: f"{v:.3f};".replace(".", ",")),
     ],
 )
 def test_commas_between_numbers(text: str, tmp_path: Path) -> None:

@@ -30,13 +30,13 @@ from thud.recordings.channel import require_small, shown_path, shown_text
 from thud.recordings.header_aliases import (
     BRACKETS,
     DATE,
+    LOOSE,
     NUMBER,
     RATE,
     STEP,
     TIME_UNIT,
     UNIT,
     WORDS,
-    find_rate,
     is_time,
     plain,
     split_title,
@@ -61,23 +61,16 @@ UNUSUAL = {
     ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
     ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
 }
-# A comma that must be a decimal mark, as in 1,05 and -0,5.
-DECIMAL_COMMA = re.compile(r"[-+]?\d+,0\d|[-+]0,")
-# Separators of name and value in a header, and maximum number of lines of titles and units.
+# Separators of name and value in a header, and begin of a value.
 PAIR = re.compile(r"[:=\t;,]")
-MAX_TITLES = 3
-# A title with the number of its column, such as "Column 2: Force [N]".
-NUMBERED = re.compile(r"(?:column|col\.?|spalte|열|列)\s*(\d{1,3})\s*[:=]\s*(\S.*)", re.IGNORECASE)
-# What separates titles that hold commas: tabs, semicolons, or blanks between words.
-OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
-# A number behind a name.
 VALUE = re.compile(r"[:=]\s*[-+]?\d")
 DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
-# Titles of columns that may have no cells.
-REMARK = {
-    "comment", "comments", "remark", "remarks", "note", "notes", "kommentar", "bemerkung",
-    "bemerkungen",
-}  # fmt: skip
+# What separates titles that hold commas: tabs, semicolons, or blanks between words.
+OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
+# A unit behind a comma, as in "Time, s": this comma separates no titles.
+UNIT_PART = re.compile(r", +([^,]+)")
+# Titles of the column that LabVIEW and spreadsheets add, which may have no cells.
+REMARK = {"comment", "comments", "remark", "remarks", "kommentar", "bemerkung"}
 ALLOWED = (
     "columns of numbers, separated by commas, semicolons, tabs or blanks (decimal commas with "
     "semicolons, tabs and blanks, or in quotes)"
@@ -163,11 +156,10 @@ class Table:
 
 @dataclass
 class _Layout:
-    """Layout of a file: the numbers begin at line `first` and have `width` columns.
+    """Layout of a file: the numbers begin at line `first`.
 
-    `used` are the numeric columns with the units in their cells. With `has_gaps` there are empty
-    columns, which blanks between titles do not show; with `has_commas` the only column has decimal
-    commas.
+    `used` are the columns of numbers with the units in their first cells, `clock` is a column of
+    times of day, `width` the number of columns and `full_width` that with empty ones behind them.
     """
 
     name: str
@@ -178,17 +170,12 @@ class _Layout:
     first: int = 1
     width: int = 0
     full_width: int = 0
-    has_gaps: bool = False
     used: dict[int, str] = field(default_factory=dict)
     clock: int | None = None
-    has_commas: bool = False
-    header: list[tuple[str, str]] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    units: list[str] = field(default_factory=list)
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line of numbers."""
-        text = strip_comment(line).rstrip("\t; ".replace(self.separator or " ", ""))
+        text = strip_comment(line)
         return split_line(text, self.separator) if text else []
 
     def rows(self) -> Iterator[tuple[int, str]]:
@@ -266,24 +253,20 @@ def _lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
 
 
 def _read(layout: _Layout) -> Table:
-    _read_header(_find_numbers(layout), layout)
+    header, titles, has_titles = _read_header(_find_numbers(layout), layout)
     if not layout.decimal.line:
         layout.decimal = find_decimal(_decisive(layout), layout.separator, layout.name)
-    _require_separators(layout)
+    if layout.separator == "," and not layout.decimal.line and not has_titles:
+        layout.refuse(
+            layout.first,
+            "the commas may separate columns or be decimal marks",
+            "a title for each column, decimal points, or semicolons between columns",
+        )
     values = _read_numbers(layout)
     clock = None if layout.clock is None else values.pop(layout.clock)
-    columns = [
-        Column(i + 1, layout.names[i], layout.units[i], numbers, layout.name)
-        for i, numbers in values.items()
-    ]
+    columns = [Column(i + 1, *titles[i], numbers, layout.name) for i, numbers in values.items()]
     mark = layout.decimal.mark if layout.decimal.line else ""
-    has_titles = any(layout.names) or any(layout.units)
-    return Table(layout.name, columns, layout.header, mark, has_titles, clock)
-
-
-def _trimmed(cells: list[str]) -> list[str]:
-    """Return the cells up to the last one that is not empty."""
-    return cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
+    return Table(layout.name, columns, header, mark, has_titles, clock)
 
 
 def _value(cell: str) -> tuple[str, str]:
@@ -299,7 +282,7 @@ def _find_numbers(layout: _Layout) -> list[str]:
     is_workbook = layout.separator is not None
     for line in itertools.islice(layout.lines(), MAX_HEADER):
         if not is_workbook:
-            layout.separator = find_separator(strip_comment(line).rstrip("\t; "))
+            layout.separator = find_separator(strip_comment(line))
         cells = layout.cells(line)
         filled = {i: cell for i, cell in enumerate(cells) if cell}
         values = {i: _value(cell) for i, cell in filled.items()}
@@ -307,9 +290,9 @@ def _find_numbers(layout: _Layout) -> list[str]:
         clocks = [i for i, cell in filled.items() if seconds_of_day(cell) is not None]
         dates = [i for i, cell in filled.items() if DATE_CELL.fullmatch(cell)] + clocks
         # Dates precede the numbers, and further columns may hold words, such as a state.
+        is_first = bool(used) and min(filled) in {*used, *dates}
         if (
-            used
-            and min(filled) in {*used, *dates}
+            is_first
             and min(used) > max(dates, default=-1)
             and len(used) > (len(filled) - len(dates)) / 2
         ):
@@ -319,7 +302,6 @@ def _find_numbers(layout: _Layout) -> list[str]:
                 min(clocks, default=None),
             )
             layout.width, layout.full_width = max(filled) + 1, len(cells)
-            layout.has_gaps = len(filled) < layout.width
             if layout.width > MAX_COLUMNS:
                 refuse(f"{layout.name}: {layout.width} columns", f"up to {MAX_COLUMNS}")
             return above
@@ -335,151 +317,94 @@ def _decisive(layout: _Layout) -> Iterator[tuple[int, list[str], bool]]:
             yield number, [_value(cells[i])[0] for i in layout.used if i < len(cells)], '"' in line
 
 
-def _require_separators(layout: _Layout) -> None:
-    """Raise InputError if commas may be separators or decimal marks."""
-    texts = filter(None, (strip_comment(line) for _, line in layout.rows()))
-    if layout.has_commas:
-        # As separate numbers, 05 and -0 would be unusual.
-        is_shown = any("," not in text or DECIMAL_COMMA.match(text) for text in texts)
-    else:
-        titles = any(layout.names) or any(layout.units)
-        is_shown = layout.separator != "," or bool(layout.decimal.line) or titles
-    # A cell that begins with a sign is not the fraction of the number before it.
-    signed = {0}
-    for text in () if is_shown or layout.has_commas else texts:
-        signed |= {i for i, cell in enumerate(layout.cells(text)) if not cell[:1].isdigit()}
-        is_shown = '"' in text or "." in text or len(signed) >= layout.width
-        if is_shown:
-            return
-    if not is_shown:
-        layout.refuse(
-            layout.first,
-            "the commas may separate columns or be decimal marks",
-            "a title for each column, decimal points, or semicolons between columns",
-        )
-
-
 # Header: titles, units, names and values.
 
 
-def _read_header(above: list[str], layout: _Layout) -> None:
-    """Find the titles and units of the columns, and the names and values of the header."""
-    lines = [(number, line.strip(" ")) for number, line in enumerate(above, 1) if line.strip()]
-    rows, numbered, others = _sort_lines(lines, layout)
-    text = strip_comment(next(line for _, line in layout.rows())).rstrip("\t; ")
-    if layout.separator == "," and is_number(text) and not rows and find_rate(layout.header):
-        layout.separator, layout.width, layout.used, layout.has_commas = ";", 1, {0: ""}, True
-        rows, numbered, others = _sort_lines(lines, layout)
+def _read_header(
+    above: list[str], layout: _Layout
+) -> tuple[list[tuple[str, str]], list[tuple[str, str]], bool]:
+    """Return names and values of the header, name and unit of each column, and if it has a line."""
+    header: list[tuple[str, str]] = []
+    rows: list[tuple[int, list[str]]] = []
+    others: list[tuple[int, str]] = []
+    for number, line in enumerate(above, 1):
+        if not (text := line.lstrip(COMMENTS + " \t").strip()):
+            continue
+        is_marked = PAIR.search(text)
+        parts = PAIR.split(text, maxsplit=1) if is_marked else text.rsplit(maxsplit=1)
+        name, value = parts[0].strip(), "".join(parts[1:]).strip(" :=\t;,")
+        if value and _is_known_pair(plain(split_title(name)[0] if is_marked else name), value):
+            header.append((name, value))
+        elif cells := _title_row(line, layout):
+            rows.append((number, cells))
+        else:
+            others.append((number, line))
     units = [cells for _, cells in rows if _are_units(cells)]
-    titles = [row for row in rows if row[1] not in units]
-    near = {number for number, _ in lines[-MAX_TITLES:]}
-    _, chosen = max(
-        (row for row in titles if row[0] in near or _evidence(row[1])),
-        key=lambda row: (_evidence(row[1]), row[0]),
-        default=(0, []),
-    )
-    others += [(number, "\t".join(cells)) for number, cells in titles if cells is not chosen]
-    last = lines[-1][0] if lines else 0
+    titles = [(_evidence(cells), number, cells) for number, cells in rows if cells not in units]
+    _, _, chosen = max(titles, default=(0, 0, []))
+    others += [(number, "\t".join(cells)) for _, number, cells in titles if cells is not chosen]
     for number, line in sorted(others):
-        _read_other(line, number, layout, is_last=number == last, is_open=not (chosen or numbered))
+        _refuse_titles(line, number, layout, is_last=number == len(above), is_open=not chosen)
     layout.width = max([layout.width, *map(len, (chosen, *units))])
-    layout.names = [""] * layout.width
-    stated: list[list[str]] = [[] for _ in range(layout.width)]
-    for i, cell in [*enumerate(chosen), *numbered.items()]:
-        if i < layout.width:
-            layout.names[i], unit = split_title(cell)
-            stated[i].append(unit)
-        elif plain(cell) not in REMARK:
-            refuse(f"{layout.name}: a title for column {i + 1} of {layout.width}", ONE_TITLE)
+    names = [split_title(cell) for cell in chosen] or [("", "")] * layout.width
+    stated = [[unit] for _, unit in names]
     for i, cell in itertools.chain(*map(enumerate, units)):
         name, unit = split_title(cell)
         stated[i].append(unit or name)
     for i, unit in layout.used.items():
         stated[i].append(unit)
-    _apply_header_units(stated, layout)
-    layout.units = [
-        _one_unit(units, i, layout) or (name if name in UNITS else "")
-        for i, (units, name) in enumerate(zip(stated, layout.names, strict=True))
-    ]
+    _add_header_units(header, names, stated, layout)
+    columns = []
+    for i, (name, _) in enumerate(names):
+        known = {find_unit(unit) or unit: unit for unit in stated[i] if unit not in {"", "-", "--"}}
+        if len(known) > 1:
+            text = " and ".join(map(shown_text, known.values()))
+            refuse(f"{layout.name}: column {i + 1}: its unit is stated as {text}", "one unit")
+        columns.append((name, next(iter(known.values()), name if name in UNITS else "")))
+    return [(name, re.split(r"[\t;]", value)[0]) for name, value in header], columns, bool(rows)
 
 
-def _uncommented(line: str) -> str:
-    return line.lstrip(COMMENTS + " \t").strip()
-
-
-def _sort_lines(
-    lines: list[tuple[int, str]], layout: _Layout
-) -> tuple[list[tuple[int, list[str]]], dict[int, str], list[tuple[int, str]]]:
-    """Return lines with a cell for each column, titles by column, and further lines."""
-    layout.header = []
-    rows: list[tuple[int, list[str]]] = []
-    numbered: dict[int, str] = {}
-    others: list[tuple[int, str]] = []
-    for number, line in lines:
-        text = _uncommented(line)
-        title, *value = PAIR.split(text, maxsplit=1)
-        name, values = plain(split_title(title)[0]), "".join(value).strip(" :=\t;,")
-        if match := NUMBERED.fullmatch(text):
-            numbered[int(match[1]) - 1] = match[2]
-        elif value and _is_pair(name, values, layout.width):
-            is_unit = name in UNIT | TIME_UNIT
-            layout.header.append((title.strip(), values if is_unit else _first(values)))
-        elif cells := _fitting(line, text, layout):
-            rows.append((number, cells))
-        else:
-            others.append((number, line))
-    return rows, numbered, others
-
-
-def _first(values: str) -> str:
-    """Return the first of the values for several channels."""
-    return re.split(r"[\t;]", values)[0]
-
-
-def _is_pair(name: str, value: str, width: int) -> bool:
+def _is_known_pair(name: str, value: str) -> bool:
     """Whether a line of the header is a known name with its value."""
     if name in DATE:
         return bool(DATE_LIKE.search(value))
-    has_value = width == 1 or any(map(str.isdigit, value))
-    return bool(value) and (name in UNIT | TIME_UNIT or (name in RATE | STEP and has_value))
+    return name in UNIT | TIME_UNIT or (name in RATE | STEP and bool(re.match(r"[-+.]?\d", value)))
 
 
-def _fitting(line: str, text: str, layout: _Layout) -> list[str]:
-    """Return the cells of a line if it has a title for each column, else an empty list."""
-    if layout.width == 1:
-        is_value = re.search(r"[:=]|[\t;]\s*\S", text) or is_number(text)
-        return [] if is_value else [text.rstrip(";\t ").strip('"')]
+def _title_row(line: str, layout: _Layout) -> list[str]:
+    """Return the cells of a line if it has a title or unit for each column, else an empty list."""
+    separator = layout.separator
     # A separator in front of the titles is no comment.
-    starts = (line, text) if line[:1] == layout.separator else (text,)
-    for variant in (*starts, *(part.partition("#")[0].rstrip() for part in starts)):
-        for cells in _splits(variant, layout):
-            filled = _trimmed(cells)
+    marks = (COMMENTS + " \t").replace(separator or " ", "")
+    text = line.lstrip(marks).rstrip(" \r")
+    if layout.width == 1:
+        text = text.strip(" ;\t")
+        is_value = re.search(r"[:=]|[\t;]\s*\S", text) or is_number(text)
+        return [] if is_value or not text else [text.strip('"')]
+    for variant in (text, text.partition("#")[0].rstrip()):
+        for cells in _splits(variant, separator):
+            filled = cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
             extra = filled[layout.width :]
-            is_title = len(filled) <= layout.full_width or all(plain(c) in REMARK for c in extra)
             has_number = any(
-                is_number(c) or DATE_CELL.fullmatch(c) or seconds_of_day(c) for c in cells
+                is_number(c.rstrip(":")) or DATE_CELL.fullmatch(c) or seconds_of_day(c) is not None
+                for c in filled
             )
-            if len(cells) >= layout.width and is_title and filled and not has_number:
+            is_wide = len(filled) > layout.full_width and not all(plain(c) in REMARK for c in extra)
+            if filled and len(cells) >= layout.width and not is_wide and not has_number:
                 return cells[: max(layout.width, len(filled))]
     return []
 
 
-def _splits(text: str, layout: _Layout) -> Iterator[list[str]]:
+def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
     """Yield the cells of a line of titles by the separator of the numbers, and by others."""
-    separator = layout.separator
-    for mark in dict.fromkeys((separator, "\t", ";", ",")):
-        if mark and mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
+    for mark in dict.fromkeys((separator or "\t", "\t", ";", ",")):
+        if mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
             cells = split_line(text, mark)
-            # The commas of "Time, s" do not separate titles.
-            loose = text.split(", ")[1:] if separator == "," else cells
-            bases = {_quantity(cell) for cell in loose if find_unit(cell)} - {"counts", "FS"}
-            if mark != "," or _are_units(cells) or not bases:
+            parts = [find_unit(part) for part in UNIT_PART.findall(text)]
+            if mark != "," or _are_units(cells) or not any({*parts} - {"", "counts", "FS"}):
                 yield cells
-    if layout.has_gaps:
-        return
-    if not any(mark in text for mark in '\t;"'):
+    if separator is None:
         yield re.split(r" {2,}", text)
-    if not any(mark in text for mark in '\t;,"'):
         # "Force [N]" and "Force / N" are one title.
         joined = BRACKETS.sub(lambda match: match[0].replace(" ", "\0"), text)
         words = re.sub(r"(?<=[^\])}\s])\s+(?=[\[({])|\s+(/)\s+", "\0\\1\0", joined).split()
@@ -501,83 +426,73 @@ def _evidence(cells: list[str]) -> int:
     return 2 if any(find_unit(unit) for _, unit in pairs) else int(any(map(is_time, cells)))
 
 
-def _read_other(line: str, number: int, layout: _Layout, *, is_last: bool, is_open: bool) -> None:
-    """Add a further line to the header; raise InputError for titles or numbers that do not fit.
+def _refuse_titles(
+    line: str, number: int, layout: _Layout, *, is_last: bool, is_open: bool
+) -> None:
+    """Raise InputError for a line above the numbers with numbers, or with titles that do not fit.
 
     `is_last` is the line above the numbers; with `is_open` the columns have no titles yet.
     """
-    text = _uncommented(line)
-    is_comment = line[:1] in tuple(COMMENTS)
-    row = [] if is_comment else _trimmed(layout.cells(line))
-    if len(row) == layout.width and not layout.has_commas:
-        first = next(filter(None, row))
-        is_row = not any(map(str.isalpha, first)) and any(map(is_number, row))
+    text = line.lstrip(COMMENTS + " \t").strip()
+    is_comment = line.lstrip(" ")[:1] in tuple(COMMENTS)
+    row = [] if is_comment else layout.cells(line.strip(" "))
+    row = row[: max((i for i, cell in enumerate(row, 1) if cell), default=0)]
+    first = next(filter(None, row), "")
+    if len(row) == layout.width and any(map(is_number, row)):
         # A word may stand in front of the numbers of the first row.
-        is_row |= number == layout.first - 1 and all(is_number(row[i]) for i in layout.used)
-        if is_row or is_number(first):
+        is_row = is_last and all(is_number(row[i]) for i in layout.used)
+        if is_row or not any(map(str.isalpha, first)):
             wrong = next(cell for cell in row if cell and not is_number(cell))
             layout.refuse(number, f"{shown_text(wrong)!r} is not a number")
+    cells = next(_splits(text, layout.separator), [text])
     pieces = [piece.strip() for piece in re.split(r"[\t;,]", text)]
-    has_number = any(is_number(_value(piece)[0]) for piece in pieces)
-    cells = next(_splits(text, layout), [text])
+    if VALUE.search(text) or any(is_number(_value(piece)[0]) for piece in pieces):
+        return
     is_title = any(map(is_time, cells)) and (len(cells) > 1 or is_last)
     if is_last and not is_comment and ":" not in text:
         is_title |= (layout.separator or "\n") in text
-    is_unit = _are_units(cells) or any(map(_states_unit, pieces))
-    if (is_unit or (is_title and is_open)) and not has_number | bool(VALUE.search(text)):
+    if _are_units(cells) or any(map(_states_unit, pieces)) or (is_title and is_open):
         count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
         reason = count if len(cells) != layout.width else "is a second line of titles"
         layout.refuse(number, f"{shown_text(text)!r}: {reason}", ONE_TITLE)
-    pair = PAIR.split(text, maxsplit=1) if PAIR.search(text) else text.rsplit(maxsplit=1)
-    if pair[1:]:
-        layout.header.append((pair[0], _first(pair[1].strip(" :=\t;,"))))
 
 
 def _states_unit(text: str) -> bool:
-    """Whether a text holds a unit in brackets, or ends with one after a slash or "in"."""
-    if any(find_unit("".join(filter(None, groups))) for groups in BRACKETS.findall(text)):
-        return True
-    match = re.search(r"(?:\bin|/)\s+(\S{1,12})$", text)
-    return bool(match and find_unit(match[1]))
+    """Whether a text holds a unit in brackets, or ends with one after a mark or "in"."""
+    units = ["".join(groups) for groups in BRACKETS.findall(text)]
+    loose = LOOSE.fullmatch(text)
+    if loose and loose["mark"].strip():
+        units.append(loose["unit"])
+    return any(map(find_unit, units))
 
 
-def _apply_header_units(stated: list[list[str]], layout: _Layout) -> None:
+def _add_header_units(
+    header: list[tuple[str, str]],
+    names: list[tuple[str, str]],
+    stated: list[list[str]],
+    layout: _Layout,
+) -> None:
     """Add units that the header states for the columns of times, or for the others."""
     used = [*layout.used]
-    times = [i for i in used if is_time(f"{layout.names[i]} [{''.join(stated[i][:1])}]")]
+    times = [i for i in used if is_time(f"{names[i][0]} [{stated[i][0]}]")]
     channels = [i for i in used if i not in times]
-    for title, value in layout.header:
+    for title, value in header:
         words = plain(split_title(title)[0])
-        if words not in UNIT | TIME_UNIT:
-            continue
-        units = _trimmed([part.strip(" \"'") for part in re.split(r"[\t;,]", value)])
+        units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
         if words in TIME_UNIT:
             chosen, units = times or used[:1], units[:1]
-        elif len(units) == 1:  # of the columns without a unit of another quantity
-            base = _quantity(units[0])
-            chosen = [i for i in channels if {*map(_quantity, filter(None, stated[i]))} <= {base}]
-        else:
+        elif words in UNIT and len(units) == 1:
+            chosen = channels
+        elif words in UNIT:
             lists = ([*range(layout.width)], used, channels, used[1:])
             chosen = next((some for some in lists if len(some) == len(units)), [])
-        if len(units) not in {1, len(chosen)}:
-            count = f"{len(units)} units for {len(channels)} channels"
-            refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
+            if not chosen:
+                count = f"{len(units)} units for {len(channels)} channels"
+                refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
+        else:
+            continue
         for i, unit in zip(chosen, itertools.cycle(units), strict=False):
             stated[i].append(unit)
-
-
-def _quantity(unit: str) -> str:
-    """Return the SI unit or base unit of a unit, or the unit itself if it is not known."""
-    return UNITS.get(find_unit(unit), (unit,))[0]
-
-
-def _one_unit(stated: list[str], column: int, layout: _Layout) -> str:
-    """Return the unit of a column; raise InputError if several are stated."""
-    units = {find_unit(unit) or unit: unit for unit in stated if unit not in {"", "-", "--"}}
-    if len(units) > 1:
-        text = " and ".join(map(shown_text, units.values()))
-        refuse(f"{layout.name}: column {column + 1}: its unit is stated as {text}", "one unit")
-    return next(iter(units.values()), "")
 
 
 # Numbers.
@@ -603,34 +518,21 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     return {column: table[:, k].copy() for k, column in enumerate(columns)}
 
 
-def _convert(block: list[str], columns: list[int], layout: _Layout) -> NDArray[np.float64] | None:
-    """Return the numbers of a block of lines; None if a line is empty, unusual or wrong."""
+def _convert(lines: list[str], columns: list[int], layout: _Layout) -> NDArray[np.float64] | None:
+    """Return the numbers of lines at once; None if they hold anything else."""
     separator, decimal = layout.separator, layout.decimal.mark
-    joined = "\n".join(block)
-    if separator is None:
-        counts = {len(line.split()) for line in block}
-    else:
-        counts = {line.count(separator) + 1 for line in block}
-    count = max(counts)
-    is_even = len(counts) == 1 and count > max(columns) and layout.clock is None
-    if not is_even or UNUSUAL[decimal].search(joined):
+    joined = "\n".join(lines)
+    if len(columns) < layout.width or UNUSUAL[decimal].search(joined):
         return None
-    if others := {*range(count)} - {*columns}:
-        texts = (
-            (i, cell.strip())
-            for line in block
-            for i, cell in enumerate(line.split(separator))
-            if i in others
-        )
-        if any(text and (i >= layout.width or is_number(text)) for i, text in texts):
-            return None
-    lines = joined.replace(",", ".").split("\n") if decimal == "," else block
+    if decimal == ",":
+        lines = joined.replace(",", ".").split("\n")
+    lines = [line.rstrip(" " + (separator or "")) for line in lines]
     try:
-        return np.loadtxt(
-            lines, delimiter=separator, comments=None, usecols=columns, ndmin=2, dtype=np.float64
-        )
+        values = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except (ValueError, OverflowError):
         return None
+    # Empty lines are left out.
+    return values if values.shape[1] == len(columns) else None
 
 
 def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) -> list[float] | None:
@@ -639,7 +541,7 @@ def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) ->
     if not cells:
         return None
     row = [_cell_value(cells[i], i, number, layout) for i in columns if i < len(cells)]
-    if len(row) < len(columns) or len(_trimmed(cells)) > layout.width:
+    if len(row) < len(columns) or any(cells[layout.width :]):
         layout.refuse(number, f"{len(cells)} columns, {layout.width} in the lines above")
     for i in {*range(len(cells))} - {*columns}:
         if is_number(cells[i]):
@@ -649,16 +551,16 @@ def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) ->
 
 
 def _cell_value(cell: str, column: int, number: int, layout: _Layout) -> float:
-    """Return the number or the time of day, s, of a cell."""
+    """Return the number or the time of day, s, of a cell, in the unit of the first cell."""
     unit = layout.used.get(column, "")
     if column == layout.clock:
         value, reason = seconds_of_day(cell), f"{shown_text(cell)!r} is not a time"
     elif unit:
         text, own = _value(cell)
         base, size = UNITS.get(find_unit(own), ("", 0.0))
-        is_same = base == UNITS[find_unit(unit)][0]
-        value = to_number(text, layout.decimal.mark) if is_same else None
-        value = None if value is None else value * size / UNITS[find_unit(unit)][1]
+        own_base, own_size = UNITS[find_unit(unit)]
+        value = to_number(text, layout.decimal.mark) if base == own_base else None
+        value = None if value is None else value * size / own_size
         reason = f"{shown_text(cell)!r} is not in {unit}"
     else:
         value = to_number(cell, layout.decimal.mark)
