@@ -1,49 +1,36 @@
-"""Contact of one pulse: background, first touch and release (docs/recordings_theory.md)."""
+"""Contact of one pulse: first touch and release (docs/recordings_theory.md, section 3)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import convolve1d, uniform_filter1d
+from scipy.linalg import toeplitz
 from scipy.special import comb
 
 from thud.base.immutable import Immutable
+from thud.base.note import Note
 from thud.impact.contact_time import THRESHOLD
 from thud.level.estimate import Estimate
-from thud.level.levels import RECORDED_BAND, low_pass
-from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
-from thud.recordings.noise import MAINS, N_HARMONIC, Background, fit_background
+from thud.level.levels import low_pass
+from thud.recordings.background import cell_means, cells_between, uniform_bounds
+from thud.recordings.flanks import FLANK, SMOOTHING, find_touch
+from thud.recordings.noise import MAINS, N_HARMONIC, Background
 from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
-from thud.recordings.response import correct_force
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Window
-    from thud.recordings.noise import Cells
     from thud.recordings.response import Chain
 
-# The background is averaged over cells. Pairs: width of a cell, and distance from the contact up to
-# which this width is used, s.
-BACKGROUND_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, MAX_BACKGROUND))
-# Length of a flank in the search for the touch, s.
-FLANK = 3e-3
 # Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
-# Time from a fifth of the peak to the end of the search over that from half of it to a fifth. A
-# power of time up to 4 passes 1 % in it; in a longer search, strong noise may be a slow release.
-REACH = 2.0
-# Width of the cells of a flank, s: from MIN_CELL to MAX_CELL in the interval of the touch; outside,
-# GROWTH times the distance from this interval, if this is more.
-MIN_CELL = 2e-5
-MAX_CELL = 1e-4
-GROWTH = 0.15
-# Width of the cells of the contact, s.
-CONTACT_CELL = 2e-4
+# Width of the cells of a flank, s.
+FLANK_CELL = 4e-5
+N_FREQUENCY = 200
 # The gate of the levels extends this many samples beyond the contact, and (GATE_RATE / rate)**2
 # more at low rates, at which the anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
@@ -66,8 +53,8 @@ MIN_NOISE_SAMPLES = 50
 MIN_INCREASE = 4.0
 # Band in which the noise of the background is compared with its fit, Hz.
 NOISE_BAND = (100.0, 600.0)
-# Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
-SAMPLE_ERROR = 2e-4
+# Minimum drift and hum that are noted, in standard deviations.
+MIN_DEVIATIONS = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +75,8 @@ class Contact(Immutable):
         side.
     force : ndarray, shape (span[1] - span[0],)
         Force without background, N.
-    removed_means : tuple of ndarray, shape (n_cell,)
-        Times of cells, and the removed background in them, N.
+    removed : ndarray, shape (span[1] - span[0],)
+        Removed background, N.
     gate : tuple of int
         First and stop index of the contact with its margins in the window.
     covariance : ndarray, shape (n_cell, n_cell)
@@ -109,7 +96,7 @@ class Contact(Immutable):
     peak: float
     span: tuple[int, int]
     force: NDArray[np.float64]
-    removed_means: tuple[NDArray[np.float64], NDArray[np.float64]]
+    removed: NDArray[np.float64]
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
     background_lengths: tuple[float, float]
@@ -117,15 +104,25 @@ class Contact(Immutable):
     sample_rate: float
 
     @property
+    def notes(self) -> tuple[Note, ...]:
+        """What was removed with the background."""
+        first, stop = (index - self.span[0] for index in self.gate)
+        offset = float(self.removed[first:stop].mean())
+        notes = [*self.background.tones, Note("offset_removed", value=offset, unit="N")]
+        drift, deviation = self.background.drift
+        if abs(drift) > MIN_DEVIATIONS * deviation:
+            notes.append(Note("drift_removed", value=drift, unit="N/s"))
+        frequency, amplitude, deviation = self.background.hum
+        if amplitude > MIN_DEVIATIONS * deviation:
+            others = {"frequency": frequency}
+            notes.append(Note("hum_removed", value=amplitude, unit="N", others=others))
+        return tuple(notes)
+
+    @property
     def gated(self) -> NDArray[np.float64]:
         """Force within the gate, N."""
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
-
-    @property
-    def removed(self) -> NDArray[np.float64]:
-        """Removed background, N, shape (span[1] - span[0],): linear between the cells."""
-        return np.interp(np.arange(*self.span) / self.sample_rate, *self.removed_means)
 
     @cached_property
     def white_variance(self) -> float:
@@ -219,103 +216,106 @@ class Contact(Immutable):
         return result + summed @ self.covariance @ summed.T
 
 
-def cells_between(bounds: NDArray[np.intp], rate: float, middle: float) -> Cells:
-    """Return begins and ends of cells, s from the middle of the contact; bounds are in samples."""
-    time = np.asarray((bounds - 0.5) / rate - middle, dtype=np.float64)
-    return time[:-1], time[1:]
+def find_contact(
+    force: NDArray[np.float64],
+    removed: NDArray[np.float64],
+    background: Background,
+    rate: float,
+    contact: tuple[int, int],
+    chain: Chain | None = None,
+) -> Contact:
+    """Return the contact of a pulse.
 
-
-def _means(force: NDArray[np.float64], bounds: NDArray[np.intp]) -> NDArray[np.float64]:
-    total: NDArray[np.float64] = np.add.reduceat(force[: bounds[-1]], bounds[:-1])
-    return total / np.diff(bounds)
-
-
-def _background_bounds(length: int, rate: float) -> NDArray[np.intp]:
-    """Return bounds of background cells up to a length, in samples from the contact."""
-    bounds = [0.0]
-    for width, max_distance in BACKGROUND_CELLS:
-        count = int((max_distance - bounds[-1]) / width + 1e-9)
-        bounds += list(bounds[-1] + width * np.arange(1, count + 1))
-    indices = np.unique(np.rint(np.array(bounds) * rate).astype(int))
-    return indices[indices <= length]
-
-
-def _spread(rate: float, chain: Chain | None) -> int:
-    """Return the number of samples by which filters spread a flank."""
-    periods = int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
-    return int((GATE_RATE / rate) ** 2) + periods
-
-
-@dataclass(frozen=True, eq=False)
-class Edges:
-    """Posteriors of first touch, and of release in reversed time, s from the first sample.
-
-    `background_limits` are the stop index of the background before the contact and the first index
-    of the background after it. `offset` is the median of the background, N, that is subtracted
-    before the fit.
+    Parameters
+    ----------
+    force, removed : ndarray, shape (n,)
+        Force without background, and the removed background, N.
+    background
+        Fit of the background.
+    rate
+        Samples per second, Hz.
+    contact
+        First and stop index of the contact, accurate to about 1 ms.
+    chain
+        Instruments whose responses were corrected.
     """
-
-    touch: Posterior
-    release: Posterior
-    background: Background
-    offset: float
-    background_limits: tuple[int, int]
-
-
-def estimate_limits(window: Window, noise: Background | None = None) -> tuple[Estimate, Estimate]:
-    """Return first touch and release, s from the first sample, accurate to about 0.1 ms."""
-    edges = find_edges(window, window.force, noise, passes=1)
-    (t0, s0), (t1, s1) = edges.touch.edge_times()[0], edges.release.edge_times()[0]
-    u0, u1 = _step_errors(
-        edges.background, window.force - edges.offset, window.sample_rate, t0, -t1
-    )
-    return Estimate(t0, math.hypot(s0, u0)), Estimate(-t1, math.hypot(s1, u1))
-
-
-def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
-    """Return the contact in a window; `force`, N, is its force, with any dropouts filled."""
-    rate, contact = window.sample_rate, window.contact
-    middle = (contact[0] + contact[1]) / 2 / rate
-    edges = find_edges(window, force, None, passes=2)
-    background, (before_stop, after_start) = edges.background, edges.background_limits
-    (t0, s0), begin = edges.touch.edge_times()
-    (t1, s1), end = edges.release.edge_times()
-    t1 = -t1
-    correction_error = CORRECTION_ERROR / window.chain.highest if window.chain else 0.0
-    margin = GATE_SAMPLES + _spread(rate, window.chain)
+    touch, begin = _find_edge(force, background, rate, contact[0], chain, side=1)
+    release, end = _find_edge(force, background, rate, contact[1], chain, side=-1)
+    # Samples into which filters spread the flanks belong to the gate.
+    margin = GATE_SAMPLES + int((GATE_RATE / rate) ** 2)
+    margin += int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
     gate = (
-        max(int((t0 - 3 * s0) * rate) - margin, 0),
-        min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
+        max(int((touch.value - 3 * touch.uncertainty) * rate) - margin, 0),
+        min(int((release.value + 3 * release.uncertainty) * rate) + margin + 1, len(force)),
     )
-    inner = uniform_bounds(*gate, rate)
-    _, covariance = background.predict(cells_between(inner, rate, middle))
+    cells = cells_between(uniform_bounds(*gate, rate), rate, background.middle)
     length = int(MAX_BACKGROUND * rate)
     span = (max(0, gate[0] - length), min(len(force), gate[1] + length))
-    # Cells outside the gate are five times as wide; the width in samples is proportional to `rate`.
-    sides = [uniform_bounds(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
-    cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
-    removed_means = (
-        (cells[0] + cells[1]) / 2 + middle,
-        background.predict_mean(cells) + edges.offset,
+    correction_error = CORRECTION_ERROR / chain.highest if chain else 0.0
+    step_errors = _step_errors(background, force, rate, begin.value, end.value)
+    begin, end = (
+        replace(edge, uncertainty=math.hypot(edge.uncertainty, correction_error, error))
+        for edge, error in zip((begin, end), step_errors, strict=True)
     )
-    corrected = force[slice(*span)] - np.interp(np.arange(*span) / rate, *removed_means)
-    start = span[0] / rate
-    u0, u1 = _step_errors(background, corrected, rate, begin[0] - start, -end[0] - start)
     return Contact(
-        Estimate(t0, s0),
-        Estimate(t1, s1),
-        Estimate(begin[0], math.hypot(begin[1], correction_error, u0)),
-        Estimate(-end[0], math.hypot(end[1], correction_error, u1)),
+        touch,
+        release,
+        begin,
+        end,
         background.peak,
         span,
-        corrected,
-        removed_means,
+        force[slice(*span)],
+        removed[slice(*span)],
         gate,
-        covariance,
-        (before_stop / rate, (len(force) - after_start) / rate),
+        background.predict(cells)[1],
+        (background.ends[0], len(force) / rate - background.ends[1]),
         background,
         rate,
     )
+
+
+def _find_edge(
+    force: NDArray[np.float64],
+    background: Background,
+    rate: float,
+    index: int,
+    chain: Chain | None,
+    side: int,
+) -> tuple[Estimate, Estimate]:
+    """Return first touch and begin of a contact (side 1), or its release and end (side -1), s.
+
+    The index is that of the edge to about 1 ms. For the release, times are reversed.
+    """
+    end = background.ends[0 if side > 0 else 1]
+    search = side * end, side * index / rate + MARGIN
+    stop = index + side * (MAX_DELAY + FLANK) * rate
+    step = side * max(1, round(FLANK_CELL * rate))
+    bounds = np.arange(round(end * rate), int(stop), step)[::side]
+    bounds = bounds[(bounds >= 0) & (bounds <= len(force))]
+    cells = cells_between(bounds, rate, background.middle)
+    # The posterior of the variances matters little beside that of the flank.
+    fixed = replace(background, draws=background.variances[None])
+    _, covariance = fixed.predict(cells)
+    covariance += background.quantization.offset**2
+    if chain is None:
+        covariance += np.diag(background.variances[0] / 2 / (cells[1] - cells[0]))
+    else:
+        lags = (cells[0] - cells[0][0])
+        frequency = np.linspace(0, 2 * chain.highest, N_FREQUENCY)
+        gain = chain.noise_gain(frequency) * chain.passed(frequency) ** 2
+        waves = np.cos(2 * np.pi * np.multiply.outer(lags, frequency))
+        covariance += toeplitz(waves @ gain * background.variances[0] * frequency[1])
+    smooth = np.convolve(force, SMOOTHING, mode="same")
+    touch, begin = find_touch(
+        side * ((cells[0] + cells[1]) / 2 + background.middle)[::side],
+        (cell_means(smooth, bounds) / background.peak)[::side],
+        covariance[::side, ::side] / background.peak**2,
+        search,
+        1 / rate,
+        chain,
+        release=side < 0,
+    )
+    return replace(touch, value=side * touch.value), replace(begin, value=side * begin.value)
 
 
 def _step_errors(
@@ -335,163 +335,3 @@ def _step_errors(
     inside = above[(above > begin) & (above < end)]
     first, last = (inside[0], inside[-1]) if inside.size else (end, begin)
     return offset / step * float(first - begin), offset / step * float(end - last)
-
-
-def find_edges(
-    window: Window, force: NDArray[np.float64], noise: Background | None, passes: int
-) -> Edges:
-    """Return the edges of a contact; a second pass starts from the edges of the first pass.
-
-    `noise` is the fit to another part of the signal; if None, the noise is fitted.
-    """
-    rate, (first, stop) = window.sample_rate, window.contact
-    middle = (first + stop) / 2 / rate
-    # At most half of a short background is cut off.
-    before_stop = int(max(first - MARGIN * rate, first / 2))
-    after_start = int(min(stop + MARGIN * rate, (stop + len(force)) / 2))
-    offset = float(np.median(np.concatenate([force[:before_stop], force[after_start:]])))
-    force = force - offset
-    width = max(1, round(rate / RECORDED_BAND))
-    smooth = uniform_filter1d(force[first:stop], width)
-    peak = float(smooth.max())
-    low = float(smooth.min())
-    half, fifth = (
-        first + np.flatnonzero(smooth >= low + level * (peak - low))[[0, -1]]
-        for level in (0.5, 0.2)
-    )
-    reach = fifth + REACH * (fifth - half)
-    before_stop = int(np.clip(reach[0], first / 2, before_stop))
-    after_start = int(np.clip(reach[1], after_start, (stop + len(force)) / 2))
-    touch = (before_stop / rate, first / rate + MARGIN)
-    release = (stop / rate - MARGIN, after_start / rate)
-    for pass_index in range(passes):
-        # The first of two passes needs only the coarse grid.
-        searches = 1 + 2 * pass_index if passes > 1 else 2
-        cells, mean = background_means(force, before_stop, after_start, rate, middle)
-        if noise is None:
-            noise = fit_background(cells, mean, peak)
-            draws, quantization = noise.draws.copy(), window.quantization
-            draws[:, 0] = np.maximum(draws[:, 0], quantization.density)
-            noise = Background(cells, mean, draws, peak, quantization)
-        background = Background(cells, mean, noise.draws, peak, noise.quantization)
-        fixed = Background(cells, mean, noise.variances[None], peak, noise.quantization)
-        posteriors = []
-        for sign, background_end, pulse_end, interval in (
-            (1, before_stop, first, touch),
-            (-1, after_start, stop, release),
-        ):
-            search = interval if sign > 0 else (-interval[1], -interval[0])
-            end = min(search[1], sign * pulse_end / rate + MAX_DELAY) + FLANK
-            bounds = sign * flank_bounds(
-                sign * background_end, search, end, rate, fine=pass_index > 0
-            )
-            posteriors.append(
-                find_posterior(force, bounds, search, fixed, rate, middle, searches, window.chain)
-            )
-        if pass_index + 1 < passes:
-            touch, reverse = (
-                _interval(posterior.edge_times(), 3 / rate + 1e-4) for posterior in posteriors
-            )
-            release = (-reverse[1], -reverse[0])
-            # Samples into which filters spread the flanks are no background.
-            spread = _spread(rate, window.chain)
-            before_stop = max(int(touch[0] * rate) - spread, first // 2)
-            after_start = min(int(release[1] * rate) + 1 + spread, (stop + len(force) + 1) // 2)
-    return Edges(posteriors[0], posteriors[1], background, offset, (before_stop, after_start))
-
-
-def _interval(
-    edge: tuple[tuple[float, float], tuple[float, float]], margin: float
-) -> tuple[float, float]:
-    """Return an interval that includes first touch and begin, with a margin, s."""
-    ends = np.array([(mean - 5 * spread, mean + 5 * spread) for mean, spread in edge])
-    return float(ends.min()) - margin, float(ends.max()) + margin
-
-
-def uniform_bounds(start: int, stop: int, rate: float) -> NDArray[np.intp]:
-    """Return bounds of cells of about CONTACT_CELL, in samples at a rate, Hz."""
-    count = max(1, round((stop - start) / rate / CONTACT_CELL))
-    return np.unique(np.rint(np.linspace(start, stop, 1 + count)).astype(int))
-
-
-def background_means(
-    force: NDArray[np.float64], before_stop: int, after_start: int, rate: float, middle: float
-) -> tuple[Cells, NDArray[np.float64]]:
-    """Return the background cells on both sides of a contact, and their mean forces, N."""
-    sides = (
-        before_stop - _background_bounds(before_stop, rate)[::-1],
-        after_start + _background_bounds(len(force) - after_start, rate),
-    )
-    begins, ends = zip(*(cells_between(side, rate, middle) for side in sides), strict=True)
-    mean = [_means(force, side) for side in sides if len(side) > 1]
-    return (np.concatenate(begins), np.concatenate(ends)), np.concatenate(mean)
-
-
-def find_posterior(  # noqa: PLR0913, PLR0917 - all of them describe one flank
-    force: NDArray[np.float64],
-    bounds: NDArray[np.intp],
-    interval: tuple[float, float],
-    background: Background,
-    rate: float,
-    middle: float,
-    searches: int,
-    chain: Chain | None = None,
-) -> Posterior:
-    """Return the posterior of the touch within an interval, s, from cells with bounds in samples.
-
-    If the bounds decrease, the posterior is that of the release, and its time and `interval` are
-    reversed.
-    """
-    reversed_ = bounds[0] > bounds[-1]
-    bounds = bounds[::-1] if reversed_ else bounds
-    bounds = bounds[(bounds >= 0) & (bounds <= len(force))]
-    cells = cells_between(bounds, rate, middle)
-    mean, covariance = background.predict(cells)
-    low, high = max(bounds[0] - 1, 0), min(bounds[-1] + 1, len(force))
-    smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[bounds[0] - low :]
-    value = _means(smooth, bounds - bounds[0]) - mean
-    # Weights of the samples in the smoothed means.
-    count = np.diff(bounds)
-    kernel = SMOOTHING if chain is None else np.convolve(SMOOTHING, _response(chain, rate))
-    margin = len(kernel) // 2
-    weights = np.zeros((len(count), bounds[-1] - bounds[0] + 2 * margin))
-    weights[np.repeat(np.arange(len(count)), count), margin + np.arange(count.sum())] = 1
-    weights = convolve1d(weights / count[:, None], kernel, mode="constant")
-    covariance += background.quantization.offset**2
-    covariance += background.variances[0] * rate / 2 * weights @ weights.T
-    covariance += (SAMPLE_ERROR * background.peak) ** 2 * np.eye(len(value))
-    time = (cells[0] + cells[1]) / 2 + middle
-    if reversed_:
-        time, value, covariance = -time[::-1], value[::-1], covariance[::-1, ::-1]
-    flank = Flank(
-        time, value, covariance, background.peak, 1 / rate, release=bool(reversed_), chain=chain
-    )
-    return find_touch(flank, *interval, searches)
-
-
-@lru_cache(maxsize=4)
-def _response(chain: Chain, rate: float) -> NDArray[np.float64]:
-    """Return the impulse response of a correction; the impulse is in the middle."""
-    length = int(CORRECTION_PERIODS * rate / chain.highest)
-    impulse = np.zeros(2 * length + 1)
-    impulse[length] = 1
-    return correct_force(impulse, rate, chain)
-
-
-def flank_bounds(
-    first: int, interval: tuple[float, float], end: float, rate: float, *, fine: bool
-) -> NDArray[np.intp]:
-    """Return bounds of flank cells in samples, from the end of the background to a time, s.
-
-    The interval, s, includes the touch. Without `fine`, all cells have the maximum width.
-    """
-    touch = (interval[0] + interval[1]) / 2 * rate
-    half_width = (interval[1] - interval[0]) / 2 * rate
-    bounds = [first]
-    while bounds[-1] < end * rate:
-        distance = max(abs(bounds[-1] - touch) - half_width, 0)
-        width = MAX_CELL * rate
-        if fine:
-            width = max(MIN_CELL * rate, GROWTH * distance, min(half_width / 10, width))
-        bounds.append(bounds[-1] + max(1, int(width)))
-    return np.array(bounds)

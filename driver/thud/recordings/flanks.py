@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +11,7 @@ from scipy.special import ndtri
 from scipy.stats import qmc
 
 from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
+from thud.level.estimate import Estimate
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,15 +86,21 @@ ERRORS = np.array([kind.error for kind in KINDS])
 # Standard uncertainty of first touch and of release due to the shapes, s: the largest of finite
 # elements, whose last force is below 1 % of the peak.
 TOUCH_ERRORS = (40e-6, 140e-6)
-# Relative error of the force due to the shapes: smooth kinds, rough kinds.
-MISFIT = (0.005, 0.1)
+# Relative error of the force due to the shapes, and time over which it is correlated, s.
+MISFIT = 0.02
+CORRELATION_TIME = 2e-4
+# Errors of samples due to quantization and the filter of the recorder, as a fraction of the peak.
+SAMPLE_ERROR = 2e-4
 # A draw is rejected if its force is negative, or falls in a smooth kind, by more than this fraction
 # of the peak: a fifth of the threshold.
 MAX_FALL = 0.002
-# Number of candidate times in a search. The next search covers the mean ± SEARCH_DEVIATIONS
-# standard deviations of the result.
+# Number of candidate times in a search, and of searches. The next search covers the mean plus and
+# minus SEARCH_DEVIATIONS standard deviations of the result.
 N_TIME = 33
+N_SEARCH = 3
 SEARCH_DEVIATIONS = 6.0
+# Length of a flank after the latest candidate time, s: beyond, pulses do not have these shapes.
+FLANK = 3e-3
 # Number of draws of each kind of flank, and minimum posterior probability of a kind.
 N_DRAW = 128
 MIN_PROBABILITY = 1e-6
@@ -110,152 +116,105 @@ GUARD = 4.0
 DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
 
 
-@dataclass(frozen=True, eq=False)
-class Flank:
-    """The start of a pulse, or with `release` its end in reversed time.
+def find_touch(  # noqa: PLR0913, PLR0917 - all of them describe one flank
+    time: NDArray[np.float64],
+    force: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    search: tuple[float, float],
+    interval: float,
+    chain: Chain | None,
+    *,
+    release: bool,
+) -> tuple[Estimate, Estimate]:
+    """Return first touch of a flank, and the time at which its force passes 1 % of the peak, s.
 
-    Attributes
+    Parameters
     ----------
-    time : ndarray, shape (n_cell,)
-        Middles of the cells over which the samples are averaged, s.
-    force : ndarray, shape (n_cell,)
-        Mean force in each cell without the background, N.
+    time, force : ndarray, shape (n_cell,)
+        Middles of cells, s, and mean forces in them without background, as fractions of the peak.
     covariance : ndarray, shape (n_cell, n_cell)
-        Covariance of the errors of `force`, N2.
-    peak : float
-        Peak force, N.
-    interval : float
+        Covariance of the errors of `force`.
+    search
+        Earliest and latest time of first touch, s.
+    interval
         Sampling interval, s.
-    chain : Chain or None
+    chain
         Instruments whose responses were corrected.
+    release
+        Whether the flank is the end of a pulse in reversed time.
     """
-
-    time: NDArray[np.float64]
-    force: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    peak: float
-    interval: float
-    release: bool
-    chain: Chain | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """Posterior of the first touch of a flank, or with `release` of the end of a pulse.
-
-    Attributes
-    ----------
-    time : ndarray, shape (n_time,)
-        Uniformly spaced candidate times, s.
-    kinds : ndarray, shape (n_kind,)
-        Indices of `KINDS`.
-    weight : ndarray, shape (n_kind, n_time)
-        Posterior probabilities.
-    factors : ndarray, shape (n_kind, n_time, n_column, n_column)
-        Factors that `_evidence` returns.
-    """
-
-    time: NDArray[np.float64]
-    kinds: NDArray[np.intp]
-    weight: NDArray[np.float64]
-    factors: NDArray[np.float64]
-    release: bool
-
-    def edge_times(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return first touch and begin of the contact, s, with their standard deviations.
-
-        At the begin of the contact, the force passes 1 % of the peak. Draws of kind, time and shape
-        with an implausible flank are excluded.
-        """
-        kind = np.repeat(self.kinds, N_DRAW)
-        kind_probability = np.repeat(self.weight.sum(axis=1), N_DRAW)
-        quantiles = (np.arange(N_DRAW) + 0.5) / N_DRAW
-        index = np.ravel([np.searchsorted(w.cumsum(), quantiles * w.sum()) for w in self.weight])
-        index = np.minimum(index, len(self.time) - 1)
-        touch = self.time[index]
-        force = self._force_draws(kind, index)
-        highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(force, axis=1), 0.0)
-        delay = _crossing(force, THRESHOLD)
-        probability = kind_probability * ((highest - force).max(axis=1) <= MAX_FALL)
-        if not probability.any():
-            probability = kind_probability
-        probability /= probability.sum()
-        jump_probability = probability @ (delay == 0)
-        # By the spacing of the candidate times.
-        spacing = float((self.time[1] - self.time[0]) ** 2 / 12)
-        results = []
-        for value, variance, error in (
-            (touch, spacing, TOUCH_ERRORS[self.release]),
-            (touch + 1e-3 * delay, spacing * jump_probability, ERRORS[kind]),
-        ):
-            mean = float(probability @ value)
-            results.append(
-                (mean, float(np.sqrt(probability @ ((value - mean) ** 2 + error**2) + variance)))
-            )
-        return results[0], results[1]
-
-    def _force_draws(self, kind: NDArray[np.intp], index: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Return draws of the averaged force as a fraction of the peak: [n_draw, n_delay]."""
-        row = np.repeat(np.arange(len(self.kinds)), N_DRAW)
-        pairs, pair = np.unique(row * len(self.time) + index, return_inverse=True)
-        lower = self.factors.reshape(-1, *self.factors.shape[2:])[pairs]
-        inverse = np.linalg.inv(lower[:, :-1, :-1])
-        normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(self.kinds), 1))
-        right = lower[pair, -1, :-1] + normal
-        units = (right[:, None] @ inverse[pair])[:, 0]
-        shapes = units * SPREADS[kind] + MEANS[kind]
-        return np.asarray(shapes @ AVERAGED_SHAPES.T, dtype=np.float64)
-
-
-def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
-    """Return the posterior of the first touch of a flank between two times, s.
-
-    There are up to `searches` searches, each in a shorter interval.
-    """
-    relative_force = flank.force / flank.peak
-    whitening = []
-    for misfit in MISFIT:
-        covariance = flank.covariance / flank.peak**2 + np.diag((misfit * relative_force) ** 2)
-        factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        inverse = solve_triangular(
-            factor, np.eye(len(relative_force)), lower=True, check_finite=False
-        )
-        whitening.append(inverse)
-    table = _table(1e3 * flank.interval, flank.chain)
-    kinds = np.arange(len(KINDS))
-    for search in range(searches):
-        time = np.linspace(low, high, N_TIME)
-        columns = _columns(table, 1e3 * (flank.time - time[:, None]), relative_force)
-        evidence = [
-            _evidence(columns, inverse, members)
-            for inverse, members in zip(
-                whitening, (kinds[kinds < N_SMOOTH], kinds[kinds >= N_SMOOTH]), strict=True
-            )
-            if members.size
-        ]
-        logarithm = np.concatenate([likelihood for likelihood, _ in evidence])
-        logarithm += LOG_PRIOR[kinds, int(flank.release), None]
+    error = np.hypot(MISFIT * force, SAMPLE_ERROR)
+    correlation = np.exp(-np.abs(np.subtract.outer(time, time)) / CORRELATION_TIME)
+    factor = np.linalg.cholesky(covariance + np.multiply.outer(error, error) * correlation)
+    inverse = solve_triangular(factor, np.eye(len(force)), lower=True, check_finite=False)
+    table = _table(1e3 * interval, chain)
+    low, high = search
+    for _ in range(N_SEARCH):
+        candidates = np.linspace(low, high, N_TIME)
+        count = int(np.searchsorted(time, high + FLANK))
+        tick = np.rint(1e3 * (time[:count] - candidates[:, None]) / TICK).astype(int)
+        tick = np.clip(tick + round(BEFORE / TICK), 0, len(table) - 1)
+        columns = np.empty((*tick.shape, table.shape[1] + 1))
+        columns[..., :-1], columns[..., -1] = table[tick], force[:count]
+        logarithm, factors = _evidence(columns, inverse[:count, :count])
+        logarithm += LOG_PRIOR[:, int(release), None]
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
-        likely = weight.sum(axis=1) > MIN_PROBABILITY
-        kinds, weight = kinds[likely], weight[likely]
-        factors = np.concatenate([factor for _, factor in evidence])[likely]
-        posterior = Posterior(time, kinds, weight, factors, flank.release)
-        mean, deviation = _moments(time, weight.sum(axis=0))
-        half_width = SEARCH_DEVIATIONS * deviation
-        if search + 1 == searches or (mean - half_width <= low and mean + half_width >= high):
+        mean = float(weight.sum(axis=0) @ candidates)
+        spacing = float((candidates[1] - candidates[0]) ** 2 / 12)
+        variance = float(weight.sum(axis=0) @ (candidates - mean) ** 2) + spacing
+        half_width = SEARCH_DEVIATIONS * float(np.sqrt(variance))
+        if mean - half_width <= low and mean + half_width >= high:
             break
         low, high = max(low, mean - half_width), min(high, mean + half_width)
-    return posterior
+    touch, delay, kind, probability = _draw_edges(candidates, weight, factors)
+    results = []
+    for value, variance, error in (
+        (touch, spacing, TOUCH_ERRORS[release]),
+        # A candidate time is that of the threshold only at a jump.
+        (touch + 1e-3 * delay, spacing * float(probability @ (delay == 0)), ERRORS[kind]),
+    ):
+        mean = float(probability @ value)
+        variance += float(probability @ ((value - mean) ** 2 + error**2))
+        results.append(Estimate(mean, float(np.sqrt(variance))))
+    return results[0], results[1]
 
 
-def _moments(time: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float]:
-    mean = float(weight @ time)
-    return mean, float(np.sqrt(weight @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12))
+def _draw_edges(
+    candidates: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    factors: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp], NDArray[np.float64]]:
+    """Return draws of touch, s, delay to 1 % of the peak, ms, and kind, with probabilities.
+
+    The arguments are candidate times, the posterior, [n_kind, n_time], and the factors of
+    `_evidence`. Draws with an implausible flank have no probability.
+    """
+    quantiles = (np.arange(N_DRAW) + 0.5) / N_DRAW
+    normal = _normal_draws(factors.shape[-1] - 1)
+    touches, forces, probabilities = [], [], []
+    kinds = np.flatnonzero(weight.sum(axis=1) > MIN_PROBABILITY)
+    for kind, row, lower in zip(kinds, weight[kinds], factors[kinds], strict=True):
+        index = np.minimum(np.searchsorted(row.cumsum(), quantiles * row.sum()), len(row) - 1)
+        used, pair = np.unique(index, return_inverse=True)
+        inverse = np.linalg.inv(lower[used, :-1, :-1])
+        units = ((lower[index, -1, :-1] + normal)[:, None] @ inverse[pair])[:, 0]
+        force = (units * SPREADS[kind] + MEANS[kind]) @ AVERAGED_SHAPES.T
+        highest = np.maximum.accumulate(force, axis=1) if kind < N_SMOOTH else 0.0
+        plausible = (highest - force).max(axis=1) <= MAX_FALL
+        touches.append(candidates[index])
+        forces.append(force)
+        probabilities.append(row.sum() * np.array([plausible, np.ones(N_DRAW)]))
+    probability, fallback = np.concatenate(probabilities, axis=1)
+    if not probability.any():
+        probability = fallback
+    delay = _crossing(np.concatenate(forces), THRESHOLD)
+    kind = np.repeat(kinds, N_DRAW)
+    return np.concatenate(touches), delay, kind, probability / probability.sum()
 
 
 def _evidence(
-    columns: NDArray[np.float64], inverse: NDArray[np.float64], kinds: NDArray[np.intp]
+    columns: NDArray[np.float64], inverse: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return logarithms of the likelihood by kind and time, and factors of the information.
 
@@ -268,7 +227,7 @@ def _evidence(
     n_time, n_cell, n_column = columns.shape
     flat = np.moveaxis(columns, 1, 0).reshape(n_cell, -1)
     white = (inverse @ flat).reshape(n_cell, n_time, n_column).transpose(1, 2, 0)
-    transforms = TRANSFORMS[kinds, None]
+    transforms = TRANSFORMS[:, None]
     information = transforms.swapaxes(2, 3) @ (white @ white.swapaxes(1, 2)) @ transforms
     shapes = np.arange(n_column - 1)
     information[..., shapes, shapes] += 1
@@ -300,7 +259,7 @@ def _normal_draws(count: int) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=4)
 def _table(interval: float, chain: Chain | None) -> NDArray[np.float64]:
-    """Return the smoothed shapes of a flank at ticks around the touch: [n_tick, n_column]."""
+    """Return the shapes of a flank at ticks around the touch: [n_tick, n_column]."""
     ticks = np.arange(-round((BEFORE + GUARD) / TICK), round((AFTER + GUARD) / TICK))
     tau = np.asarray(TICK * ticks, dtype=np.float64)
     total = np.zeros((len(tau), SPREADS.shape[1]))
@@ -313,17 +272,6 @@ def _table(interval: float, chain: Chain | None) -> NDArray[np.float64]:
     guard = round(GUARD / TICK)
     # A view would keep the guard in memory.
     return total[guard:-guard].copy()
-
-
-def _columns(
-    table: NDArray[np.float64], tau: NDArray[np.float64], relative_force: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return shapes at times since the touch, ms, then the force: [n_time, n_cell, n_column]."""
-    index = np.rint(tau / TICK).astype(int) + round(BEFORE / TICK)
-    result = np.empty((*tau.shape, table.shape[1] + 1))
-    result[..., :-1] = table[np.clip(index, 0, len(table) - 1)]
-    result[..., -1] = relative_force
-    return result
 
 
 def _shapes(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:

@@ -25,7 +25,6 @@ from thud.recordings.same_drops import (
     refuse_same_drops,
     refuse_simultaneous_channels,
 )
-from thud.recordings.tones import remove_tones
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -125,8 +124,6 @@ def measure_window(window: Window, config: Config) -> Drop:
     if window.signal.cells:
         window, faults = repair_cells(window)
         notes += faults
-    window, removed = remove_tones(window)
-    notes += removed
     chain, plate, recorded = config.chain, config.resonance, window
     if chain is not None:
         window, corrected = correct_window(window, chain)

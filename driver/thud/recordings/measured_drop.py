@@ -18,10 +18,10 @@ from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
-from thud.recordings.contact import SAMPLE_ERROR, Contact, estimate_limits, find_contact
+from thud.recordings.background import find_offset_step, remove_background, step_errors
+from thud.recordings.contact import SAMPLE_ERROR, Contact, find_contact
 from thud.recordings.faults import check_jumps, min_background, repair
 from thud.recordings.noise import Noise
-from thud.recordings.offset_step import find_offset_step, step_errors
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
@@ -57,8 +57,6 @@ MIN_CONTACT_RATIO = 4.0
 MAX_BOUNCE_RATIO = 3.0
 # Deviation of the offset by quantization, as a fraction of the peak, that raises a warning.
 MAX_OFFSET = 5e-4
-# Minimum drift and hum that are noted, in standard deviations.
-MIN_DEVIATIONS = 3.0
 # Quantities of `QUANTITIES` that are estimated for each drop.
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
@@ -150,9 +148,12 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     Raise InputError if the pulse is clipped, cut off or doubled, or has long dropouts.
     """
     force, faults = repair(window)
-    notes = [*window.notes, *faults]
+    notes, rate = [*window.notes, *faults], window.sample_rate
     try:
-        contact = find_contact(window, force)
+        quiet, removed, background = remove_background(
+            force, rate, window.contact, window.quantization
+        )
+        contact = find_contact(quiet, removed, background, rate, window.contact, window.chain)
     except np.linalg.LinAlgError as error:
         refuse(
             f"{window.name}: the background is not noise",
@@ -173,11 +174,10 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         )
     if window.chain is None:
         notes += check_jumps(contact)
-    offset_step = find_offset_step(contact)
+    impulse, peak_force = _impulse(contact), _peak(contact)
+    offset_step = find_offset_step(background, impulse.value)
     if offset_step:
         notes.append(Note("offset_step", value=offset_step, unit="N", effect=0.0))
-    impulse, peak_force = _impulse(contact), _peak(contact)
-    if offset_step:
         errors = step_errors(offset_step, len(contact.gated))
         error_impulses = errors.sum(axis=1) / contact.sample_rate
         impulse = _with_half_width(impulse, float(np.abs(error_impulses).max()))
@@ -200,7 +200,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
     methods, unknown = conditions.restitutions(impulse, duration, flights)
     notes += (*_check_aliasing(contact, window.chain), *_check_step(window, contact), *unknown)
     restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
-    rate, first = window.sample_rate, contact.span[0]
+    first = contact.span[0]
     return Drop(
         name=window.name,
         begin=first / rate - contact.touch.value,
@@ -219,7 +219,7 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         effective_mass=conditions.effective_mass(impulse, duration, methods.get(BOUNCES)),
         noise=_noise(contact),
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
-        notes=(*_removed(contact), *notes),
+        notes=(*contact.notes, *notes),
         contact=contact,
     )
 
@@ -236,10 +236,15 @@ def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate,
         minimum = min_background(bounce.sample_rate)
         if first < minimum or len(bounce.force) - stop < minimum:
             break
-        delay = (bounce.start - window.start) / window.sample_rate
+        rate = bounce.sample_rate
+        quiet, removed, background = remove_background(
+            bounce.force, rate, bounce.contact, bounce.quantization, drop.background
+        )
+        landing = find_contact(quiet, removed, background, rate, bounce.contact, bounce.chain)
+        delay = (bounce.start - window.start) / rate
         begin, end = (
             Estimate(delay + edge.value, edge.uncertainty)
-            for edge in estimate_limits(bounce, drop.background)
+            for edge in (landing.touch, landing.release)
         )
         landings.append((begin, end))
     return landings
@@ -310,21 +315,6 @@ def _noise(contact: Contact) -> Noise:
     deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
     white, pink, brown = map(float, contact.background.variances[:3])
     return Noise(deviation, "before and after", white, pink, brown)
-
-
-def _removed(contact: Contact) -> tuple[Note, ...]:
-    """Return notes on what was removed with the background."""
-    first, stop = (index - contact.span[0] for index in contact.gate)
-    offset = float(contact.removed[first:stop].mean())
-    notes = [Note("offset_removed", value=offset, unit="N")]
-    drift, deviation = contact.background.drift
-    if abs(drift) > MIN_DEVIATIONS * deviation:
-        notes.append(Note("drift_removed", value=float(drift), unit="N/s"))
-    frequency, amplitude, deviation = contact.background.hum
-    if amplitude > MIN_DEVIATIONS * deviation:
-        hum = {"frequency": float(frequency)}
-        notes.append(Note("hum_removed", value=float(amplitude), unit="N", others=hum))
-    return tuple(notes)
 
 
 def _check_step(window: Window, contact: Contact) -> tuple[Note, ...]:

@@ -1,21 +1,21 @@
-"""Noise and background of a signal next to a contact (docs/recordings_theory.md, section 2)."""
+"""Noise of a signal, and the background that it predicts (docs/recordings_theory.md, section 2)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve, lapack, solve_triangular
-from scipy.special import chdtri, ndtri
-from scipy.stats import qmc
 
 from thud.base.immutable import Immutable
 from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.note import Note
 
     Cells = tuple[NDArray[np.float64], NDArray[np.float64]]  # begins and ends, s
 
@@ -27,8 +27,6 @@ N_HARMONIC = 5
 # Wide prior standard deviations of offset, and of drift per second, as fractions of the peak force.
 OFFSET = 1.0
 DRIFT = 0.1
-# The exact covariance of two cells is used if squared lag / mean squared length is less than this.
-EXACT_LAG = 8.0
 # The prior density of the logarithm of a variance is proportional to this power of the variance.
 # The power is lower by 1 for large variances: standard deviation of a cell above PRIOR_DEVIATION
 # times the peak force.
@@ -36,13 +34,12 @@ SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 PRIOR_DEVIATION = 0.03
 # Standard deviation of each cell due to quantization, as a fraction of the peak force.
 QUANTIZATION = 1e-6
-# Number of draws of the variances, and number of draws after resampling by the posterior.
-N_DRAW = 64
-N_RESAMPLED = 16
-# Degrees of freedom of the Student distribution of the draws.
-DEGREES_OF_FREEDOM = 5
+# Distance of the variances that represent the posterior from the most probable ones, in standard
+# deviations. With sqrt(5) they would have its covariance; 95 % intervals of levels contain 95 to 97
+# % of the errors with 2, and 95 to 100 % with sqrt(5).
+DISTANCE = 2.0
 # Search for the maximum of the posterior: maximum number of iterations, tolerance of the logarithm.
-MAX_ITERATIONS = 25
+MAX_ITERATIONS = 50
 TOLERANCE = 0.02
 
 
@@ -82,22 +79,15 @@ def covariances_without_white(cells: Cells, other: Cells) -> NDArray[np.float64]
 
     Any two cells are equal or disjoint. The first axis is pink noise, brown noise (each of density
     1 at 1 Hz), and hum of 50 Hz and of 60 Hz (each of variance 1). Pink and brown noise have the
-    covariances -ln|lag| and -pi**2 |lag|, except for a constant, which the unknown offset absorbs.
-    For distant cells, the mean of -ln|lag| is exact to second order in the lengths of the cells.
+    covariances -ln|lag| and -pi**2 |lag|, except for a constant, which the unknown offset absorbs:
+    those of means are differences of their second integrals at the corners of a pair of cells.
     """
     (a, b), (c, d) = cells, other
-    lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
-    width = (((b - a) ** 2)[:, None] + (d - c) ** 2) / 2
-    near = np.nonzero(lag**2 < EXACT_LAG * width)
-    lag[near] = 1.0
-    pink = width / (12 * lag**2) - np.log(lag)
-    brown = -(np.pi**2) * lag
-    # Adjacent or equal cells: corner differences of the second integrals.
-    a, b, c, d = a[near[0]], b[near[0]], c[near[1]], d[near[1]]
-    size: NDArray[np.float64] = np.maximum(np.abs([b - c, a - c, b - d, a - d]), 1e-300)
-    sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
-    pink[near] = (sign * (size**2 * (0.75 - 0.5 * np.log(size))).T).sum(1)
-    brown[near] = (sign * (-(np.pi**2) / 6 * size**3).T).sum(1)
+    pairs = ((b, c), (a, c), (b, d), (a, d))
+    size = np.maximum(np.abs([np.subtract.outer(*pair) for pair in pairs]), 1e-300)
+    integrals = [size**2 * (0.75 - 0.5 * np.log(size)), -(np.pi**2) / 6 * size**3]
+    signs = np.array([1, -1, -1, 1])
+    pink, brown = np.tensordot(integrals, signs, (1, 0)) / np.multiply.outer(b - a, d - c)
     waves = _waves(cells)
     hum = waves @ (waves if other is cells else _waves(other)).swapaxes(1, 2)
     return np.array([pink, brown, *hum])
@@ -123,8 +113,10 @@ class Background(Immutable):
 
     `cells` are begins and ends of cells, s, and `mean`, [n_cell], their mean forces, N. Each row of
     `draws`, [n_draw, 5], has the densities of white, pink and brown noise, N2/Hz, and the variances
-    of hum of 50 and of 60 Hz, N2; if they are known, there is one row. The peak force, N, scales
-    the priors. The predictions exclude the errors by `quantization`.
+    of hum of 50 and of 60 Hz, N2; the rows are equally probable. The peak force, N, scales the
+    priors. The predictions exclude the errors by `quantization`. Times of cells are from `middle`,
+    s from the first sample; `ends` are the end of the background before the contact and its begin
+    after it, s. `tones` are notes on what was removed before the fit.
     """
 
     cells: Cells
@@ -132,6 +124,9 @@ class Background(Immutable):
     draws: NDArray[np.float64]
     peak: float
     quantization: Quantization = field(default_factory=Quantization)
+    middle: float = 0.0
+    ends: tuple[float, float] = (0.0, 0.0)
+    tones: tuple[Note, ...] = ()
 
     @property
     def variances(self) -> NDArray[np.float64]:
@@ -146,16 +141,16 @@ class Background(Immutable):
     @cached_property
     def _factors(self) -> list[NDArray[np.float64]]:
         """Cholesky factor of the covariance of the cells for each draw."""
-        unit, fixed = unit_covariances(self.cells), _fixed(self.cells, self.peak)
+        unit, fixed = unit_covariances(self.cells), fixed_covariance(self.cells, self.peak)
         return [
             np.asarray(np.linalg.cholesky(np.tensordot(draw, unit, 1) + fixed), dtype=np.float64)
             for draw in self.draws
         ]
 
     @cached_property
-    def _weights(self) -> list[NDArray[np.float64]]:
-        """Inverse covariance of the cells times their means for each draw."""
-        return [cho_solve((f, True), self.mean, check_finite=False) for f in self._factors]
+    def _weights(self) -> NDArray[np.float64]:
+        """Inverse covariance of the cells times their means for each draw, [n_draw, n_cell]."""
+        return np.array([cho_solve((f, True), self.mean, check_finite=False) for f in self._factors])
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the expected background in cells, N, and the covariance of its error, N2.
@@ -170,7 +165,7 @@ class Background(Immutable):
         means = np.empty((len(self.draws), len(cells[0])))
         for k, (draw, factor) in enumerate(zip(self.draws, self._factors, strict=True)):
             covariance = np.tensordot(draw[1:], cross_covariances, 1) + trend
-            whitened = _solve_lower(factor, covariance)
+            whitened = solve_lower(factor, covariance)
             means[k] = self._weights[k] @ covariance
             total -= whitened.T @ whitened / len(self.draws)
         mean = means.mean(axis=0)
@@ -179,10 +174,9 @@ class Background(Immutable):
 
     def predict_mean(self, cells: Cells) -> NDArray[np.float64]:
         """Return the expected background in cells, N."""
-        cross_covariances = covariances_without_white(self.cells, cells)
-        mean = np.mean(self._weights, axis=0) @ _trend(self.cells, cells, self.peak)
-        for draw, weights in zip(self.draws, self._weights, strict=True):
-            mean += np.tensordot(draw[1:], weights @ cross_covariances, 1) / len(self.draws)
+        weights = self.draws[:, 1:].T @ self._weights / len(self.draws)
+        mean = self._weights.mean(axis=0) @ _trend(self.cells, cells, self.peak)
+        mean += np.einsum("ki,kij->j", weights, covariances_without_white(self.cells, cells))
         return np.asarray(mean, dtype=np.float64)
 
     @property
@@ -190,8 +184,8 @@ class Background(Immutable):
         """Drift, N/s, and its standard deviation."""
         prior = (self.peak * DRIFT) ** 2
         middle = (self.cells[0] + self.cells[1]) / 2
-        information = [float(np.sum(_solve_lower(factor, middle) ** 2)) for factor in self._factors]
-        values = prior * np.array([middle @ weights for weights in self._weights])
+        information = [float(np.sum(solve_lower(factor, middle) ** 2)) for factor in self._factors]
+        values = prior * self._weights @ middle
         variance = max(prior - prior**2 * float(np.mean(information)), 0.0) + float(values.var())
         return float(values.mean()), float(np.sqrt(variance))
 
@@ -200,13 +194,12 @@ class Background(Immutable):
         """Frequency of the stronger hum, Hz, amplitude, N, and its standard deviation, N."""
         k = int(np.argmax(self.variances[3:]))
         waves = _waves(self.cells)[k]
-        scaled = [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)]
-        hum = waves @ waves.T @ np.mean(scaled, axis=0)
+        hum = waves @ waves.T @ (self.draws[:, 3 + k] @ self._weights) / len(self.draws)
         noise = np.mean(self.variances[0] / 2 / (self.cells[1] - self.cells[0]))
         return MAINS[k], float(np.sqrt(2 * np.mean(hum**2))), float(np.sqrt(2 * noise / len(hum)))
 
 
-def _solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solve a lower triangular system without the slow checks of SciPy."""
     return np.asarray(lapack.dtrtrs(factor, right, lower=True)[0])
 
@@ -217,7 +210,7 @@ def _trend(cells: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
     return np.asarray(peak**2 * (OFFSET**2 + DRIFT**2 * time), dtype=np.float64)
 
 
-def _fixed(cells: Cells, peak: float) -> NDArray[np.float64]:
+def fixed_covariance(cells: Cells, peak: float) -> NDArray[np.float64]:
     """Return the part of the covariance of cells due to offset, drift and quantization."""
     return _trend(cells, cells, peak) + (QUANTIZATION * peak) ** 2 * np.eye(len(cells[0]))
 
@@ -228,105 +221,79 @@ def unit_covariances(cells: Cells) -> NDArray[np.float64]:
     return np.concatenate([white[None], covariances_without_white(cells, cells)])
 
 
-def fit_background(cells: Cells, mean: NDArray[np.float64], peak: float) -> Background:
-    """Return the background with variances drawn from their posterior.
+def fit_background(
+    cells: Cells,
+    mean: NDArray[np.float64],
+    peak: float,
+    column: NDArray[np.floating] | None = None,
+) -> Background:
+    """Return the background with variances that represent their posterior.
 
-    Arguments are as in `Background`; times are relative to about the middle of the contact.
+    Other arguments are as in `Background`; times are relative to about the middle of the contact.
+    A multiple of `column`, [n_cell], of about the peak may be in the means.
+
+    These are the most probable logarithms of the variances, plus and minus DISTANCE times each
+    column of a square root of their covariance in a normal approximation. The prior densities
+    increase with the variances up to about those of PRIOR_DEVIATION, so that the estimate of absent
+    noise is small and not zero.
     """
-    unit = unit_covariances(cells)
+    unit, fixed = unit_covariances(cells), fixed_covariance(cells, peak)
+    if column is not None:
+        fixed += peak**2 * np.multiply.outer(column, column)
     # Approximate variance of a cell per unit of each variance; for brown noise over 0.02 s, the
     # duration of a contact.
     scale = np.array([np.mean(np.diagonal(unit[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
-    posterior = _Posterior(unit, _fixed(cells, peak), mean, (PRIOR_DEVIATION * peak) ** 2 / scale)
+    large = (PRIOR_DEVIATION * peak) ** 2 / scale
     # First guess of the variance: half the mean square difference of adjacent cells.
     adjacent = cells[0][1:] - cells[1][:-1] < 1e-3 * (cells[1] - cells[0])[1:]
     differences = np.diff(mean)[adjacent]
     variance = np.mean(differences**2) / 2 if differences.size else 0.0
     variance += (QUANTIZATION * peak) ** 2
-    guess = np.log(variance * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
-    maximum, curvature = posterior.maximum(guess)
-    return Background(cells, mean, np.exp(posterior.draw(maximum, curvature)), peak)
+    best = np.log(variance * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
+
+    value, score, curvature = _log_posterior(best, unit, fixed, mean, large)
+    fraction = 1.0
+    for _ in range(MAX_ITERATIONS):
+        step = fraction * np.clip(np.linalg.solve(curvature, score), -3, 2)
+        trial = _log_posterior(best + step, unit, fixed, mean, large)
+        if trial[0] < value:
+            fraction /= 3
+            if np.abs(step).max() < TOLERANCE:
+                break
+            continue
+        gain, best, fraction = trial[0] - value, best + step, 1.0
+        value, score, curvature = trial
+        if gain < TOLERANCE:
+            break
+    # With curvature = L L', the rows of inverse(L) are the square root of its inverse.
+    lower = np.linalg.cholesky(curvature)
+    steps = DISTANCE * solve_triangular(lower, np.eye(len(best)), lower=True)
+    return Background(cells, mean, np.exp(np.concatenate([best + steps, best - steps])), peak)
 
 
-@dataclass(frozen=True, eq=False)
-class _Posterior:
-    """Posterior of the logarithms of the variances.
+def _log_posterior(
+    phi: NDArray[np.float64],
+    unit: NDArray[np.float64],
+    fixed: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    large: NDArray[np.float64],
+) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
+    """Return the posterior of logarithms of the variances: logarithm, gradient, curvature.
 
-    The covariance of the cells is linear in the variances: `unit` has the covariance for each unit
-    variance, `fixed` is the part that does not depend on the variances. The priors increase with
-    the variances up to about `large`, so that the estimate of absent noise is small and not zero.
+    The covariance of the cells is `fixed`, and `unit` times the variances. The curvature is the
+    average information (Gilmour, Thompson and Cullis 1995) of likelihood and priors.
     """
-
-    unit: NDArray[np.float64]
-    fixed: NDArray[np.float64]
-    mean: NDArray[np.float64]
-    large: NDArray[np.float64]
-
-    def logarithm(self, phi: NDArray[np.float64]) -> float:
-        """Return the logarithm of the posterior."""
-        theta = np.exp(phi)
-        factor, failed = lapack.dpotrf(np.tensordot(theta, self.unit, 1) + self.fixed, lower=True)
-        if failed:
-            return -np.inf
-        white = _solve_lower(factor, self.mean)
-        value = -np.log(np.diagonal(factor)).sum() - 0.5 * white @ white
-        return float(value + SLOPE @ phi - np.log1p(theta / self.large).sum())
-
-    def _derivatives(
-        self, phi: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the gradient, and the average information of likelihood and priors."""
-        theta = np.exp(phi)
-        factor, _ = lapack.dpotrf(np.tensordot(theta, self.unit, 1) + self.fixed, lower=True)
-        inverse = lapack.dpotri(factor, lower=True)[0]
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        weighted = inverse @ self.mean
-        products = (self.unit @ weighted) * theta[:, None]
-        trace = theta * np.einsum("kij,ij->k", self.unit, inverse)
-        score = 0.5 * (products @ weighted - trace) + SLOPE - theta / (theta + self.large)
-        # At the maximum, the scores of likelihood and prior cancel; the latter is about SLOPE.
-        return score, 0.5 * products @ inverse @ products.T + np.diag(SLOPE)
-
-    def maximum(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the most probable logarithms, from a first guess, and the curvature at them."""
-        value = self.logarithm(phi)
-        score, curvature = self._derivatives(phi)
-        for _ in range(MAX_ITERATIONS):
-            step = np.clip(np.linalg.solve(curvature, score), -3, 2)
-            trial = self.logarithm(phi + step)
-            while trial < value and np.abs(step).max() > TOLERANCE:
-                step /= 3
-                trial = self.logarithm(phi + step)
-            if trial < value:
-                break
-            gain, phi, value = trial - value, phi + step, trial
-            score, curvature = self._derivatives(phi)
-            if gain < TOLERANCE:
-                break
-        return phi, curvature
-
-    def draw(
-        self, maximum: NDArray[np.float64], curvature: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return draws from the posterior, [N_RESAMPLED, 5], by importance resampling."""
-        steps, logarithm = _student(len(maximum))
-        # Each row of `phi` is a draw, whose covariance is proportional to inverse(curvature) =
-        # inverse(L)' inverse(L).
-        lower = np.linalg.cholesky(curvature)
-        phi = maximum + solve_triangular(lower, steps.T, lower=True, trans="T").T
-        weight = np.array([self.logarithm(draw) for draw in phi]) - logarithm
-        weight = np.exp(weight - weight.max())
-        quantiles = (np.arange(N_RESAMPLED) + 0.5) / N_RESAMPLED * weight.sum()
-        return np.asarray(phi[np.searchsorted(weight.cumsum(), quantiles)])
-
-
-@lru_cache(maxsize=8)
-def _student(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return draws of Student's distribution, [N_DRAW, count], and their logarithmic density."""
-    points = qmc.Sobol(count + 1, seed=0).random(N_DRAW)
-    normal = ndtri(points[:, :-1])
-    draws = normal / np.sqrt(chdtri(DEGREES_OF_FREEDOM, points[:, -1:]) / DEGREES_OF_FREEDOM)
-    logarithm = (
-        -(DEGREES_OF_FREEDOM + count) / 2 * np.log1p((draws**2).sum(axis=1) / DEGREES_OF_FREEDOM)
-    )
-    return draws, logarithm
+    theta = np.exp(phi)
+    factor, failed = lapack.dpotrf(np.tensordot(theta, unit, 1) + fixed, lower=True)
+    if failed:
+        return -np.inf, np.zeros_like(phi), np.eye(len(phi))
+    inverse = lapack.dpotri(factor, lower=True)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    weighted = inverse @ mean
+    value = -np.log(np.diagonal(factor)).sum() - 0.5 * mean @ weighted
+    value += SLOPE @ phi - np.log1p(theta / large).sum()
+    products = (unit @ weighted) * theta[:, None]
+    trace = theta * np.einsum("kij,ij->k", unit, inverse)
+    score = 0.5 * (products @ weighted - trace) + SLOPE - theta / (theta + large)
+    # At the maximum, the scores of likelihood and prior cancel; the latter is about SLOPE.
+    return float(value), score, 0.5 * products @ inverse @ products.T + np.diag(SLOPE)

@@ -14,9 +14,9 @@ from thud.base.checks import require_choice
 from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Budget, Size
 from thud.level.levels import force_exposure_levels, get_bands
+from thud.recordings.background import step_errors
 from thud.recordings.band_noise import band_noise
 from thud.recordings.filters import filter_levels
-from thud.recordings.offset_step import step_errors
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from thud.base.immutable import freeze
-from thud.recordings.contact import cells_between
+from thud.recordings.background import cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.noise import (
     DRIFT,
