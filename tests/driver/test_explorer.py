@@ -306,9 +306,9 @@ def test_file_of_the_laboratory_is_read_with_its_recordings(client: TestClient) 
 @pytest.mark.parametrize(
     ("files", "words"),
     [
-        ([("lab.toml", LABORATORY)], "'lab.toml': is the file of a laboratory"),
+        ([("lab.toml", LABORATORY)], "lab.toml: is the file of a laboratory"),
         ([("a.toml", b""), ("b.toml", b""), ("a.wav", WAV)], "2 files of laboratories"),
-        ([("lab.toml", b"mass = 'x'"), ("a.wav", WAV)], "'lab.toml': “Mass, kg”"),
+        ([("lab.toml", b"mass = 'x'"), ("a.wav", WAV)], "lab.toml: “Mass, kg”"),
         (
             [("lab.toml", b"[report]\naccreditation_mark = '/etc/x.png'"), ("a.wav", WAV)],
             "accreditation_mark cannot be sent",
@@ -400,43 +400,42 @@ def test_uncertainties_of_the_fields_are_counted(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize(
-    ("query", "words"),
+    ("query", "field"),
     [
-        ({}, "'ball 1.wav': enter “Calibration”"),
-        ({"filter_order": "4"}, "“Filter of the recorder” is not chosen; allowed: flat, Bessel"),
-        (
-            {"filter_kind": "bessel", "filter_order": "4"},
-            "“Cutoff of the filter (−3 dB), Hz” is mis",
-        ),
-        ({"filter_kind": "bessel", "filter_order": "4.5"}, "“Order of the filter” = 4.5 is not"),
-        ({"plate_f0": "1500"}, "“Quality factor of the force plate” is missing"),
+        ({}, "calibration"),
+        ({"filter_order": "4"}, "filter_kind"),
+        ({"filter_kind": "bessel", "filter_order": "4"}, "filter_cutoff"),
+        ({"filter_kind": "bessel", "filter_order": "4.5"}, "filter_order"),
+        ({"plate_f0": "1500"}, "plate_Q"),
+        ({"height": "-1"}, "height"),
+        ({"height": "high"}, "height"),
+        ({"calibration": "much"}, "calibration"),
+        ({"unit": "stone"}, "unit"),
+        ({"calibration_uncertainty": "60"}, "calibration_uncertainty"),
+        ({"channel": "1", "channels": "sum"}, "channel"),
+        ({"channel": "9", "calibration": "1 N/FS"}, "channel"),
+        ({"drops": "7", "calibration": CALIBRATION}, "drops"),
+    ],
+)
+def test_errors_of_a_recording_name_their_fields(
+    client: TestClient, query: dict[str, str], field: str
+) -> None:
+    response = client.post("/measure", **form_of(WAV, {"name": "ball 1.wav"} | query))
+    report = json.loads(response.text.splitlines()[-1])
+    assert report["field"] == field
+    # Names of copies are those of the files, without a folder.
+    assert tempfile.gettempdir() not in report["error"]
+
+
+def test_ranges_of_a_recording_are_in_the_unit_of_their_fields(client: TestClient) -> None:
+    for query, words in (
         ({"height": "-1"}, "“Drop height, m” = -1 is not allowed; allowed: 0.001 to 10 m"),
-        ({"height": "high"}, "“Drop height, m” = 'high' is not a number"),
-        ({"calibration": "much"}, "“Calibration”: 'much' is not a number with units"),
-        ({"unit": "stone"}, "“Unit of the values” = 'stone' is not known"),
         (
             {"calibration_uncertainty": "60"},
             "“Uncertainty of the calibration, %” = 60 is not allowed; allowed: 0 to 50",
         ),
-        (
-            {"channel": "1", "channels": "sum"},
-            "both “Channel” and “Load cells to be added” are stated",
-        ),
-        (
-            {"channel": "9", "calibration": "1 N/FS"},
-            "'ball 1.wav': “Channel” = 9 matches 0 channels",
-        ),
-        ({"drops": "7", "calibration": CALIBRATION}, "“Drops”: there is no drop 7"),
-    ],
-)
-def test_messages_on_a_recording_name_its_fields_and_its_file(
-    client: TestClient, query: dict[str, str], words: str
-) -> None:
-    response = client.post("/measure", **form_of(WAV, {"name": "ball 1.wav"} | query))
-    is_begun = response.status_code == 200
-    message = json.loads(response.text.splitlines()[-1])["error"] if is_begun else response.text
-    assert words in message
-    assert "recording.wav" not in message
+    ):
+        assert measured(client, WAV, **query)["error"] == words
 
 
 def test_load_cells_are_named_like_the_fields(client: TestClient) -> None:
@@ -448,12 +447,10 @@ def test_load_cells_are_named_like_the_fields(client: TestClient) -> None:
     np.savetxt(text, cells, "%.9g", ",", header="time_s,F1_N,F2_N", comments="")
     content = text.getvalue().encode()
     report = measured(client, content, name="cells.csv")
-    assert "“Load cells to be added” =" in report["error"]
-    assert "or “Channel” = the force" in report["error"]
+    assert report["field"] == "channels"
     query = {"name": "cells.csv", "channels": "sum"}
     warnings = measured(client, content, **query)["answer"]["warnings"]
     assert warnings
-    assert not any("[" in warning or "recording.csv" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])
@@ -501,7 +498,6 @@ def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: Tes
     assert answer["headline"]["result"] == "undecided"
     (asked,) = answer["asks"]
     assert asked["values"] == {"plate_f0": "1100", "plate_Q": "24"}
-    assert any("“First resonance of the force plate, Hz” = 1100" in w for w in answer["warnings"])
     # The share of the resonance is asked for next, as half of it would conform.
     answer = measured(client, content, **fields, **asked["values"])["answer"]
     assert answer["headline"]["result"] == "undecided"
@@ -661,7 +657,7 @@ def test_recordings_that_do_harm_get_a_sentence(
 ) -> None:
     report = measured(client, content, name=name, unit="N")
     assert words in report["error"]
-    assert repr(name) in report["error"]
+    assert report["error"].startswith(name)
 
 
 def copies_in(folder: Path) -> list[Path]:

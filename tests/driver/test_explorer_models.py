@@ -153,7 +153,7 @@ def test_modulus_that_is_too_low_is_named_with_three_digits() -> None:
         compute(case)
     report = describe_error(raised.value)
     assert report["field"] == "ball.youngs_modulus"
-    assert report["error"].startswith("Young's modulus = 0.05 MPa is too low for this drop: ")
+    assert report["error"].startswith("Young's modulus = 50000.0 Pa is too low for this drop: ")
     assert not re.search(r"\d\.\d{3,}", report["error"])
 
 
@@ -222,7 +222,7 @@ def test_choices_of_a_rating_name_their_standards() -> None:
 
 def test_group_without_effect_is_refused() -> None:
     values = {"model": {"name": "hollow_sphere"}, "mesh": {"radial_elements": 3}}
-    with pytest.raises(thud.InputError, match="&mesh does nothing"):
+    with pytest.raises(thud.InputError, match="mesh: does nothing"):
         new_case(values)
 
 
@@ -298,7 +298,7 @@ def test_wall_denser_than_any_material_is_refused(wall: float) -> None:
     values = {"model": {"name": "modal_ball"}, "ball": {"wall_thickness": wall}}
     error = error_of(values)
     assert error["field"] == "ball.wall_thickness"
-    assert error["error"].startswith(f"Wall thickness = {1e3 * wall:g} mm gives the wall ")
+    assert error["error"].startswith(f"Wall thickness = {wall!r} is too thin: the wall has ")
     # A tyre has no such wall.
     new_case(values | {"model": {"name": "two_mass"}})
 

@@ -98,7 +98,7 @@ def test_curve_that_the_model_does_not_explain_says_so(client: TestClient) -> No
     ("content", "fields", "words"),
     [
         ("", {}, "press 1.csv: cannot be read (no numbers); allowed: a column of deflection"),
-        ("force (N)\n1\n2", {}, "press 1.csv: the file has 1 column of numbers; allowed: a column"),
+        ("force (N)\n1\n2", {}, "press 1.csv: has 1 column of numbers; allowed: a column"),
         (
             "travel,force (N)\n0,0\n1,2",
             {},

@@ -25,37 +25,46 @@ MAX_NUMBER = 10**300
 MAX_SEED = 2**32 - 1
 
 
-def refuse(
-    problem: str, allowed: str, cause: Exception | None = None, *, subject: str = ""
+def refuse(  # noqa: PLR0913 - the fields of a note
+    problem: str,
+    allowed: str,
+    cause: Exception | None = None,
+    *,
+    name: str = "",
+    subject: str = "",
+    value: object = None,
+    low: float = math.nan,
+    high: float = math.nan,
 ) -> NoReturn:
     """Raise InputError with a message that states the problem and what is allowed.
 
-    The subject is the key that would mend it, if there is one.
+    Parameters
+    ----------
+    problem
+        What is wrong, or what is wrong with the argument or key of the name.
+    allowed
+        What is allowed, after the problem.
+    cause
+        Exception that shows the problem.
+    name
+        Name of an argument or key, with which the message begins.
+    subject
+        Key that would mend it, by default that of the name.
+    value, low, high
+        Number that is not allowed, and its range.
     """
-    message = f"{problem}; allowed: {allowed}"
-    note = Note("refused", subject, others={"name": "", "text": message}) if subject else None
-    raise InputError(message, note) from cause
-
-
-def refuse_value(  # noqa: PLR0913 - the fields of a note
-    name: str,
-    value: object,
-    allowed: str,
-    *,
-    subject: str = "",
-    low: float = math.nan,
-    high: float = math.nan,
-    problem: str = "not allowed",
-) -> NoReturn:
-    """Raise InputError for a value that is not allowed, or not within a range.
-
-    The subject is by default the name.
-    """
-    text = f"= {shown(value)} is {problem}; allowed: {allowed}"
+    text = f"{problem}; allowed: {allowed}"
     number = float(value) if isinstance(value, int | float) and not math.isnan(low) else math.nan
-    others = {"name": name, "text": text}
-    note = Note("refused", subject or name, number, low, high, others=others)
-    raise InputError(str(note), note)
+    note = Note("refused", subject or name, number, low, high, others={"name": name, "text": text})
+    raise InputError(str(note).lstrip(), note) from cause
+
+
+def refuse_value(
+    name: str, value: object, allowed: str, *, low: float = math.nan, high: float = math.nan
+) -> NoReturn:
+    """Raise InputError for a value that is not allowed, or not within a range; see `refuse`."""
+    problem = f"= {shown(value)} is not allowed"
+    refuse(problem, allowed, name=name, value=value, low=low, high=high)
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
@@ -70,8 +79,8 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
 def require_choice(name: str, value: object, allowed: Collection[str]) -> None:
     """Raise InputError if a value is not one of the allowed words."""
     if not isinstance(value, str) or value not in allowed:
-        unknown = f"not known{suggestion(value, allowed)}"
-        refuse_value(name, value, ", ".join(map(repr, allowed)), problem=unknown)
+        unknown = f"= {shown(value)} is not known{suggestion(value, allowed)}"
+        refuse(unknown, ", ".join(map(repr, allowed)), name=name)
 
 
 def require_mapping(name: str, value: object, entries: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -30,8 +31,15 @@ class ThudError(Exception):
         self.note = note
 
     def within(self, place: object) -> Self:
-        """Return the error with a place, such as a path, in front of its message."""
-        return type(self)(f"{place}: {self}", self.note)
+        """Return the error with a place, such as a path, in front of its message.
+
+        It is the beginning of the text ``"place"`` of the note, too.
+        """
+        note = self.note
+        if note:
+            before = f"{place}: {note.others.get('place', '')}"
+            note = replace(note, others={**note.others, "place": before})
+        return type(self)(f"{place}: {self}", note)
 
 
 class FitWarning(UserWarning):

@@ -65,11 +65,13 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     used = case.to_namelist()
     for group in values:
         if group not in used:
-            refuse(f"&{group} does nothing with this model and floor", ", ".join(used))
+            problem = f"{humanize(group)}: does nothing with this model and floor"
+            refuse(problem, ", ".join(map(humanize, used)), subject=group)
     _require_density(case)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:
-        refuse(f"&sampling: {samples:g} samples are too many for the page", f"up to {MAX_SAMPLES}")
+        problem = f"{samples:g} samples are too many for the page"
+        refuse(problem, f"up to {MAX_SAMPLES}", subject="sampling.duration")
     return case
 
 
@@ -85,8 +87,10 @@ def _require_density(case: Case) -> None:
     if volume <= 0 or mass / volume > MAX_DENSITY:
         density = f"{mass / volume:.2g} kg/m3" if volume > 0 else "an infinite density"
         refuse(
-            f"&ball: wall_thickness = {wall!r} gives the wall {density}",
+            f"= {wall!r} is too thin: the wall has {density}",
             f"a thicker wall or less mass, up to {MAX_DENSITY:g} kg/m3",
+            name="&ball: wall_thickness",
+            subject="ball.wall_thickness",
         )
 
 
@@ -107,7 +111,7 @@ def answer_case(case: Case) -> Answer:
     assessed = impact.assess()
     answer = common_answer(impact, assessed, *contact_force(impact, force))
     answer["force"]["title"] = FORCE_NAMES[force]
-    answer["warnings"] += impact.warnings
+    notes = list(impact.notes)
     error = float(impact.numerical_error.level.max())
     # A warning states that the error is unknown.
     if not math.isnan(error):
@@ -120,9 +124,8 @@ def answer_case(case: Case) -> Answer:
         prediction = predict_level(impact)
         answer["room"] = _room(prediction) | {"source": answer["headline"]}
         answer["headline"] = room_headline(prediction)
-        known = answer["warnings"]
-        answer["warnings"] += [text for text in prediction.warnings if text not in known]
-    answer["warnings"] = [in_words(warning) for warning in answer["warnings"]]
+        notes += prediction.notes
+    answer["warnings"] = list(dict.fromkeys(map(in_words, notes)))
     return answer
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -129,7 +130,7 @@ def _improve_floor(case: Case) -> Work:
     prediction = predict_level(compute(case))
     required = prediction.requirement
     if required is None:
-        refuse("&room: required = 0: the room has no requirement", "the required level, dB")
+        refuse("the room has no requirement", "the required level, dB", subject="room.required")
     if required.verdict == VERDICTS[0]:
         return {"changes": [], "none": "The requirement is met already.", "note": FLOOR_NOTE}
     if prediction.source_notes:
@@ -341,7 +342,7 @@ def _change(case: Case, name: str, start: float, value: float) -> dict[str, Any]
 
 
 def fit_recording(
-    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object], values: Values
+    paths: Sequence[str], table: Mapping[str, object], values: Values
 ) -> dict[str, Any]:
     """Fit parameters of a model to the first drop of a recording.
 
@@ -351,7 +352,7 @@ def fit_recording(
         Values of the case with the fitted ones and what the recording states (``"values"``), a
         text with their intervals, and details of the fit.
     """
-    recording, _ = read_copies(paths, names, table)
+    recording = read_copies(paths, table)
     stated = {"height": recording.config.height, "mass": recording.config.mass}
     case = new_case(values)
     known = {key: value for key, value in stated.items() if value is not None}
@@ -386,7 +387,7 @@ def fit_recording(
         key, _ = find_key(name, key_owners(case))
         values.setdefault(key.group, {})[key.name] = value
     details = " ".join(f"{note[:1].upper()}{note[1:]}." for note in result.warnings)
-    text = f"Fitted to {names[0]}: {', '.join(texts)} (95 %){_misfit_text(result)}"
+    text = f"Fitted to {Path(paths[0]).name}: {', '.join(texts)} (95 %){_misfit_text(result)}"
     text += " The verdict is that of the best values, not of their intervals."
     return {"values": values, "text": text, "details": details}
 

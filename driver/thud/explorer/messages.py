@@ -1,25 +1,28 @@
-"""Messages of the library in the words of the page: labels and units of fields instead of keys."""
+"""Errors and notes in the words of the page: labels and units of fields instead of keys."""
 
 from __future__ import annotations
 
-import re
+import math
 from typing import TYPE_CHECKING, Any
 
+from thud.base._schema import KEYS
 from thud.base.errors import InputError
 from thud.base.units import scaled
 from thud.case.keys import humanize
 from thud.explorer.form import fields_by_key
-from thud.explorer.recording_fields import recording_field_of
+from thud.explorer.recording_fields import FIELDS, PERCENT, PRESS_FIELDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from thud.base.note import Note
+
     Field = Mapping[str, Any]
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_KEY = re.compile(r"&(\w+):? (\w+)\b")
-# Range of a key, such as "0 < wall_thickness < outer_radius = 0.089 m".
-_RANGE = re.compile(r"allowed: (.+?) (<=?) (\w+) (<=?) (.+)$")
+# Fields of recordings by the names of their keys in a configuration.
+_RECORDING_FIELDS = {item.key: item for item in (*FIELDS, *PRESS_FIELDS)}
+# Magnitude of ends of ranges that are open.
+_HUGE = 1e300
 
 
 def describe_error(error: BaseException) -> dict[str, Any]:
@@ -27,40 +30,39 @@ def describe_error(error: BaseException) -> dict[str, Any]:
 
     The field is ``group.name``, or the name of a field of a recording; None: no field.
     """
-    message = str(error) or InputError.__name__
-    return {"error": in_words(message), "field": field_of(message) or recording_field_of(message)}
+    note = getattr(error, "note", None)
+    if note is None:
+        return {"error": str(error) or InputError.__name__, "field": None}
+    item = _RECORDING_FIELDS.get(note.subject)
+    field = note.subject if field_of(note) else item.name if item else None
+    return {"error": in_words(note) if note.others["name"] else str(error), "field": field}
 
 
-def field_of(message: str) -> str | None:
-    """Return the field that a message of the library begins with, as ``group.name``."""
-    match = _KEY.match(message)
-    field = fields_by_key().get((match[1], match[2])) if match else None
-    return f"{field['group']}.{field['name']}" if field else None
+def field_of(note: Note) -> Field | None:
+    """Return the field of the key of the library that a note is about."""
+    group, _, name = note.subject.partition(".")
+    return fields_by_key().get((group, name))
 
 
-def in_words(message: str) -> str:
-    """Return a message with labels and units of fields instead of keys and SI units.
-
-    >>> in_words("&ball: wall_thickness = 0.2 is not allowed; "
-    ...          "allowed: 0 < wall_thickness < outer_radius = 0.089 m")
-    'Wall thickness = 200 mm is not allowed; allowed: more than 0 mm and less than outer radius, \
-89 mm'
-    """
-    match = _KEY.match(message)
-    first = fields_by_key().get((match[1], match[2])) if match else None
-    if match and first:
-        message = _with_range(message, first)
-        message = _in_unit(message[match.end() :], first)
-        message = f"{first['label']}{_with_labels(message, match[1])}"
-    elif group := re.match(r"&(\w+): ", message):
-        message = f"{humanize(group[1])}: {_with_labels(message[group.end() :], group[1])}"
-    return _KEY.sub(_label, message)
-
-
-def _label(match: re.Match[str]) -> str:
-    """Return the label of a key in a sentence."""
-    field = fields_by_key().get((match[1], match[2]))
-    return lower(field["label"]) if field else match[0]
+def in_words(note: Note) -> str:
+    """Return the sentence of a note with the label of its field, and a range in its unit."""
+    others = note.others
+    if "text" not in others:
+        return str(note)
+    field, item = field_of(note), _RECORDING_FIELDS.get(note.subject)
+    name, text = str(others["name"]), others["text"]
+    if field:
+        name = field["label"]
+        if "low_open" in others and not math.isnan(note.low):
+            text = _out_of_range(note, field)
+    elif item:
+        name = item.quoted
+        if item.unit == PERCENT and not math.isnan(note.low):
+            value, low, high = (f"{100 * number:g}" for number in (note.value, note.low, note.high))
+            text = f"= {value} is not allowed; allowed: {low} to {high}"
+    elif name == f"&{note.subject}:":
+        name = f"{humanize(note.subject)}:"
+    return f"{others.get('place', '')}{name} {text}"
 
 
 def lower(label: str) -> str:
@@ -69,56 +71,34 @@ def lower(label: str) -> str:
     return label if is_name else label[:1].lower() + label[1:]
 
 
-def _with_labels(text: str, group: str) -> str:
-    """Return a text with labels in place of the keys of a group that are more than a word."""
-    for (other, name), field in fields_by_key().items():
-        if other == group and "_" in name:
-            text = re.sub(rf"(?<!\w){name}(?!\w)", lower(field["label"]), text)
-    return text
-
-
-def _in_unit(text: str, field: Field) -> str:
-    """Return the text after a key with its value, in the unit of its field."""
-    unit, power = field["unit"], field["power"]
-    suffix = f" {unit}" if unit else ""
-
-    def convert(match: re.Match[str]) -> str:
-        return f" = {_scaled(match[1], power)}{suffix}"
-
-    name = re.escape(field["si_unit"])
-    # A value with a prefix, such as 2.08 MPa, is as readable as it is.
-    si = rf"(?: {name}(?!\w))?(?! [kMG]{name}(?!\w))" if name else ""
-    return re.sub(rf"^ = ({_NUMBER}){si}(?![\w.])", convert, text)
-
-
-def _with_range(message: str, field: Field) -> str:
-    """Return a message with its allowed range in words."""
-    match = _RANGE.search(message)
-    if not match or match[3] != field["name"]:
-        return message
-    lower = _bound(match[1], field, ("more than", "at least")[match[2] == "<="])
-    upper = _bound(match[5], field, ("less than", "at most")[match[4] == "<="])
-    ends = f"{lower} and {upper}"
-    if match[2] == match[4] == "<=":
-        ends = f"{lower.removeprefix('at least ')} to {upper.removeprefix('at most ')}"
-        if field["unit"] and "," not in ends:
-            ends = ends.replace(f" {field['unit']} to", " to")
-    whole = ", whole" if message.endswith(", whole") and not ends.endswith(", whole") else ""
-    return f"{message[: match.start()]}allowed: {ends}{whole}"
-
-
-def _bound(text: str, field: Field, words: str) -> str:
-    """Return an end of a range in the unit of the field, after words such as "less than"."""
-    text = text.removesuffix(", whole").removesuffix(f" {field['si_unit']}")
-    name, _, number = text.rpartition(" = ")
-    if not re.fullmatch(_NUMBER, number):
-        return f"{words} {text}"
-    other = fields_by_key().get((field["group"], name))
-    label = f"{lower(other['label']) if other else name}, " if name else ""
+def _out_of_range(note: Note, field: Field) -> str:
+    """Return what is said of a value outside its range, in the unit of its field."""
+    key = next(key for key in KEYS if (key.group, key.name) == (field["group"], field["name"]))
     unit = f" {field['unit']}" if field["unit"] else ""
-    return f"{words} {label}{_scaled(number, field['power'])}{unit}"
+    ends = [
+        _end(number, limit, field, word)
+        for number, limit, word in (
+            (note.low, key.lower, "more than" if note.others["low_open"] else "at least"),
+            (note.high, key.upper, "less than" if note.others["high_open"] else "at most"),
+        )
+        if abs(number) < _HUGE
+    ]
+    allowed = " and ".join(ends)
+    is_closed = not (note.others["low_open"] or note.others["high_open"])
+    if is_closed and len(ends) > 1 and not isinstance(key.upper, str):
+        allowed = f"{_scaled(note.low, field)} to {_scaled(note.high, field)}{unit}"
+    whole = ", whole" if key.kind == "whole" or key.whole else ""
+    return f"= {_scaled(note.value, field)}{unit} is not allowed; allowed: {allowed}{whole}"
 
 
-def _scaled(number: str, power: int) -> str:
+def _end(number: float, limit: float | str, field: Field, word: str) -> str:
+    """Return an end of a range in words, with the field whose value it is."""
+    other = fields_by_key().get((field["group"], limit)) if isinstance(limit, str) else None
+    label = f"{lower(other['label'])}, " if other else ""
+    unit = f" {field['unit']}" if field["unit"] else ""
+    return f"{word} {label}{_scaled(number, field)}{unit}"
+
+
+def _scaled(number: float, field: Field) -> str:
     """Return a number in the unit of a field."""
-    return f"{scaled(float(number), -power):.10g}"
+    return f"{scaled(float(number), -field['power']):.10g}"

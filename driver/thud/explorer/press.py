@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from thud.explorer.answer import new_case
 from thud.explorer.form import fields_by_key
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.recording_fields import PRESS_FIELDS
+from thud.recordings.channel import shown_text
 from thud.recordings.header_aliases import plain
 from thud.recordings.table import read_table
 from thud.studies.compression_fit import fit_compression
@@ -42,15 +44,13 @@ EXPECTED = (
 )
 
 
-def fit_press(
-    paths: Sequence[str], names: Sequence[str], units: Mapping[str, str], values: Values
-) -> dict[str, Any]:
+def fit_press(paths: Sequence[str], units: Mapping[str, str], values: Values) -> dict[str, Any]:
     """Fit the modulus of a ball to the curve of a press.
 
     Parameters
     ----------
-    paths, names
-        Path of a copy of the file, and the name of the original one.
+    paths
+        Path of a copy of the file, with its name.
     units
         Units of columns whose titles state none, by name of `PRESS_FIELDS`.
     values
@@ -69,22 +69,23 @@ def fit_press(
     """
     if len(paths) > 1:
         refuse(f"{len(paths)} files are chosen", "the curve of one press")
-    path, name = paths[0], Path(names[0]).name
+    name = Path(paths[0]).name
     case = new_case(values)
     model = new_model(case.model, {})
     facts = MODEL_FACTS[model.name]
     if "youngs_modulus" not in facts.fitted:
         titles = [other.title for other in MODEL_FACTS.values() if "youngs_modulus" in other.fitted]
         refuse(f"a press determines no parameter of the model “{facts.title}”", ", ".join(titles))
+    # So messages name the file without the folder of its copy.
+    os.chdir(Path(paths[0]).parent)
+    deflection, force, note = _read_curve(name, units)
     try:
-        deflection, force, note = _read_curve(path, units)
         with warnings.catch_warnings():
             # They are part of the details.
             warnings.simplefilter("ignore")
             result = fit_compression(deflection, force, case.ball, model)
     except ThudError as error:
-        message = f"{name}: {str(error).removeprefix(f'{path}: ')}"
-        raise type(error)(message) from error
+        raise error.within(name) from error
     field = fields_by_key()["ball", "youngs_modulus"]
     ends = result.values["youngs_modulus"], *result.intervals()["youngs_modulus"]
     best, low, high = (f"{scaled(x, -field['power']):.4g}" for x in ends)
@@ -116,17 +117,17 @@ def _shown(ball: object, name: str) -> str:
 
 
 def _read_curve(
-    path: str, units: Mapping[str, str]
+    name: str, units: Mapping[str, str]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], str]:
     """Return deflection, m, and force, N, of the loading branch, and a note on what was left out.
 
     A column is found by its unit, or by its title, or in a file of two columns without titles
     by its order: deflection, force.
     """
-    table = read_table(path, EXPECTED)
+    table = read_table(name, EXPECTED)
     columns = table.columns
     if len(columns) < 2:  # noqa: PLR2004 - deflection and force
-        refuse(f"the file has {len(columns)} column of numbers", EXPECTED)
+        refuse(f"{name}: has {len(columns)} column of numbers", EXPECTED)
     if len(columns) == 2 and not table.has_titles:  # noqa: PLR2004 - deflection and force
         deflection, force = columns
     else:
@@ -136,7 +137,7 @@ def _read_curve(
     y = force.values * _factor(force, "N", "press_force", units)
     for column, numbers in ((deflection, x), (force, y)):
         if not np.isfinite(numbers).all():
-            refuse(f"{column}: a value is not finite", "finite numbers")
+            refuse(f"{name}: {column}: a value is not finite", "finite numbers")
     count = int(np.argmax(x)) + 1
     notes = []
     if count < len(x):
@@ -155,9 +156,11 @@ def _find(columns: Sequence[Column], words: set[str], unit: str, kind: str) -> C
     both = [column for column in by_name if column in by_unit]
     found = both or by_unit or by_name
     if len(found) > 1:
-        refuse(f"{' and '.join(map(str, found[:2]))} may both be the {kind}", f"one {kind}")
+        both_names = " and ".join(map(str, found[:2]))
+        refuse(f"{columns[0].table}: {both_names} may both be the {kind}", f"one {kind}")
     if not found:
-        refuse(f"no column of {kind} among {', '.join(map(str, columns))}", EXPECTED)
+        listed = ", ".join(map(str, columns))
+        refuse(f"{columns[0].table}: no column of {kind} among {listed}", EXPECTED)
     return found[0]
 
 
@@ -166,9 +169,16 @@ def _factor(column: Column, unit: str, name: str, units: Mapping[str, str]) -> f
     field = next(item for item in PRESS_FIELDS if item.name == name)
     allowed = f"{', '.join(field.choices)} in its title, or under {field.quoted}"
     stated = units.get(name, "")
+    base, factor = UNITS.get(find_unit(column.unit) if column.unit else stated, ("", 0.0))
+    problem = ""
     if not column.unit and not stated:
-        refuse(f"{column}: its unit is not stated", allowed)
-    factor = column.factor(unit, allowed) if column.unit else UNITS[stated][1]
-    if column.unit and stated and UNITS[stated][1] != factor:
-        refuse(f"{column}: {column.unit} by its title, {stated} under {field.quoted}", "one unit")
+        problem = "its unit is not stated"
+    elif base != unit:
+        fault = "does not fit" if base else "is not known"
+        problem = f"the unit {shown_text(column.unit)!r} {fault}"
+    elif column.unit and stated and UNITS[stated][1] != factor:
+        problem = f"{column.unit} by its title, {stated} under {field.quoted}"
+        allowed = "one unit"
+    if problem:
+        refuse(f"{column.table}: {column}: {problem}", allowed, subject=field.key)
     return factor

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, shown
-from thud.base.errors import ThudError
+from thud.base.checks import refuse
 from thud.base.files import read_toml
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import largest_contribution, recording_headline
 from thud.explorer.decisive import decisive_warnings
-from thud.explorer.recording_fields import TABLES, name_fields
+from thud.explorer.recording_fields import TABLES
 from thud.plot.impact_figures import contact_force
 from thud.recordings.assumptions import ASSUMED_SHARE
 from thud.recordings.config import config_from
@@ -25,27 +25,22 @@ from thud.report.rows import INCOMPLETE, excluded_text, expanded_text, value_tex
 from thud.report.write import figures, json_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from thud.level.assessment import Verdict
     from thud.recordings.config import Config
-    from thud.recordings.signal import Signal
 
-# Maximum length of a name of a file.
-MAX_NAME = 80
 # Ending of the name of the file on laboratory, instruments and calibration.
 LABORATORY = ".toml"
 
 
-def answer_recording(
-    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
-) -> dict[str, Any]:
+def answer_recording(paths: Sequence[str], table: Mapping[str, object]) -> dict[str, Any]:
     """Return the answer of recorded drops of one source.
 
-    `paths` are copies of the files, `names` the names of the original files, and `table` is a table
-    of the configuration. Its values replace those of a file of the laboratory among the files.
+    `paths` are copies of the files with their names, in one folder, and `table` is a table of the
+    configuration. Its values replace those of a file of the laboratory among the files.
     """
-    recording, in_words = read_copies(paths, names, table)
+    recording = read_copies(paths, table)
     verdict = recording.assess()
     answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
     rows = criteria_data(recording)
@@ -65,65 +60,38 @@ def answer_recording(
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording, verdict)
     # The page shows the name of a single file next to its warnings.
-    signals = [name for name in names if not _is_laboratory(name)]
-    shown_name = signals[0] if len(signals) == 1 else ""
+    signals = [path for path in paths if not _is_laboratory(path)]
+    shown_name = Path(signals[0]).name if len(signals) == 1 else ""
     texts = {
         "warnings": [note for note in recording.notes if note.is_warning],
         "open_warnings": decisive_warnings(recording.notes, verdict.criteria),
     }
     for key, notes in texts.items():
-        answer[key] = [
-            in_words(str(note) if note.subject == shown_name else note.message) for note in notes
-        ]
+        answer[key] = [str(note) if note.subject == shown_name else note.message for note in notes]
     return answer
 
 
-def calibration_report(
-    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
-) -> str:
+def calibration_report(paths: Sequence[str], table: Mapping[str, object]) -> str:
     """Return the page with the calibration report of recorded drops, as `answer_recording`."""
-    recording, _ = read_copies(paths, names, table)
+    recording = read_copies(paths, table)
     data = report_data(recording)
     drawings = [content.decode() for content in figures(recording).values()]
     return report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
 
 
-def read_copies(
-    paths: Sequence[str], names: Sequence[str], table: Mapping[str, object]
-) -> tuple[Recording, Callable[[str], str]]:
-    """Return the recording in copies of files, and a function for its messages.
+def read_copies(paths: Sequence[str], table: Mapping[str, object]) -> Recording:
+    """Return the recording in copies of files, whose folder becomes the working directory.
 
-    The function replaces the names of the copies by those of the original files, and keys of the
-    configuration by fields of the page. Raise InputError, with such a message.
+    So messages name the files without the folder. Raise InputError if they are no recording.
     """
-    titles = {
-        Path(path).name: "".join(filter(str.isprintable, Path(name).name))[:MAX_NAME] or "recording"
-        for path, name in zip(paths, names, strict=True)
-    }
-
-    def in_words(message: str) -> str:
-        message = name_fields(message)
-        for path, (copy, title) in zip(paths, titles.items(), strict=True):
-            message = message.replace(path, title).replace(copy, title)
-        return message
-
-    recorded = [path for path in paths if not _is_laboratory(path)]
-    try:
-        config = _config_of([path for path in paths if _is_laboratory(path)], table)
-        if not recorded:
-            refuse(f"{paths[0]}: is the file of a laboratory", "together with recordings")
-        signals = (
-            _renamed(signal, Path(path).name, titles[Path(path).name])
-            for path in recorded
-            for signal in open_signals(path, config)
-        )
-        recording = Recording.from_signals(signals, config)
-    except ThudError as error:
-        message = name_fields(str(error))
-        for path, (copy, title) in zip(paths, titles.items(), strict=True):
-            message = message.replace(path, copy).replace(copy, shown(title))
-        raise type(error)(message) from error
-    return replace(recording, name=Path(titles[Path(recorded[0]).name]).stem), in_words
+    os.chdir(Path(paths[0]).parent)
+    names = [Path(path).name for path in paths]
+    recorded = [name for name in names if not _is_laboratory(name)]
+    config = _config_of([name for name in names if _is_laboratory(name)], table)
+    if not recorded:
+        refuse(f"{names[0]}: is the file of a laboratory", "together with recordings")
+    signals = (signal for name in recorded for signal in open_signals(name, config))
+    return replace(Recording.from_signals(signals, config), name=Path(recorded[0]).stem)
 
 
 def _is_laboratory(name: str) -> bool:
@@ -143,18 +111,6 @@ def _config_of(paths: Sequence[str], table: Mapping[str, object]) -> Config:
     stated_tables = {name: stated[name] for name in TABLES if name in stated and name in table}
     merged = {name: {**keys, **table[name]} for name, keys in stated_tables.items()}  # type: ignore[dict-item]
     return config_from({**stated, **table, **merged})
-
-
-def _renamed(signal: Signal, copy: str, title: str) -> Signal:
-    """Return a signal with the name of the original file in place of that of its copy."""
-    return replace(
-        signal,
-        name=signal.name.replace(copy, title),
-        notes=tuple(
-            replace(note, subject=note.subject.replace(copy, title)) for note in signal.notes
-        ),
-        cells=tuple(_renamed(cell, copy, title) for cell in signal.cells),
-    )
 
 
 def _asks(recording: Recording, verdict: Verdict) -> list[dict[str, Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +59,11 @@ class Field:
         table, _, key = self.name.partition("_")
         return (table, key) if table in TABLES else ("", self.name)
 
+    @property
+    def key(self) -> str:
+        """Name of the key in messages on a configuration."""
+        return ": ".join(filter(None, self.path))
+
     def value(self, text: str) -> object:
         """Return the value of the key; raise InputError for a text that is not a number."""
         if self.name == "channel":
@@ -69,7 +73,7 @@ class Field:
         try:
             number = float(text)
         except ValueError as error:
-            refuse(f"{self.quoted} = {shown(text)} is not a number", "a number", error)
+            refuse(f"= {shown(text)} is not a number", "a number", error, name=self.key)
         if self.unit == PERCENT:
             return number / 100
         return int(number) if number.is_integer() else number
@@ -145,51 +149,6 @@ def recording_table(stated: Mapping[str, str]) -> Table:
     for item in FIELDS:
         table, key = item.path
         if item.choices and table in result and key not in result[table]:
-            refuse(f"{item.quoted} is not chosen", ", ".join(item.choices.values()))
+            allowed = ", ".join(item.choices.values())
+            refuse("is not chosen", allowed, name=item.key)
     return result
-
-
-def name_fields(message: str) -> str:
-    """Return a message with the names of fields instead of those of keys.
-
-    >>> name_fields("filter: order is missing; allowed: order and cutoff")
-    '“Order of the filter” is missing; allowed: “Order of the filter” and “Cutoff of the filter \
-(−3 dB), Hz”'
-    """
-    own = message.partition(": ")[0]
-    for item in FIELDS:
-        table, key = item.path
-        if table and own == table:
-            message = re.sub(rf"(^{table}: )?\b{key}\b", item.quoted, message)
-            continue
-        if item.unit == PERCENT and message.startswith(key):
-            message = re.sub(r"\d[\d.e+-]*", _in_percent, message)
-        # Messages name a key before its value, at their beginning or both, or as stated.
-        message = re.sub(rf"^({key}: )+(?={key}\b)", "", message)
-        message = re.sub(rf"^({key}: )+", f"{item.quoted}: ", message)
-        message = re.sub(
-            rf"(?<![\w“]){key}(?= = | and channels are| are stated)", item.quoted, message
-        )
-    message = message.replace("sample_rate in Hz", _label("sample_rate"))
-    message = message.replace("enter a calibration:", f"enter {_label('calibration')}:")
-    for table in TABLES:
-        message = message.replace(f"[{table}]: f0 = ", f"[{table}]: {_label('plate_f0')} = ")
-        message = message.replace(", Q = ", f", {_label('plate_Q')} = ")
-        message = message.replace(f"[{table}] share", _label("plate_share"))
-        message = message.replace(f"[{table}]", f"the fields of the {table}")
-    return message
-
-
-def recording_field_of(message: str) -> str | None:
-    """Return the name of the first field that a message names; None if there is none."""
-    fields = (*FIELDS, *PRESS_FIELDS)
-    places = {message.find(item.quoted): item.name for item in fields if item.quoted in message}
-    return places[min(places)] if places else None
-
-
-def _label(name: str) -> str:
-    return next(item.quoted for item in FIELDS if item.name == name)
-
-
-def _in_percent(number: re.Match[str]) -> str:
-    return f"{100 * float(number[0]):g}"

@@ -28,6 +28,7 @@ from thud.base._schema import KEYS
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
+from thud.case.keys import humanize
 from thud.explorer.criteria import glossary
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import SI_UNITS, construction_form, form
@@ -39,7 +40,7 @@ from thud.explorer.presets import presets
 from thud.explorer.recording_fields import press_form, recording_form, recording_table
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping, Sequence
 
     from starlette.requests import Request
     from starlette.types import Receive, Scope, Send
@@ -55,6 +56,8 @@ FILE_KEYS = {
     for key in KEYS
     if key.kind == "text" and key.group != "case"
 }
+# Maximum length of the name of a copy of a file, of up to four bytes a character.
+MAX_NAME = 50
 # Maximum number of files and of fields in a form.
 MAX_FILES = 100
 MAX_FIELDS = 100
@@ -217,8 +220,8 @@ async def _with_files(
 ) -> Response:
     """Return reports of a slow task on the files of a form.
 
-    Its arguments are the paths of copies of the files, their names, and the `arguments` of the
-    fields of the form. The names of the files are not used in paths.
+    Its arguments are the paths of copies of the files, and the `arguments` of the fields of the
+    form.
     """
     state = request.app.state
     async with AsyncExitStack() as stack:
@@ -230,11 +233,12 @@ async def _with_files(
             files = [value for value in form.getlist("file") if isinstance(value, UploadFile)]
             if not files:
                 raise HTTPException(400, "the request contains no file")
-            names = [file.filename or "recording" for file in files]
-            paths = [str(Path(folder, f"recording_{i}{_ending(n)}")) for i, n in enumerate(names)]
+            paths = [
+                str(Path(folder, name)) for name in _names([file.filename or "" for file in files])
+            ]
             for file, path in zip(files, paths, strict=True):
                 await anyio.to_thread.run_sync(_copy, file.file, path)
-        return _Reports(state.slow.run(task, paths, names, *further), stack.pop_all())
+        return _Reports(state.slow.run(task, paths, *further), stack.pop_all())
 
 
 @asynccontextmanager
@@ -256,10 +260,20 @@ async def _received(request: Request) -> AsyncGenerator[FormData, None]:
         await form.close()
 
 
-def _ending(name: str) -> str:
-    """Return the ending of a name of a file, of letters and digits only."""
-    ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
-    return f".{ending}"
+def _names(names: Sequence[str]) -> list[str]:
+    """Return names for copies of files: the same, but without folders, short and different.
+
+    >>> _names(["../a b.wav", "a b.wav", ".."])
+    ['a b.wav', '2 a b.wav', 'recording']
+    """
+    result: list[str] = []
+    for number, name in enumerate(names, 1):
+        path = Path("".join(filter(str.isprintable, name)).replace("\\", "/"))
+        ending = "".join(c for c in path.suffix if c.isascii() and c.isalnum())[:8]
+        title = path.stem.strip(". ")[:MAX_NAME] or "recording"
+        title = f"{title}.{ending}" if ending else title
+        result.append(f"{number} {title}" if title in result else title)
+    return result
 
 
 def _copy(source: BinaryIO, path: str) -> None:
@@ -395,7 +409,8 @@ def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]
     for group, keys in _files_in(values):
         for name, path in keys.items():
             if not isinstance(path, str) or path not in request.app.state.offered:
-                refuse(f"&{group}: {name} cannot be chosen on the page", "a file that it offers")
+                problem = f"{humanize(name).capitalize()} cannot be chosen on the page"
+                refuse(problem, "a file that it offers", subject=f"{group}.{name}")
     return values
 
 

@@ -55,6 +55,6 @@ def require_chosen(
     for key, text in stated.items():
         highest = max((r.stop - 1 for r in parse_numbers(text, key)), default=0) if text else 0
         if highest > count:
-            refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}")
+            refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}", subject=key)
     if not chosen:
         refuse("every drop is left out", "at least one drop")

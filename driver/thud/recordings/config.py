@@ -250,8 +250,7 @@ def config_from(table: Mapping[str, object], file: str = "") -> Config:
     try:
         return Config(**table)  # type: ignore[arg-type]
     except InputError as error:
-        message = f"{file}: {error}" if file else str(error)
-        raise InputError(message) from error
+        raise (error.within(file) if file else error) from error
 
 
 def read_config(path: str | os.PathLike[str]) -> Config:

@@ -39,7 +39,8 @@ class Number:
         require_number(key, value)
         number = float(value)  # type: ignore[arg-type]
         if not self.low <= number <= self.high:
-            refuse_value(key, value, f"{self.low:g} to {self.high:g} {self.unit}".rstrip())
+            allowed = f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
+            refuse_value(key, value, allowed, low=self.low, high=self.high)
         return number
 
 
@@ -121,8 +122,7 @@ def to_calibration(value: object, key: str) -> Calibration | str | float:
     try:
         read_chain(to_line(value, key))
     except InputError as error:
-        message = f"{key}: {error}"
-        raise InputError(message) from error
+        raise error.within(key) from error
     return value
 
 
@@ -248,4 +248,4 @@ class Table:
         """Raise InputError if a key is not stated."""
         for name in names:
             if name not in self.stated:
-                refuse(f"{self.title}{name} is missing", " and ".join(names))
+                refuse("is missing", " and ".join(names), name=f"{self.title}{name}")

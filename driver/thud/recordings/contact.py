@@ -300,7 +300,7 @@ def _find_edge(
     if chain is None:
         covariance += np.diag(background.variances[0] / 2 / (cells[1] - cells[0]))
     else:
-        lags = (cells[0] - cells[0][0])
+        lags = cells[0] - cells[0][0]
         frequency = np.linspace(0, 2 * chain.highest, N_FREQUENCY)
         gain = chain.noise_gain(frequency) * chain.passed(frequency) ** 2
         waves = np.cos(2 * np.pi * np.multiply.outer(lags, frequency))

@@ -111,7 +111,7 @@ def require_unit(text: object, label: str) -> str:
     """Return the unit that a text names; raise InputError if it names none."""
     unit = find_unit(text) if isinstance(text, str) else ""
     if not unit:
-        refuse(f"{label}: unit = {shown(text)} is not known", ALLOWED)
+        refuse(f"{label}: unit = {shown(text)} is not known", ALLOWED, subject="unit")
     return unit
 
 
@@ -129,9 +129,17 @@ def read_chain(text: object) -> list[Factor]:
         match = FACTOR.fullmatch(term)
         value = float(match["value"]) if match else 0.0
         if term.lstrip("+-").isdecimal() and "," in text:
-            refuse(f"calibration: {text[:60]!r} has a decimal comma", f"a point, {EXAMPLES}")
+            refuse(
+                f"calibration: {text[:60]!r} has a decimal comma",
+                f"a point, {EXAMPLES}",
+                subject="calibration",
+            )
         if not match or not SIZES[0] < abs(value) < SIZES[1]:
-            refuse(f"calibration: {term[:60]!r} is not a number with units", EXAMPLES)
+            refuse(
+                f"calibration: {term[:60]!r} is not a number with units",
+                EXAMPLES,
+                subject="calibration",
+            )
         (top, top_factor), (bottom, bottom_factor) = (
             UNITS[require_unit(match[side], f"calibration {term[:60]!r}")]
             for side in ("top", "bottom")
@@ -178,7 +186,11 @@ def newtons_per_unit(
     if calibration is None:
         if base != "N":
             description = {"FS": "full-scale values"}.get(unit, f"values in {unit}")
-            refuse(f"{label}: enter a calibration: the file holds {description}", EXAMPLES)
+            refuse(
+                f"{label}: enter a calibration: the file holds {description}",
+                EXAMPLES,
+                subject="calibration",
+            )
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse, refuse_value
 from thud.base.note import Note
 from thud.recordings.faults import fill_dropouts, read_repaired, refuse_clipped
 from thud.recordings.polarity import MIN_PEAK_RATIO, scan
@@ -56,7 +56,7 @@ def require_channels(value: object, key: str = "channels") -> str | tuple[int | 
         isinstance(name, int | str) and not isinstance(name, bool) and name for name in names
     )
     if not allowed or len(set(names)) < len(names):
-        refuse(f"{key} = {shown(value)} is not allowed", f"{EXAMPLES}, 2 to {MAX_CELLS} different")
+        refuse_value(key, value, f"{EXAMPLES}, 2 to {MAX_CELLS} different")
     return tuple(name for name in names if isinstance(name, int | str))
 
 

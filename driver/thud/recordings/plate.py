@@ -63,7 +63,7 @@ class Plate(Table):
         if {"f0", "Q", "f0_uncertainty", "share"} & set(self.stated):
             self.require("f0", "Q")
             if self.flat_limit is not None:
-                refuse("plate: f0 and flat_limit are both stated", "one of them")
+                refuse("and flat_limit are both stated", "one of them", name="plate: f0")
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the ratio of measured and applied force, at frequencies in Hz."""

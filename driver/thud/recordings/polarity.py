@@ -77,6 +77,7 @@ def find_sign(extremes: Extremes, name: str) -> tuple[float, tuple[Note, ...]]:
         refuse(
             f"{name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
             "polarity = 'positive' or 'negative', the sign of a compression",
+            subject="polarity",
         )
     return (1.0, ()) if up > down else (-1.0, (Note("sign_changed", name, -down, unit="N"),))
 

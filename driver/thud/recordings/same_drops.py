@@ -87,6 +87,7 @@ def refuse_simultaneous_channels(
                 f"{signal.name}: has drops at the same instants as {other[0].signal.name}; "
                 "simultaneous forces are never averaged",
                 HINT,
+                subject="channels",
             )
 
 

@@ -186,6 +186,7 @@ def _in_newtons(
                 f"{name}: the file states {unapplied}, but not whether its values were multiplied "
                 "by it",
                 "calibration = N per stored value, such as 1 if the values are in N",
+                subject="calibration",
             )
         notes += (Note("factor_not_applied", name, others={"factor": unapplied}),)
     scale, description, uncertainty = newtons_per_unit(unit, calibration, channel.counts, name)
@@ -220,6 +221,7 @@ def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, tup
         refuse(
             f"{name}: the sample rate is not known{reason}",
             "sample_rate in Hz, or a column of times",
+            subject="sample_rate",
         )
     if not RATES[0] <= rate <= RATES[1]:
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
