@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 # Columns of a terminal.
 WIDTH = 80
 _GAP = 2
+# Columns up to this width are not broken to fit more of them in a table.
+_MAX_KEPT = 26
 # Labels and words up to this width stay whole.
 _MAX_WORD = WIDTH // 2 - _GAP
 # Cells are broken after spaces and underscores, but "1.2 ± 0.1", "5 %" and "3 to 4" stay whole.
@@ -26,8 +28,8 @@ _WORD = re.compile(r"(?:[^ _]| (?=[±%]|to \S)|(?<=±) |(?<= to) )*[ _]*")
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
     """Return rows of text as lines with aligned columns, up to `WIDTH` wide.
 
-    Cells of wider tables are broken, those of the widest columns first. If there are too many
-    columns, further tables follow, each with the first column.
+    If there are too many columns, further tables follow, each with the first column. Cells of a
+    table that is wider are broken, those of the widest columns first.
 
     >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
     octave  level
@@ -36,7 +38,8 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
     label, *columns = zip(*rows, strict=True)
     tables = [[label]]
     for column in columns:
-        if len(tables[-1]) > 1 and _total(_min_widths([*tables[-1], column])) > WIDTH:
+        widths = [min(max(map(len, c)), _MAX_KEPT) for c in (*tables[-1], column)]
+        if len(tables[-1]) > 1 and _total(widths) > WIDTH:
             tables.append([label])
         tables[-1].append(column)
     return "\n\n".join(map(_format_columns, tables))
