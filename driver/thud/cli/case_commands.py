@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     import argparse
 
     from thud.base.bridge import Bundle
-    from thud.level.impact_result import ImpactResult
+    from thud.recordings.recording import ImpactResult
 
 
 def run_cases(options: argparse.Namespace) -> int:

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from thud.impact.floor_impact import FloorImpact
     from thud.impact.impact import Impact
     from thud.level.assessment import Criterion, Verdict
-    from thud.level.impact_result import ImpactResult
+    from thud.recordings.recording import ImpactResult
 
     Answer = dict[str, Any]
 

@@ -19,12 +19,14 @@ from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
 from thud.export.wav import wav_file
-from thud.level.impact_result import DropForce, ImpactResult
+from thud.level.drop_force import DropForce, DropResult
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.channel import library
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from thud.recordings.recording import ImpactResult
 
 KINDS = {"floor": "force on the floor", "elastic": "elastic force"}
 CONVENTION = (
@@ -126,7 +128,7 @@ def blocked_force(
     InputError
         If the drop does not exist, or the rate is not possible.
     """
-    require_kind("source", source, ImpactResult)
+    require_kind("source", source, DropResult)
     force = BlockedForce(**vars(source.drop_force(drop)))
     return force if rate is None else _resampled(force, rate)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import FloorOptions, Room
-    from thud.level.impact_result import ImpactResult
+    from thud.recordings.recording import ImpactResult
 
     Array = NDArray[np.float64]
 

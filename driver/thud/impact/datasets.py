@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from thud.base.quantity import Quantity
     from thud.case.case import Case
     from thud.impact.outcomes import Ensemble
-    from thud.level.impact_result import ImpactResult
+    from thud.recordings.recording import ImpactResult
 
 
 def impact_dataset(

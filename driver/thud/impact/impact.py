@@ -11,13 +11,12 @@ import numpy as np
 
 from thud.base._schema import ImpactQuantities
 from thud.base.checks import require_choice, require_whole
-from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
 from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.level.assessment import assess_levels
+from thud.level.drop_force import DropForce, DropResult
 from thud.level.estimate import Estimate
-from thud.level.impact_result import DropForce
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
@@ -59,7 +58,7 @@ class ImpactNumbers:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Impact(ImpactQuantities, Displayed):
+class Impact(ImpactQuantities, DropResult):
     """Force and motion of an impact, sampled at a constant rate.
 
     Attributes are those of `ImpactQuantities` and the following. The peak forces of the model
@@ -182,10 +181,6 @@ class Impact(ImpactQuantities, Displayed):
         return (
             self.peak_elastic_force if self.assessed_force(force) == "elastic" else self.peak_force
         )
-
-    def quantity(self, name: str) -> float:
-        """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
-        return float(getattr(self, name, math.nan))
 
     def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
         """Return `force` after a check, or the kind of force that the case assesses if None."""

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LevelsForce, LimitsSource
     from thud.floors.floor_comparison import FloorComparison
     from thud.floors.prediction import RoomPrediction
-    from thud.level.impact_result import ImpactResult
+    from thud.recordings.recording import ImpactResult
 
 
 # Line styles and markers of `thud.plot.style` by their names in ``curves.js``.

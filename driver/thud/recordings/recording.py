@@ -6,17 +6,16 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 from thud.base.checks import require_kind, require_whole
-from thud.base.display import Displayed
 from thud.base.extras import data_frame, require_extra
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
-from thud.level.impact_result import DropForce
+from thud.level.drop_force import DropForce, DropResult
 from thud.recordings.assumptions import check_assumptions, instrument_contributions
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
+    from thud.impact.impact import Impact
     from thud.level.assessment import Verdict
     from thud.level.estimate import Estimate
     from thud.recordings.measure_drops import Origin
@@ -51,7 +51,7 @@ LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(Displayed):
+class Recording(DropResult):
     """Recorded drops of one source.
 
     `time` and `force` are those of the first drop, also in comparisons and fits. Levels and other
@@ -164,7 +164,7 @@ class Recording(Displayed):
         """Time of first touch, s: 0."""
         return 0.0
 
-    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - of the protocol
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - as for impacts
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
@@ -280,9 +280,9 @@ class Recording(Displayed):
         """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
         if name in ESTIMATES and not hasattr(self, name):
             return float(np.mean([getattr(drop, name).value for drop in self.drops]))
-        return float(getattr(self, name, math.nan))
+        return super().quantity(name)
 
-    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - of the protocol
+    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - as for impacts
         """Return the corrected force of the first drop, N, shape (n_sample,), for any `kind`."""
         return self.drops[0].force
 
@@ -294,7 +294,7 @@ class Recording(Displayed):
         """
         return mean_force(self.drops, self.average("third").level)
 
-    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - of the protocol
+    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - as for impacts
         """Return the mean maximum force, N."""
         return self.peak_force
 
@@ -316,7 +316,7 @@ class Recording(Displayed):
         self,
         bands: BandSet = "octave",
         method: str | None = None,
-        force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
+        force: LevelsForce | None = None,  # noqa: ARG002 - as for impacts
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
         return self.average(bands, method or self.level_method).level.copy()
@@ -351,7 +351,7 @@ class Recording(Displayed):
     def assess(
         self,
         source: LimitsSource | None = None,
-        force: LevelsForce | None = None,  # noqa: ARG002 - of the protocol
+        force: LevelsForce | None = None,  # noqa: ARG002 - as for impacts
     ) -> Verdict:
         """Assess the recording by the limits of a source, by default that of the configuration."""
         return assess_levels(
@@ -405,3 +405,7 @@ class Recording(Displayed):
                 str(Note("noise_remains", value=measured.noise.deviation, unit="N")),
             ),
         )
+
+
+# A drop of a model or of a recording: both have force, levels and verdict under the same names.
+ImpactResult: TypeAlias = "Impact | Recording"
