@@ -14,7 +14,7 @@ import numpy as np
 
 from thud.base import _schema
 from thud.base.checks import refuse_value
-from thud.base.key import require_keywords
+from thud.base.key import refuse_keyword
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,7 +57,8 @@ def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def checked(*arguments: P.args, **keywords: P.kwargs) -> R:
-        require_keywords(label, keywords, annotations)
+        for word in keywords.keys() - annotations:
+            refuse_keyword(label, word, annotations)
         names = list(annotations)[: len(arguments)]
         positional = [plain(*entry) for entry in zip_longest(names, arguments, fillvalue="")]
         named = {name: plain(name, value) for name, value in keywords.items()}

@@ -48,7 +48,9 @@ class Immutable:
         owner: object = array
         while isinstance(owner, np.ndarray):
             if owner.flags.writeable:
-                return freeze(array.copy())
+                array = array.copy()
+                array.setflags(write=False)
+                break
             owner = owner.base
         return array
 

@@ -10,7 +10,7 @@ from thud.base.checks import refuse, refuse_unknown
 from thud.base.immutable import Plain
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
 
 Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
 
@@ -62,7 +62,10 @@ class Group(Plain):
 
     def __new__(cls, *_: object, **keywords: object) -> Self:
         """Raise InputError if a keyword is not a field."""
-        require_keywords(f"{cls.__name__}()", keywords, [field.name for field in fields(cls)])  # type: ignore[arg-type]
+        names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
+        for word in keywords:
+            if word not in names:
+                refuse_keyword(f"{cls.__name__}()", word, names)
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
@@ -87,16 +90,13 @@ def _groups(base: type[Group]) -> Iterator[type[Group]]:
         yield from _groups(group) if group.__subclasses__() else (group,)
 
 
-def require_keywords(label: str, keywords: Iterable[str], allowed: Collection[str]) -> None:
+def refuse_keyword(label: str, word: str, allowed: Iterable[str]) -> None:
     """Raise InputError for an unknown keyword; its message names the classes with that field."""
-    for word in keywords:
-        if word in allowed:
-            continue
-        keys = {group.__name__: [field.name for field in fields(group)] for group in _groups(Group)}  # type: ignore[arg-type]
-        if owners := [name for name, names in keys.items() if word in names]:
-            refuse(
-                f"{label}: {word!r} is a key of {' and '.join(owners)}",
-                " or ".join(f"{name}({word}=...)" for name in owners),
-            )
-        also = [near for name, names in keys.items() for near in (name.lower(), *names)]
-        refuse_unknown(label, [word], allowed, also)
+    keys = {group.__name__: [field.name for field in fields(group)] for group in _groups(Group)}  # type: ignore[arg-type]
+    if owners := [name for name, names in keys.items() if word in names]:
+        refuse(
+            f"{label}: {word!r} is a key of {' and '.join(owners)}",
+            " or ".join(f"{name}({word}=...)" for name in owners),
+        )
+    also = [near for name, names in keys.items() for near in (name.lower(), *names)]
+    refuse_unknown(label, [word], allowed, also)

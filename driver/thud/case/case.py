@@ -67,6 +67,9 @@ def attribute_of(key: Key) -> str:
     return "model" if key.owner in MODELS else "floor" if key.owner in FLOORS else key.group
 
 
+_ATTRIBUTES = [(key, attribute_of(key)) for key in KEYS]
+
+
 def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -> ModelOptions:
     """Return the options of a model by its name, by default those of the first one.
 
@@ -77,7 +80,8 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
-    model = ModalBall.name if model is None else model
+    if model is None:
+        return ModalBall(**options)  # type: ignore[arg-type]
     require_choice("&model: name", model, MODELS)
     return MODELS[model](**options)  # type: ignore[arg-type]
 
@@ -147,8 +151,7 @@ class Case(Group, Displayed):
 
     def entries(self) -> Iterator[tuple[Key, object]]:
         """Yield each key that the case has, but its name, with the value."""
-        for key in KEYS:
-            attribute = attribute_of(key)
+        for key, attribute in _ATTRIBUTES:
             options = getattr(self, attribute, None)
             is_used = self.model or attribute not in GROUPS or attribute == "ball"
             if options and is_used and key.owner in {"", attribute, getattr(options, "name", "")}:
@@ -156,11 +159,11 @@ class Case(Group, Displayed):
 
     def resolved(self) -> Self:
         """Return the case with the values of the standard ball by its model where keys are None."""
-        values: dict[str, dict[str, object]] = {"ball": {}}
+        model = self.model.name if self.model else ""
+        values: dict[str, dict[str, object]] = {}
         for key, value in self.entries():
-            standard = STANDARD_BALL.get((self.model.name if self.model else "", key.name))
-            if value is None and standard is not None:
-                values.setdefault(attribute_of(key), {})[key.name] = standard
+            if value is None and key.owner in {"", model} and (model, key.name) in STANDARD_BALL:
+                values.setdefault(attribute_of(key), {})[key.name] = STANDARD_BALL[model, key.name]
         changed = {name: replace(getattr(self, name), **new) for name, new in values.items()}
         return replace(self, **changed)
 
@@ -176,8 +179,7 @@ class Case(Group, Displayed):
         model = self.model.name if self.model else ""
         for key, value in self.entries():
             group = groups.setdefault(key.group, {})
-            is_source = attribute_of(key) not in {"floor", "room"}
-            if value is None and is_source and (model, key.name) in STANDARD_BALL:
+            if value is None and key.owner in {"", model} and (model, key.name) in STANDARD_BALL:
                 continue
             if (plain := _plain(key, value)) != []:
                 group[key.name] = plain
@@ -212,8 +214,8 @@ class Case(Group, Displayed):
                 require_choice(f"&{group}: name", name, choices)
                 kinds[group] = choices[name]
         values: dict[str, dict[str, object]] = {group: {} for group in kinds}
-        for key in KEYS:
-            kind = kinds.get(attribute := attribute_of(key))
+        for key, attribute in _ATTRIBUTES:
+            kind = kinds.get(attribute)
             is_used = key.owner in {"", attribute, getattr(kind, "name", "")}
             if kind and is_used and key.group in content and key.name in content[key.group]:
                 values[attribute][key.name] = content[key.group][key.name]
