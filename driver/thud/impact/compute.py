@@ -107,7 +107,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
             sampling=Sampling(**settings, verify=verify),  # type: ignore[arg-type]
             room=room,
         )
-        case = with_floor(case, floor)
+        case = case if floor is None else with_floor(case, floor)
     impact = compute(case)
     for note in impact.notes:
         warnings.warn(PlausibilityWarning(note), stacklevel=2)
