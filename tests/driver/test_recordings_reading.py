@@ -758,9 +758,9 @@ def test_a_tail_of_zeros_takes_no_time(name: str, tmp_path: Path) -> None:
         (b"time,force\n1,2\n", "WAV"),
         (b"CDF\x01" + bytes(100), "NetCDF 4"),
         (b"PK\x03\x04" + bytes(100), "CSV"),
-        (b"RIFF\xff\xff\xff\xffWAVE", "samples"),
+        (b"RIFF\xff\xff\xff\xffWAVE", "data"),
         (b"fLaC" + bytes(100), "FLAC"),
-        (b"TDSm" + bytes(100), "npTDMS"),
+        (b"TDSm" + bytes(100), "TDMS"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5"),
         (b"MATLAB 5.0".ljust(124) + b"\0\1IM", "MATLAB|vector"),
         (b"    -1\n    58\n    -1\n", "universal|time history"),
@@ -1333,19 +1333,21 @@ def test_times_of_matlab_variables_are_found(variables: Callable[..., Any], tmp_
     np.testing.assert_allclose(found, force, atol=1e-9)
 
 
-def test_times_of_several_matlab_variables_are_their_own(tmp_path: Path) -> None:
+def test_several_times_of_one_length_show_no_rate(tmp_path: Path) -> None:
     force = half_sine(8000.0)
     index = np.arange(force.size)
     variables = {
-        f"ball{k}_{name}": value
-        for k in (1, 2)
-        for name, value in (("time", index / (8000 * k)), ("time_F", k * force))
-    }
+        f"ball{k}": {"time": index / (8000 * k), "F": k * force} for k in (1, 2)
+    }  # fmt: skip
     scipy.io.savemat(tmp_path / "balls.mat", variables)
     for k in (1, 2):
-        signal, found = read_all(tmp_path / "balls.mat", channel=f"ball{k}_time_F")
+        signal, found = read_all(tmp_path / "balls.mat", channel=f"ball{k}/F")
         assert signal.sample_rate == pytest.approx(8000 * k)
         np.testing.assert_allclose(found, k * force, atol=1e-9)
+    flat = {f"ball{k}_{key}": v for k in (1, 2) for key, v in variables[f"ball{k}"].items()}
+    scipy.io.savemat(tmp_path / "balls.mat", flat)
+    with pytest.raises(InputError, match=naming("ball1_F", "sample rate is not known")):
+        opened(tmp_path / "balls.mat", channel="ball1_F")
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ PROCESSING = {
     "unit_of_data_type": "the data set has no label of a unit; it is a force in units of "
     "{value:.6g} {unit}",
     "factor_not_applied": "{factor} of the file was not applied; the calibration replaces it",
-    "length_unknown": "the header states no length; the samples were read to the end of the file",
     "times_rounded": "the times, rounded to {value:.1g} {unit}, were replaced by a grid of "
     "{rate:.7g} Hz",
     "times_coarse": "the times of day are too coarse to show the sample rate",

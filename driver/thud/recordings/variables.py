@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,8 +41,6 @@ MAX_COLUMNS = 256
 # Maximum number of times, and number of rows that show whether a column may hold times.
 MAX_TIMES = MAX_IN_MEMORY // 8
 SHOWN_TIMES = 4096
-# Attributes of an array by which CF (NetCDF) and NWB scale its values: factor and offset.
-CONVENTIONS = (("scalefactor", "addoffset"), ("conversion", "offset"))
 
 Header = list[tuple[str, str]]
 
@@ -183,24 +180,22 @@ def _unit(variable: Variable, own: Header, entries: Header) -> str:
 
 
 def _scaling(own: Header) -> tuple[float, float, Header]:
-    """Return factor and offset by the attributes of an array, and these attributes.
+    """Return factor and offset by the attributes of NetCDF, and those that are applied.
 
     Numbers that are not finite, and a factor of zero, are not applied.
     """
-    known = {}
-    for title, text in own:
-        number, unit = read_number(text) or (math.nan, "")
-        neutral = neutral_value(title)
-        if neutral is not None and math.isfinite(number) and not unit and (number or not neutral):
-            known[plain(title)] = number, (title, text)
-    for names in CONVENTIONS:
-        # The offset of CF may stand alone.
-        if names[0] in known or (names[1] == "addoffset" and names[1] in known):
-            factor, offset = (
-                known.get(n, (d, None))[0] for n, d in zip(names, (1.0, 0.0), strict=True)
-            )
-            return factor, offset, [known[n][1] for n in names if n in known]
-    return 1.0, 0.0, []
+    factor, offset, applied = 1.0, 0.0, []
+    for entry in own:
+        number, unit = read_number(entry[1]) or (math.nan, "")
+        key = plain(entry[0]) if math.isfinite(number) and not unit else ""
+        if key == "scalefactor" and number:
+            factor = number
+        elif key == "addoffset":
+            offset = number
+        else:
+            continue
+        applied.append(entry)
+    return factor, offset, applied
 
 
 def _read_scaled(  # noqa: PLR0913, PLR0917 - a section of a column and its scale
@@ -232,18 +227,15 @@ def _rises(variable: Variable) -> bool:
 
 
 def _times_of(variable: Variable, times: list[Variable]) -> Variable | None:
-    """Return the times of an array: of the innermost group, and with the longest common begin."""
+    """Return the times of an array, of the innermost group; None if there are several."""
     fitting = [
         time
         for time in times
         if time.n_sample == variable.n_sample and variable.key.startswith(time.group)
     ]
-
-    def closeness(time: Variable) -> tuple[int, int]:
-        pairs = zip(variable.key, time.key, strict=False)
-        return len(time.group), sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
-
-    return max(fitting, key=closeness, default=None)
+    group = max((time.group for time in fitting), key=len, default="")
+    inner = [time for time in fitting if time.group == group]
+    return inner[0] if len(inner) == 1 else None
 
 
 def _rate(time: Variable, header: Header, name: str) -> tuple[float | None, str, tuple[Note, ...]]:

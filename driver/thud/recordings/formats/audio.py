@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 import struct
 from functools import partial
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.base.note import Note
 from thud.recordings.channel import Channel, guarded, library, shown_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -24,18 +22,15 @@ SUBTYPES = {
     "PCM_S8": 2.0**7, "PCM_U8": 2.0**7, "PCM_16": 2.0**15, "PCM_24": 2.0**23, "PCM_32": 2.0**31,
     "FLOAT": None, "DOUBLE": None,
 }  # fmt: skip
-# Length of a chunk whose true length is in the 64-bit table of an RF64 file, or unknown.
-UNKNOWN = 0xFFFFFFFF
-# Lengths that streams begin with, by ffmpeg, SoX and arecord, as they cannot go back to their head.
-STREAMED = {UNKNOWN, 0x7FFFF000, 0x7FFFFF00}
-# Maximum number of channels, and of chunks of a file.
-MAX_CHANNELS = 1024
-MAX_CHUNKS = 10000
+# Lengths from this one on mean that a stream could not go back to its head (0x7FFFF000 of ffmpeg,
+# 0xFFFFFFFF of SoX), or that the length is in the table of an RF64 file.
+MIN_UNKNOWN = 0x7FFFF000
 # Maximum number of samples in a FLAC header; larger values mean that it is unknown.
 MAX_FLAC = 2**36
-# Bytes of date and time in a broadcast chunk.
+# Bytes of date and time in a broadcast chunk, and of the length of the samples in an RF64 file.
 DATE = slice(320, 330)
 CLOCK = slice(330, 338)
+RF64_LENGTH = slice(28, 36)
 
 
 def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
@@ -48,24 +43,19 @@ def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the channels of an audio file; integers are fractions of full scale."""
-    soundfile = library("soundfile", "WAV and FLAC")
     name = shown_path(path)
-    with path.open("rb") as file:
-        is_flac = file.read(4) == b"fLaC"
-        date, notes = ("", ()) if is_flac else _read_chunks(file, name)
-    with soundfile.SoundFile(os.fsencode(path)) as file:
+    with library("soundfile", "WAV and FLAC").SoundFile(os.fsencode(path)) as file:
         kind, count, columns = file.subtype, file.frames, file.channels
-        rate = float(file.samplerate)
+        rate, is_flac = float(file.samplerate), file.format == "FLAC"
     if kind not in SUBTYPES:
         refuse(f"{name}: samples of the format {kind}", ", ".join(SUBTYPES))
-    if columns > MAX_CHANNELS:
-        refuse(f"{name}: {columns} channels", f"up to {MAX_CHANNELS}")
     # Without a length the library cannot seek, and a file that is cut off is not detectable.
     if is_flac and count >= MAX_FLAC:
         refuse(
             f"{name}: its header has no number of samples (written by a streaming encoder)",
             "FLAC files with their length; encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
         )
+    date = "" if is_flac else _wav_date(path)
     # A FLAC file that is cut off lacks its last sample.
     if count < 1 or (is_flac and _read(path, 0, count - 1, count).size != 1):
         refuse(f"{name}: is cut off or has no samples", "a complete file")
@@ -80,57 +70,35 @@ def read_channels(path: Path) -> list[Channel]:
             sample_rate=rate,
             counts=counts,
             date=date,
-            notes=notes,
             may_be_fractions=True,
         )
         for column in range(columns)
     ]
 
 
-def _read_chunks(file: BinaryIO, name: str) -> tuple[str, tuple[Note, ...]]:
-    """Return the date of a WAV file, and notes; raise InputError if it is cut off.
+def _wav_date(path: Path) -> str:
+    """Return the date of a WAV file; raise InputError if its samples are cut off.
 
-    The library does not detect this.
+    The library reads neither, and returns what is left of the samples.
     """
-    notes: tuple[Note, ...] = ()
-    size = os.fstat(file.fileno()).st_size
-    lengths: dict[bytes, int] = {}
-    date, missing = "", None
-    for kind, begin, length in _chunks(file, lengths, size):
-        if kind == b"data":
-            missing = begin + length - size
-            if length in STREAMED and missing > 0:
-                missing = 0
-                notes = (Note("length_unknown"),)
-        if kind == b"ds64":
-            file.seek(begin)
-            lengths[b"data"] = struct.unpack("<QQ", file.read(16))[1]
-        if kind == b"bext":
-            file.seek(begin)
-            text = file.read(CLOCK.stop)
-            texts = (
-                text[section].strip(b"\0 ").decode("ascii", "replace") for section in (DATE, CLOCK)
-            )
-            date = " ".join(word for word in texts if word.isprintable() and word)
-    if missing is None:
-        refuse(f"{name}: has no chunk of samples", "an undamaged WAV file")
-    if missing > 0:
-        refuse(f"{name}: is cut off, {missing} bytes are missing", "a complete file")
-    return date, notes
-
-
-def _chunks(
-    file: BinaryIO, lengths: dict[bytes, int], size: int
-) -> Iterator[tuple[bytes, int, int]]:
-    """Yield kind, begin and length of the chunks of a WAV file."""
-    begin = 12
-    for _ in range(MAX_CHUNKS):
-        file.seek(begin)
-        head = file.read(8)
-        if len(head) < 8 or begin >= size:  # noqa: PLR2004 - size of a chunk header
-            return
-        kind, length = struct.unpack("<4sI", head)
-        if length == UNKNOWN:
-            length = lengths.get(kind, length)
-        yield kind, begin + 8, length
-        begin += 8 + length + length % 2
+    date, size = "", path.stat().st_size
+    with path.open("rb") as file:
+        start = file.read(RF64_LENGTH.stop)
+        file.seek(12)
+        while len(head := file.read(8)) == 8:  # noqa: PLR2004 - size of a chunk header
+            kind, length = struct.unpack("<4sI", head)
+            begin = file.tell()
+            if kind == b"bext":
+                bext = file.read(CLOCK.stop).decode("latin-1")
+                words = (bext[section].strip("\0 ") for section in (DATE, CLOCK))
+                date = " ".join(word for word in words if word and word.isprintable())
+            elif kind == b"data":
+                if length >= MIN_UNKNOWN:
+                    is_rf64 = start.startswith(b"RF64")
+                    length = int.from_bytes(start[RF64_LENGTH], "little") if is_rf64 else 0
+                if (missing := begin + length - size) > 0:
+                    text = f"is cut off, {missing} bytes are missing"
+                    refuse(f"{shown_path(path)}: {text}", "a complete file")
+                break
+            file.seek(begin + length + length % 2)
+    return date

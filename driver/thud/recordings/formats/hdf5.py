@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -25,6 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+# Some file systems of networks have no locks.
+LOCKING = "best-effort"
 # Maximum size of a header value, bytes.
 MAX_VALUE = 4096
 # Name under which MATLAB stores the contents of cells.
@@ -35,7 +36,7 @@ MATLAB_OTHERS = {b"cell", b"struct", b"function_handle", b"canonical empty"}
 
 def _read(path: Path, key: str, column: int, start: int, stop: int) -> NDArray[np.float64]:
     h5py = library("h5py", "HDF5")
-    with guarded(path, "HDF5"), _open(h5py, path) as file:
+    with guarded(path, "HDF5"), h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
         return read_column(file[key], column, start, stop)
 
 
@@ -67,7 +68,7 @@ def read_channels(path: Path) -> list[Channel]:
         elif _is_header(h5py, entry):
             header.append(header_entry(key, entry[()]))
 
-    with _open(h5py, path) as file:
+    with h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
         visit("", file)
         file.visititems(visit)
         return channels_of_variables(variables, header, name)
@@ -93,13 +94,3 @@ def _is_header(h5py: Any, entry: Any) -> bool:  # noqa: ANN401 - a library
     is_text = h5py.check_string_dtype(entry.dtype) is not None
     size = 1 if entry.shape is None else np.prod(entry.shape, dtype=object)
     return (entry.dtype.kind in "iufSU" or is_text) and size * entry.dtype.itemsize <= MAX_VALUE
-
-
-def _open(h5py: Any, path: Path) -> Any:  # noqa: ANN401 - a library
-    """Open a file, without a lock if the file system has none."""
-    try:
-        return h5py.File(os.fsencode(path), "r")
-    except OSError as error:
-        if error.errno not in (errno.ENOLCK, errno.ENOTSUP):
-            raise
-    return h5py.File(os.fsencode(path), "r", locking=False)
