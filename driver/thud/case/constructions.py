@@ -332,8 +332,7 @@ def read_construction(path: Path) -> Construction:
     try:
         return _new_construction(content)
     except InputError as error:
-        message = f"{path}: {error}"
-        raise InputError(message) from error
+        raise error.within(path) from error
 
 
 def _new_construction(content: Mapping[str, Any]) -> Construction:
@@ -373,7 +372,7 @@ def _require_masses(entry: Construction) -> None:
 
     Light layers, such as resilient ones, need not be in the keys.
     """
-    mass = _mass_of_keys(entry)
+    mass = mass_of_keys(entry)
     if mass is None:
         return
     least = sum(
@@ -388,7 +387,7 @@ def _require_masses(entry: Construction) -> None:
     )
 
 
-def _mass_of_keys(entry: Construction) -> float | None:
+def mass_of_keys(entry: Construction) -> float | None:
     """Return the mass per unit area that the keys describe, kg/m2; None if they do not."""
     floor = entry.floor
     if isinstance(floor, JoistFloor):
