@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import re
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TextIO
+from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base.checks import refuse
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
 
 
 # Separators of columns by precedence; a line without any of them is separated by blanks.
@@ -68,16 +67,14 @@ class DecimalMark(NamedTuple):
         return reason
 
 
-def find_encoding(
-    path: str | os.PathLike[str], is_known: Callable[[str], bool] | None = None
-) -> str:
+def find_encoding(path: Path, is_known: Callable[[str], bool]) -> str:
     """Return the encoding of a text.
 
     UTF-16 has a byte order mark. A header that is not UTF-8 has that of `ENCODINGS` in which
     `is_known` is true of the most words that are not ASCII, or Latin-1 if its only such characters
     are those of German and of units; else the result is UTF-8.
     """
-    with Path(path).open("rb") as file:
+    with path.open("rb") as file:
         content = file.read(_MAX_HEADER_SIZE)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
@@ -93,30 +90,29 @@ def find_encoding(
     return "latin-1" if others <= _GERMAN else "utf-8-sig"
 
 
-def _count_known(
-    header: bytes, encoding: str, is_known: Callable[[str], bool] | None
-) -> int | None:
+def _count_known(header: bytes, encoding: str, is_known: Callable[[str], bool]) -> int | None:
     """Return the number of known words that are not ASCII; None in another encoding."""
     try:
         text = header.decode(encoding)
     except UnicodeDecodeError:
         return None
     cells = (cell.strip(" \r\n\"'#") for cell in _WORD_SEPARATOR.split(text.replace("\n", "\t")))
-    return sum(not cell.isascii() and is_known(cell) for cell in cells) if is_known else 0
+    return sum(not cell.isascii() and is_known(cell) for cell in cells)
 
 
-def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
+def read_lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
     """Yield the lines of a text without line ends.
 
     Raise InputError, naming the line, if a line is too long or holds zero bytes.
     """
-    for number, ended in enumerate(iter(lambda: text.readline(MAX_LINE + 1), ""), start=1):
-        line = ended.removesuffix("\n")
-        if "\0" in line:
-            refuse(f"{name}: line {number} holds zero bytes", allowed)
-        if len(line) > MAX_LINE:
-            refuse(f"{name}: line {number} is longer than {MAX_LINE} characters", allowed)
-        yield line
+    with path.open(encoding=encoding, errors="replace") as text:
+        for number, ended in enumerate(iter(lambda: text.readline(MAX_LINE + 1), ""), start=1):
+            line = ended.removesuffix("\n")
+            if "\0" in line:
+                refuse(f"{name}: line {number} holds zero bytes", allowed)
+            if len(line) > MAX_LINE:
+                refuse(f"{name}: line {number} is longer than {MAX_LINE} characters", allowed)
+            yield line
 
 
 def strip_comment(line: str) -> str:

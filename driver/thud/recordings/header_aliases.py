@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import re
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.base.columns import GROUPING, MARKS, to_number
-from thud.base.units import SPELLINGS, UNITS, find_unit
+from thud.base.units import UNITS, find_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -46,16 +45,6 @@ TIME = _words(
 _FORCE = _words("kraft stoßkraft 힘 충격력 하중 力 衝撃力 荷重")
 WORDS = RATE | STEP | DATE | UNIT | TIME_UNIT | TIME | _FORCE
 
-# Factors of units to Hz and to s, by spellings in lower case; without a unit 1.
-RATE_UNITS, TIME_UNITS = (
-    {"": 1.0}
-    | {
-        text.casefold(): UNITS[unit][1]
-        for text in (*UNITS, *SPELLINGS, "\u00b5s")
-        if UNITS[unit := find_unit(text)][0] == base
-    }
-    for base in ("Hz", "s")
-)
 # "Force [kN]", "Force (kN) 1"; "Force / kN", "Force, kN"; "Force in kN", "Force_kN", "Force kN".
 BRACKETS = re.compile(r"\[([^][]{0,30})\]|\{([^{}]{0,30})\}|\(((?:[^()]|\([^()]*\)){0,30})\)")
 LOOSE = re.compile(r"(?P<name>.*?\S)(?P<mark>\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s,_]{1,12})\s*")
@@ -133,11 +122,12 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
 
 
 def time_scale(unit: str, name: str) -> float:
-    """Return a unit of time in s; raise InputError if it is none."""
-    if unit.casefold() not in TIME_UNITS:
-        allowed = ", ".join(filter(None, TIME_UNITS))
+    """Return a unit of time in s, 1 without a unit; raise InputError if it is none."""
+    base, size = UNITS.get(find_unit(unit), ("", 1.0)) if unit else ("s", 1.0)
+    if base != "s":
+        allowed = ", ".join(name for name, (base, _) in UNITS.items() if base == "s")
         refuse(f"{name}: the unit of the times is {unit!r}", allowed)
-    return TIME_UNITS[unit.casefold()]
+    return size
 
 
 def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:
@@ -146,17 +136,14 @@ def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float |
     `decimal` is that of `read_number`.
     """
     for title, value in items:
-        name, unit = split_title(title)
-        alias = plain(name)
-        number = read_number(value, decimal) if alias in RATE or alias in STEP else None
-        if number is None or not number[0] > 0:
-            continue
-        own_unit = (number[1] or unit).casefold()
-        if alias in RATE and own_unit in RATE_UNITS:
-            return number[0] * RATE_UNITS[own_unit]
-        if alias in STEP and own_unit in TIME_UNITS:
-            rate = 1 / (number[0] * TIME_UNITS[own_unit])
-            return rate if math.isfinite(rate) else None
+        name, titled = split_title(title)
+        kind = "Hz" if plain(name) in RATE else "s" if plain(name) in STEP else ""
+        number, own = (read_number(value, decimal) if kind else None) or (0.0, "")
+        base, size = kind, 1.0
+        if unit := own or titled:
+            base, size = UNITS.get(find_unit(unit), ("", 1.0))
+        if number * size > 0 and base == kind:
+            return number * size if kind == "Hz" else 1 / (number * size)
     return None
 
 

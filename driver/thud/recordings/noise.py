@@ -150,7 +150,9 @@ class Background(Immutable):
     @cached_property
     def _weights(self) -> NDArray[np.float64]:
         """Inverse covariance of the cells times their means for each draw, [n_draw, n_cell]."""
-        return np.array([cho_solve((f, True), self.mean, check_finite=False) for f in self._factors])
+        return np.array(
+            [cho_solve((f, True), self.mean, check_finite=False) for f in self._factors]
+        )
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the expected background in cells, N, and the covariance of its error, N2.

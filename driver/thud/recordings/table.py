@@ -182,6 +182,17 @@ class _Layout:
         """Yield number and text of the lines from the first number on."""
         return itertools.islice(enumerate(self.lines(), 1), self.first - 1, None)
 
+    def decisive(self) -> Iterator[tuple[int, list[str], bool]]:
+        """Yield number, numeric cells and use of quotes of lines that may show the decimal mark."""
+        for number, line in self.rows():
+            if "." in line or "," in line:
+                cells = self.cells(line)
+                yield (
+                    number,
+                    [_value(cells[i])[0] for i in self.used if i < len(cells)],
+                    '"' in line,
+                )
+
     def refuse(self, line: int, reason: str, allowed: str = "") -> NoReturn:
         """Raise InputError for a line."""
         refuse(f"{self.name}: line {line}: {reason}", allowed or self.allowed)
@@ -209,22 +220,25 @@ def read_table(
     file = Path(path)
     name = shown_path(file)
     try:
-        if file.suffix.lower() == ".xlsx":
-            sheet, cells = read_workbook(file, allowed)
-            layout = _Layout(f"{name}, sheet {sheet!r}", allowed, lambda: iter(cells), "\t")
-            layout.decimal = DecimalMark(".", 1)
-        elif file.is_file():  # opening a pipe could block
-            require_small(file, "text")
-            # A header may have an encoding that is not known.
-            encoding = find_encoding(file, lambda word: _is_known(word, is_known))
-            layout = _Layout(name, allowed, lambda: _lines(file, encoding, name, allowed))
-        else:
-            refuse(f"{name}: cannot be read (no such regular file)", allowed)
-        return _read(layout)
+        layout = _open(file, name, allowed, is_known)
+        header, titles, has_titles = _read_header(_find_numbers(layout), layout)
+        if not layout.decimal.line:
+            layout.decimal = find_decimal(layout.decisive(), layout.separator, name)
+        if layout.separator == "," and not layout.decimal.line and not has_titles:
+            layout.refuse(
+                layout.first,
+                "the commas may separate columns or be decimal marks",
+                "a title for each column, decimal points, or semicolons between columns",
+            )
+        values = _read_numbers(layout)
     except InputError:  # is a ValueError
         raise
     except (OSError, ValueError) as error:
         refuse(f"{name}: cannot be read ({shown_text(error)})", allowed, error)
+    clock = None if layout.clock is None else values.pop(layout.clock)
+    columns = [Column(i + 1, *titles[i], numbers, layout.name) for i, numbers in values.items()]
+    mark = layout.decimal.mark if layout.decimal.line else ""
+    return Table(layout.name, columns, header, mark, has_titles, clock)
 
 
 def time_and_force(table: Table) -> NDArray[np.float64]:
@@ -238,35 +252,25 @@ def time_and_force(table: Table) -> NDArray[np.float64]:
     return np.column_stack([time.to("s"), force.to("N")])
 
 
-def _is_known(word: str, is_known: Callable[[str], bool] | None) -> bool:
-    """Whether a word of a header is known, or its unit."""
-    name, unit = split_title(word)
-    if unit and not unit.isascii():
-        return bool(find_unit(unit))
-    known = plain(name) in WORDS or bool(find_unit(name))
-    return known or (is_known is not None and is_known(name))
+def _open(file: Path, name: str, allowed: str, is_known: Callable[[str], bool] | None) -> _Layout:
+    """Return the layout of a workbook, or of a text whose header may show its encoding."""
+    if file.suffix.lower() == ".xlsx":
+        sheet, cells = read_workbook(file, allowed)
+        label = f"{name}, sheet {sheet!r}"
+        return _Layout(label, allowed, lambda: iter(cells), "\t", DecimalMark(".", 1))
+    if not file.is_file():  # opening a pipe could block
+        refuse(f"{name}: cannot be read (no such regular file)", allowed)
+    require_small(file, "text")
 
+    def is_word(word: str) -> bool:
+        title, unit = split_title(word)
+        if unit and not unit.isascii():
+            return bool(find_unit(unit))
+        known = plain(title) in WORDS or bool(find_unit(title))
+        return known or (is_known is not None and is_known(title))
 
-def _lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
-    with path.open(encoding=encoding, errors="replace") as text:
-        yield from read_lines(text, name, allowed)
-
-
-def _read(layout: _Layout) -> Table:
-    header, titles, has_titles = _read_header(_find_numbers(layout), layout)
-    if not layout.decimal.line:
-        layout.decimal = find_decimal(_decisive(layout), layout.separator, layout.name)
-    if layout.separator == "," and not layout.decimal.line and not has_titles:
-        layout.refuse(
-            layout.first,
-            "the commas may separate columns or be decimal marks",
-            "a title for each column, decimal points, or semicolons between columns",
-        )
-    values = _read_numbers(layout)
-    clock = None if layout.clock is None else values.pop(layout.clock)
-    columns = [Column(i + 1, *titles[i], numbers, layout.name) for i, numbers in values.items()]
-    mark = layout.decimal.mark if layout.decimal.line else ""
-    return Table(layout.name, columns, header, mark, has_titles, clock)
+    encoding = find_encoding(file, is_word)
+    return _Layout(name, allowed, lambda: read_lines(file, encoding, name, allowed))
 
 
 def _value(cell: str) -> tuple[str, str]:
@@ -309,14 +313,6 @@ def _find_numbers(layout: _Layout) -> list[str]:
     return refuse(f"{layout.name}: cannot be read (no numbers)", layout.allowed)
 
 
-def _decisive(layout: _Layout) -> Iterator[tuple[int, list[str], bool]]:
-    """Yield number, numeric cells and use of quotes of lines that may show the decimal mark."""
-    for number, line in layout.rows():
-        if "." in line or "," in line:
-            cells = layout.cells(line)
-            yield number, [_value(cells[i])[0] for i in layout.used if i < len(cells)], '"' in line
-
-
 # Header: titles, units, names and values.
 
 
@@ -340,9 +336,14 @@ def _read_header(
         else:
             others.append((number, line))
     units = [cells for _, cells in rows if _are_units(cells)]
-    titles = [(_evidence(cells), number, cells) for number, cells in rows if cells not in units]
-    _, _, chosen = max(titles, default=(0, 0, []))
-    others += [(number, "\t".join(cells)) for _, number, cells in titles if cells is not chosen]
+    titles = [row for row in rows if row[1] not in units]
+    # Titles state units or times, or are next to the numbers.
+    _, chosen = max(
+        titles,
+        key=lambda row: (any(map(_states_unit, row[1])), any(map(is_time, row[1])), row[0]),
+        default=(0, []),
+    )
+    others += [(number, "\t".join(cells)) for number, cells in titles if cells is not chosen]
     for number, line in sorted(others):
         _refuse_titles(line, number, layout, is_last=number == len(above), is_open=not chosen)
     layout.width = max([layout.width, *map(len, (chosen, *units))])
@@ -418,12 +419,6 @@ def _are_units(cells: list[str]) -> bool:
     return not any(name and unit for name, unit in filled) and (
         2 * known > len(filled) or (bool(filled) and all(unit for _, unit in filled))
     )
-
-
-def _evidence(cells: list[str]) -> int:
-    """Return 2 if a cell states a unit, 1 if it names times, else 0."""
-    pairs = [split_title(cell) for cell in cells]
-    return 2 if any(find_unit(unit) for _, unit in pairs) else int(any(map(is_time, cells)))
 
 
 def _refuse_titles(
