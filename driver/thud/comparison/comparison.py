@@ -22,7 +22,7 @@ from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Page
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
-from thud.level.drop_force import DropResult
+from thud.level.drop_force import ImpactOrRecording
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_figure, comparison_html
@@ -250,7 +250,7 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:
-        items = [impacts] if isinstance(impacts, Case | DropResult) else impacts
+        items = [impacts] if isinstance(impacts, Case | ImpactOrRecording) else impacts
         if not isinstance(items, Iterable) or isinstance(items, str | bytes | os.PathLike):
             refuse_value("impacts", items, allowed)
         pairs = [(getattr(item, "name", type(item).__name__.lower()), item) for item in items]
@@ -259,7 +259,7 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
     named: dict[str, Case | ImpactResult] = {}
     for name, item in pairs:
         require_kind("name", name, str)
-        require_kind(name, item, Case | DropResult)
+        require_kind(name, item, Case | ImpactOrRecording)
         # Cases from Python often share their name.
         names = chain([name], (f"{name} ({n})" for n in count(2)))
         named[next(free for free in names if free not in named)] = item

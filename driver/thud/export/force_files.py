@@ -19,7 +19,7 @@ from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
 from thud.export.wav import wav_file
-from thud.level.drop_force import DropForce, DropResult
+from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.channel import library
 
@@ -128,7 +128,7 @@ def blocked_force(
     InputError
         If the drop does not exist, or the rate is not possible.
     """
-    require_kind("source", source, DropResult)
+    require_kind("source", source, ImpactOrRecording)
     force = BlockedForce(**vars(source.drop_force(drop)))
     return force if rate is None else _resampled(force, rate)
 

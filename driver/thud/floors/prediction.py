@@ -22,7 +22,7 @@ from thud.impact.compute import compute, new_floor_impact
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.room_level import RoomLevel, new_room_level
 from thud.level.assessment import criterion_quantity
-from thud.level.drop_force import DropResult
+from thud.level.drop_force import ImpactOrRecording
 from thud.level.levels import BANDWIDTHS, SOURCES
 from thud.level.rating import (
     PredictedRating,
@@ -219,7 +219,7 @@ def predict_level(
     InputError
         If the floor is missing, or floor or room are out of range.
     """
-    require_kind("source", source, DropResult | None)
+    require_kind("source", source, ImpactOrRecording | None)
     case = Case() if source is None else source.case
     room = room or case.room or Room()
     case = with_floor(replace(case, room=room), floor or case.floor)

@@ -15,7 +15,7 @@ from thud.base.extras import data_frame, require_extra
 from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.level.assessment import assess_levels
-from thud.level.drop_force import DropForce, DropResult
+from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.level.estimate import Estimate
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
@@ -58,7 +58,7 @@ class ImpactNumbers:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Impact(ImpactQuantities, DropResult):
+class Impact(ImpactQuantities, ImpactOrRecording):
     """Force and motion of an impact, sampled at a constant rate.
 
     Attributes are those of `ImpactQuantities` and the following. The peak forces of the model

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-class DropResult(Displayed):
+class ImpactOrRecording(Displayed):
     """Base of `Impact` and `Recording`, which have force, levels and verdict by the same names.
 
     Arguments are checked for it, as the packages that recordings import take 0.3 s to load.

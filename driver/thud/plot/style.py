@@ -15,7 +15,7 @@ from matplotlib.ticker import NullLocator
 
 from thud.base.checks import require_kind, require_mapping
 from thud.base.errors import InputError
-from thud.level.drop_force import DropResult
+from thud.level.drop_force import ImpactOrRecording
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ def iterate_curves(
     """
     require_mapping("impacts", impacts, "impacts")
     for name, impact in impacts.items():
-        require_kind(name, impact, DropResult)
+        require_kind(name, impact, ImpactOrRecording)
     kinds = [impact.assessed_force(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         suffix = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""

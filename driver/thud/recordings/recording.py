@@ -15,7 +15,7 @@ from thud.base.extras import data_frame, require_extra
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
-from thud.level.drop_force import DropForce, DropResult
+from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.recordings.assumptions import check_assumptions, instrument_contributions
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
@@ -51,7 +51,7 @@ LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(DropResult):
+class Recording(ImpactOrRecording):
     """Recorded drops of one source.
 
     `time` and `force` are those of the first drop, also in comparisons and fits. Levels and other
