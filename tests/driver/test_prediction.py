@@ -21,7 +21,7 @@ from thud.base.note import Note
 from thud.case.case import Case
 from thud.cli import main
 from thud.floors.prediction import _force_change
-from thud.impact.room_level import new_room_level
+from thud.impact.compute import new_room_level
 from thud.level.assessment import octave_limits
 
 if TYPE_CHECKING:

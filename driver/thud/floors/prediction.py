@@ -18,9 +18,9 @@ from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 from thud.floors import prediction_text
 from thud.floors.survey import RoomLevels
-from thud.impact.compute import compute, new_floor_impact
+from thud.impact.compute import compute, new_floor_impact, new_room_level
 from thud.impact.floor_impact import FloorImpact
-from thud.impact.room_level import RoomLevel, new_room_level
+from thud.impact.room_level import RoomLevel
 from thud.level.assessment import criterion_quantity
 from thud.level.drop_force import ImpactOrRecording
 from thud.level.levels import BANDWIDTHS, SOURCES

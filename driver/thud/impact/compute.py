@@ -7,19 +7,21 @@ import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import IMPACT_QUANTITIES, Ball, Drop, Sampling
-from thud.base.bridge import ask, notes, without_units
+import numpy as np
+
+from thud.base._schema import IMPACT_QUANTITIES, RATINGS, Ball, Drop, Sampling
+from thud.base.bridge import ask, notes, text, without_units
 from thud.base.checks import refuse, require_kind
-from thud.base.errors import PlausibilityWarning
+from thud.base.errors import NumericalError, PlausibilityWarning
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.constructions import with_floor
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.impact import Impact
 from thud.impact.motion import new_motion
-from thud.impact.room_level import new_room_level
+from thud.impact.room_level import RoomLevel
+from thud.level.rating import PredictedRating
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions, ModelName, ModelOptions, Room
@@ -147,6 +149,42 @@ def new_floor_impact(
         floor_displacement=columns["floor_displacement"],
         floor_velocity=columns["floor_velocity"],
         floor_work=answer["floor_summary"]["floor_work"],
+    )
+
+
+def new_room_level(answer: Bundle) -> RoomLevel:
+    """Return the level from a bundle of the library that has one."""
+    bands, room = without_units(answer["room_levels"]), answer["room"]
+    frequency = bands.pop("nominal")
+    shares = [bands.pop(name) for name in list(bands) if name.endswith("_share")]
+    if not (is_known := np.isfinite(bands["level"])).all():
+        frequencies = ", ".join(f"{f:g}" for f in frequency[~is_known])
+        message = (
+            f"&room: the level in the room is not finite at {frequencies} Hz: a value of the "
+            "floor or the room is too extreme to be computed"
+        )
+        raise NumericalError(message)
+    summary = answer["room_summary"]
+    names = text(summary["contribution"]).split("\n")
+    contributed = zip(names, summary["contributed"].tolist(), strict=True)
+    contributions = dict(sorted(contributed, key=lambda entry: -entry[1]))
+    length, width, height = room["sides"].tolist()
+    return RoomLevel(
+        frequency=frequency,
+        **bands,
+        octave_level=answer["room_octaves"]["level_dB"],
+        path_shares=np.stack(shares, axis=-1),
+        mass_per_area=room["surface_mass"],
+        volume=room["volume"],
+        size=(length, width, height),
+        n_modal=int(room["n_modal"]),
+        ratings={
+            name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
+            for name, level in zip(RATINGS, summary["level"], strict=True)
+        },
+        probability=summary.get("probability", np.nan),
+        verdict=text(summary.get("verdict", b"")),
+        floor_notes=notes(answer.get("room_warnings", {})),
     )
 
 

@@ -5,22 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from thud.base._schema import RATINGS
-from thud.base.bridge import notes, text, without_units
-from thud.base.errors import NumericalError
 from thud.base.immutable import Immutable
-from thud.level.rating import PredictedRating
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from thud.base._schema import RoomRating
-    from thud.base.bridge import Bundle
     from thud.base.note import Note
+    from thud.level.rating import PredictedRating
 
     Array = NDArray[np.float64]
 
@@ -98,39 +93,3 @@ class RoomLevel(Immutable):
     def has_edges(self) -> bool:
         """Whether the levels with simply supported and with clamped edges differ."""
         return bool((self.simple_level != self.clamped_level).any())
-
-
-def new_room_level(answer: Bundle) -> RoomLevel:
-    """Return the level from a bundle of the library that has one."""
-    bands, room = without_units(answer["room_levels"]), answer["room"]
-    frequency = bands.pop("nominal")
-    shares = [bands.pop(name) for name in list(bands) if name.endswith("_share")]
-    if not (is_known := np.isfinite(bands["level"])).all():
-        frequencies = ", ".join(f"{f:g}" for f in frequency[~is_known])
-        message = (
-            f"&room: the level in the room is not finite at {frequencies} Hz: a value of the "
-            "floor or the room is too extreme to be computed"
-        )
-        raise NumericalError(message)
-    summary = answer["room_summary"]
-    names = text(summary["contribution"]).split("\n")
-    contributed = zip(names, summary["contributed"].tolist(), strict=True)
-    contributions = dict(sorted(contributed, key=lambda entry: -entry[1]))
-    length, width, height = room["sides"].tolist()
-    return RoomLevel(
-        frequency=frequency,
-        **bands,
-        octave_level=answer["room_octaves"]["level_dB"],
-        path_shares=np.stack(shares, axis=-1),
-        mass_per_area=room["surface_mass"],
-        volume=room["volume"],
-        size=(length, width, height),
-        n_modal=int(room["n_modal"]),
-        ratings={
-            name: PredictedRating(name, float(level), summary["uncertainty"], contributions)
-            for name, level in zip(RATINGS, summary["level"], strict=True)
-        },
-        probability=summary.get("probability", np.nan),
-        verdict=text(summary.get("verdict", b"")),
-        floor_notes=notes(answer.get("room_warnings", {})),
-    )
