@@ -12,11 +12,11 @@ from thud.base.checks import refuse
 from thud.recordings.channel import Channel, guarded, library, shown_path, shown_text
 from thud.recordings.variables import (
     Header,
-    Variable,
-    channels_of_variables,
+    Vector,
+    channels_of_vectors,
     header_entry,
-    may_hold_channels,
     read_column,
+    vectors_of,
 )
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def read_channels(path: Path) -> list[Channel]:
     """
     h5py = library("h5py", "HDF5")
     name = shown_path(path)
-    variables: list[Variable] = []
+    vectors: list[Vector] = []
     header: Header = []
 
     def visit(key: str, entry: Any) -> None:  # noqa: ANN401 - of the library
@@ -61,17 +61,17 @@ def read_channels(path: Path) -> list[Channel]:
             header.append((key, "".join(map(chr, entry[()].ravel()[:MAX_VALUE]))))
         elif matlab_class in MATLAB_OTHERS:
             return
-        elif may_hold_channels(entry.dtype.kind, entry.shape):
+        elif found := vectors_of(key, entry.dtype.kind, entry.shape, partial(_read, path, key)):
             if entry.is_virtual or entry.external:
                 refuse(f"{name}: {shown_text(key)}: is stored in another file", "the other file")
-            variables.append(Variable(key, entry.shape, partial(_read, path, key)))
+            vectors.extend(found)
         elif _is_header(h5py, entry):
             header.append(header_entry(key, entry[()]))
 
     with h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
         visit("", file)
         file.visititems(visit)
-        return channels_of_variables(variables, header, name)
+        return channels_of_vectors(vectors, header, name)
 
 
 def _attributes(h5py: Any, owner: str, entry: Any) -> Header:  # noqa: ANN401 - a library

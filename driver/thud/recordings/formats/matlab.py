@@ -13,11 +13,11 @@ import scipy.io
 from thud.base.checks import refuse
 from thud.recordings.channel import MAX_IN_MEMORY, MIB, require_small, shown_path, shown_text
 from thud.recordings.variables import (
-    Variable,
-    channels_of_variables,
+    Vector,
+    channels_of_vectors,
     header_entry,
-    may_hold_channels,
     read_column,
+    vectors_of,
 )
 
 if TYPE_CHECKING:
@@ -46,14 +46,13 @@ def read_channels(path: Path) -> list[Channel]:
     if len(variables) > MAX_VARIABLES:
         refuse(f"{name}: more than {MAX_VARIABLES} variables", "a recording")
     _require_size(sum(value.nbytes for value in variables.values()), name)
-    arrays = [
-        Variable(key, value.shape, partial(read_column, value))
-        for key, value in variables.items()
-        if may_hold_channels(value.dtype.kind, value.shape)
-    ]
-    keys = {array.key for array in arrays}
-    header = [header_entry(key, value) for key, value in variables.items() if key not in keys]
-    return channels_of_variables(arrays, header, name)
+    vectors: list[Vector] = []
+    header = []
+    for key, value in variables.items():
+        found = vectors_of(key, value.dtype.kind, value.shape, partial(read_column, value))
+        vectors += found
+        header += [] if found else [header_entry(key, value)]
+    return channels_of_vectors(vectors, header, name)
 
 
 def _require_size(size: int, name: str) -> None:
