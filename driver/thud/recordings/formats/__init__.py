@@ -3,66 +3,44 @@
 from __future__ import annotations
 
 import importlib
-import struct
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, guarded, shown_path
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
 # Number of bytes from which the format is identified.
 HEAD = 4096
-HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class Format(NamedTuple):
-    """A format: name, module that reads it, suffixes, and whether the first bytes match it."""
+    """A format: name, module that reads it, suffixes, and pattern of the first bytes."""
 
     name: str
     module: str
     suffixes: tuple[str, ...]
-    matches: Callable[[bytes], bool]
+    pattern: bytes
 
 
-def _is_uff(head: bytes) -> bool:
-    """Whether a file begins with the mark -1 of a universal file and the number of a data set."""
-    lines = head.lstrip(b"\r\n").splitlines()[:2]
-    return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1][:6].strip().isdigit()
-
-
-def _is_matlab_4(head: bytes) -> bool:
-    """Whether a file begins as one of MATLAB 4.
-
-    Its integers are: type, rows, columns, imaginary part, length of the name, which ends with a
-    zero. The decimal digits of the type are byte order, zero, precision and kind of matrix.
-    """
-    for digit, order in enumerate("<>"):
-        kind, _, _, imaginary, length = struct.unpack(f"{order}5I", head[:20].ljust(20, b"\xff"))
-        is_type = kind // 100 == 10 * digit and kind // 10 % 10 <= 5 and kind % 10 <= 2  # noqa: PLR2004
-        if is_type and imaginary <= 1 and head[19 + length : 20 + length] == b"\0" and length > 1:
-            return True
-    return False
-
-
-def _is_text(head: bytes) -> bool:
-    """Whether a file is text: UTF-16 with a byte order mark, or without zero bytes."""
-    return bool(head) and (head[:2] in {b"\xff\xfe", b"\xfe\xff"} or b"\0" not in head)
-
-
+# A MATLAB file of version 4 begins with integers: type (kind and precision of numbers; 1000 more if
+# they are big-endian), rows, columns, imaginary part, length of the name. A universal file begins
+# with the mark -1 and the number of a data set. Text is UTF-16 with a mark, or without zero bytes.
 FORMATS = (
-    Format("WAV", "audio", (".wav", ".rf64", ".bwf"),
-           lambda head: head[:4] in {b"RIFF", b"RF64"} and head[8:12] == b"WAVE"),
-    Format("FLAC", "audio", (".flac",), lambda head: head[:4] == b"fLaC"),
-    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
+    Format("WAV", "audio", (".wav", ".rf64", ".bwf"), rb"(RIFF|RF64).{4}WAVE"),
+    Format("FLAC", "audio", (".flac",), rb"fLaC"),
+    Format("TDMS", "tdms", (".tdms",), rb"TDSm"),
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
-           lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))),
+           rb"(.{512}|.{1024}|.{2048})?\x89HDF\r\n\x1a\n"),
     Format("MATLAB", "matlab", (".mat",),
-           lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"} or _is_matlab_4(head)),
-    Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
-    Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
+           rb".{124}(\x00\x01IM|\x01\x00MI)"
+           rb"|[\x00-\x34]\x00{3}.{8}[\x00\x01]\x00{3}[\x02-\x40]\x00{3}"
+           rb"|\x00{2}[\x03\x04].{9}\x00{3}[\x00\x01]\x00{3}[\x02-\x40]"),
+    Format("universal", "universal", (".uff", ".unv", ".uf"), rb"\s*-1 *\r?\n *\d+ *b?"),
+    Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"),
+           rb"\xff\xfe|\xfe\xff|[^\x00]+\Z"),
 )  # fmt: skip
 # First bytes of files that are not supported, and what is needed instead.
 UNSUPPORTED = {
@@ -84,7 +62,7 @@ def read_channels(path: Path) -> list[Channel]:
     name = shown_path(path)
     if not head:
         refuse(f"{name}: is empty", "a recording")
-    actual = next((entry for entry in FORMATS if entry.matches(head)), None)
+    actual = next((entry for entry in FORMATS if re.match(entry.pattern, head, re.DOTALL)), None)
     expected = next((entry for entry in FORMATS if path.suffix.lower() in entry.suffixes), None)
     advice = next((text for start, text in UNSUPPORTED.items() if head.startswith(start)), None)
     if advice:
