@@ -20,8 +20,8 @@ from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import find_offset_step, remove_background, step_errors
 from thud.recordings.contact import Contact, find_contact
-from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.faults import check_jumps, min_background, repair
+from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions

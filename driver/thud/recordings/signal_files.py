@@ -272,7 +272,8 @@ def _oriented(signal: Signal, polarity: str | None) -> Signal:
         signal = _negated(signal)
     is_assumed = any(note.code == "unit_assumed" for note in signal.notes)
     notes += check_peak(extremes, sign, signal.name, assumed=is_assumed)
-    notes += check_signs(signal.cells, extremes.peak(sign))
+    if signal.cells:
+        notes += check_signs(signal.cells, extremes.peak(sign))
     return replace(signal, notes=(*signal.notes, *notes))
 
 

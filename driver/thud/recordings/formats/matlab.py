@@ -28,39 +28,25 @@ if TYPE_CHECKING:
 
     from thud.recordings.channel import Channel
 
-MAX_VARIABLES = 1000
-
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the numeric vectors of a MATLAB file, also those in structures."""
     name = shown_path(path)
     require_small(path, "a MATLAB file")
     file = os.fsencode(path)
-    _require_size(sum(8 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(file)), name)
-    variables = {
-        key: value
-        for title, content in scipy.io.loadmat(file, simplify_cells=True).items()
-        if not title.startswith("__")
-        for key, value in _arrays(title, content, name)
-    }
-    if len(variables) > MAX_VARIABLES:
-        refuse(f"{name}: more than {MAX_VARIABLES} variables", "a recording")
-    _require_size(sum(value.nbytes for value in variables.values()), name)
-    vectors: list[Vector] = []
-    header = []
-    for key, value in variables.items():
-        found = vectors_of(key, value.dtype.kind, value.shape, partial(read_column, value))
-        vectors += found
-        header += [] if found else [header_entry(key, value)]
-    return channels_of_vectors(vectors, header, name)
-
-
-def _require_size(size: int, name: str) -> None:
-    if size > MAX_IN_MEMORY:
+    if sum(8 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(file)) > MAX_IN_MEMORY:
         refuse(
             f"{name}: the variables unpack to more than {MAX_IN_MEMORY // MIB} MiB",
             "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
         )
+    vectors: list[Vector] = []
+    header = []
+    for title, content in scipy.io.loadmat(file, simplify_cells=True).items():
+        for key, value in _arrays(title, content, name) if not title.startswith("__") else ():
+            found = vectors_of(key, value.dtype.kind, value.shape, partial(read_column, value))
+            vectors += found
+            header += [] if found else [header_entry(key, value)]
+    return channels_of_vectors(vectors, header, name)
 
 
 def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray[np.generic]]]:
