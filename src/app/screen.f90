@@ -2,7 +2,7 @@
 module thud_screen
    use thud_error, only: bad_input
    use thud_system, only: get_system_message, is_terminal, standard_error, standard_output, write_text
-   use thud_text, only: newline, to_text, wrap_lines
+   use thud_text, only: end_mark, newline, to_text, wrap_lines
    implicit none (type, external)
    private
 
@@ -12,10 +12,8 @@ module thud_screen
    integer, parameter, public :: yellow = 33, red = 31
    integer, parameter :: green = 32
 
-   !> Words of verdicts, and their colors.
-   character(len=*), parameter :: words(*) = [character(len=16) :: 'conforms', 'does not conform', 'too low', 'too high', &
-      'undecided']
-   integer, parameter :: colors(size(words)) = [green, red, red, red, yellow]
+   !> Colors of verdicts, by their codes.
+   integer, parameter :: colors(*) = [green, red, yellow]
 
 contains
 
@@ -30,11 +28,10 @@ contains
       integer :: i
 
       call wrap_lines(text, lines)
-      if (has_colors(standard_output)) then
-         do i = 1, size(words)
-            call paint(lines, trim(words(i)), colors(i))
-         end do
-      end if
+      do i = 1, size(colors)
+         call replace_marks(lines, achar(i), get_sequence(colors(i)))
+      end do
+      call replace_marks(lines, end_mark, get_sequence(0))
       call write_screen(standard_output, lines//'  Results: '//directory//newline, exit_code)
    end subroutine print_results
 
@@ -82,37 +79,36 @@ contains
       yes = is_terminal(descriptor) .and. unwanted == 0 .and. terminal /= '' .and. terminal /= 'dumb'
    end function has_colors
 
-   !> Colors a word wherever it stands alone.
-   subroutine paint(text, word, color)
+   !> Replaces marks in results by what the standard output shows for them.
+   subroutine replace_marks(text, mark, sequence)
       character(len=:), allocatable, intent(inout) :: text
-      character(len=*), intent(in) :: word
-      integer, intent(in) :: color
-      character(len=:), allocatable :: rest
+      character(len=1), intent(in) :: mark
+      !> Control sequence, without effect if there are no colors.
+      character(len=*), intent(in) :: sequence
       integer :: at
 
-      rest = text
-      text = ''
       do
-         at = index(rest, word)
+         at = index(text, mark)
          if (at == 0) exit
-         text = text//rest(:at - 1)
-         rest = rest(at + len(word):)
-         if (scan(rest(:1), ' .;'//newline) > 0) then
-            text = text//painted(word, color)
-         else
-            text = text//word
-         end if
+         text = text(:at - 1)//trim(merge(sequence, repeat(' ', len(sequence)), has_colors(standard_output)))//text(at + 1:)
       end do
-      text = text//rest
-   end subroutine paint
+   end subroutine replace_marks
 
-   !> A text in color, by a control sequence of ECMA-48.
+   !> The control sequence of ECMA-48 for a color, 0 for none.
+   pure function get_sequence(color) result(sequence)
+      integer, intent(in) :: color
+      character(len=:), allocatable :: sequence
+
+      sequence = achar(27)//'['//to_text(color)//'m'
+   end function get_sequence
+
+   !> A text in color.
    pure function painted(text, color) result(sequence)
       character(len=*), intent(in) :: text
       integer, intent(in) :: color
       character(len=:), allocatable :: sequence
 
-      sequence = achar(27)//'['//to_text(color)//'m'//text//achar(27)//'[0m'
+      sequence = get_sequence(color)//text//get_sequence(0)
    end function painted
 
 end module thud_screen

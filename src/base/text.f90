@@ -8,8 +8,8 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: byte_order_mark, fixed, flush_right, is_number, is_utf8, join, join_quoted, lower_case, newline, padded
-   public :: quoted, replaced, shortened, significant, tab, to_text, wrap_lines
+   public :: byte_order_mark, fixed, flush_right, get_width, is_number, is_utf8, join, join_quoted, lower_case, marked
+   public :: newline, padded, quoted, replaced, shortened, significant, tab, to_text, wrap_lines
 
    !> Width of the screen, characters.
    integer, parameter, public :: screen_width = 80
@@ -25,6 +25,9 @@ module thud_text
 
    !> UTF-8 byte order mark, with which some editors begin a text.
    character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
+
+   !> End of a marked text, see `marked`.
+   character(len=*), parameter, public :: end_mark = achar(4)
 
    !> Horizontal tab.
    character(len=*), parameter :: tab = achar(9)
@@ -365,14 +368,25 @@ contains
       wrapped = wrapped//text(begin:)
    end subroutine wrap_lines
 
+   !> Text between marks without width, for which the screen shows a color or nothing.
+   pure function marked(text, kind)
+      !> The text; trailing blanks are dropped.
+      character(len=*), intent(in) :: text
+      !> Kind of the text, 1 to 3.
+      integer, intent(in) :: kind
+      character(len=len_trim(text) + 2) :: marked
+
+      marked = achar(kind)//trim(text)//end_mark
+   end function marked
+
    !> Number of characters of a text.
    pure function get_width(text) result(width)
-      !> UTF-8: bytes that continue a character have no width.
+      !> UTF-8: bytes that continue a character, and marks, have no width.
       character(len=*), intent(in) :: text
       integer :: width
       integer :: i
 
-      width = count([(iand(iachar(text(i:i)), 192) /= 128, i=1, len(text))])
+      width = count([(iand(iachar(text(i:i)), 192) /= 128 .and. iachar(text(i:i)) > 4, i=1, len(text))])
    end function get_width
 
 end module thud_text

@@ -19,7 +19,8 @@ from conftest import INPUTS, MINIMAL, REPOSITORY
 
 import thud
 from thud import cli
-from thud.base.tables import WIDTH, format_rows, wrap
+from thud.base._schema import VERDICTS
+from thud.base.tables import WIDTH, Result, format_rows, wrap
 from thud.cli.screen import RED, YELLOW
 
 if TYPE_CHECKING:
@@ -222,15 +223,24 @@ def test_verdicts_in_broken_cells_have_a_color(monkeypatch: pytest.MonkeyPatch) 
     from thud.cli import screen
 
     lines: list[str] = []
-    monkeypatch.setattr(screen, "_has_colors", lambda _: True)
     monkeypatch.setattr("tqdm.tqdm.write", lambda text, file: lines.append(text))  # noqa: ARG005
-    screen.print_results(
-        "125 Hz   7.91 low  a\nverdict  does not  undecided by\n         conform   x"
-    )
-    red = [f"\x1b[{RED}m{word}{COLOR_ENDS}" for word in ("low", "does not", "conform")]
-    assert all(word in lines[0] for word in red)
-    screen.print_results("±1.6  another source that conforms")
-    assert "\x1b" not in lines[1]
+    rows = [
+        ("band", "a", "b"), ("125 Hz", Result("7.91 low", VERDICTS[1]), "low"),
+        ("verdict", Result("does not conform " + "x" * 60, VERDICTS[1]), "conforms"),
+        ("all", Result("conforms", VERDICTS[0]), Result("undecided", VERDICTS[2])),
+    ]  # fmt: skip
+    table = format_rows(rows)
+    colored = [True, False]
+    monkeypatch.setattr(screen, "_has_colors", lambda _: colored.pop(0))
+    screen.print_results(table)
+    for text, color in (("7.91 low", RED), ("does not conform", RED), ("undecided", YELLOW)):
+        assert f"\x1b[{color}m{text}{COLOR_ENDS}" in lines[0]
+    assert f"\x1b[{RED}m{'x' * 60}{COLOR_ENDS}" in lines[0]
+    assert lines[0].count("\x1b") == 10
+    # Without colors the widths are the same.
+    screen.print_results(table)
+    assert lines[1] == CONTROL.sub("", lines[0])
+    assert lines[1].isprintable() or set(lines[1]) - set(map(chr, range(32, 127))) == {"\n"}
 
 
 def test_paths_stay_whole(capsys: pytest.CaptureFixture[str], case_file: CaseFile) -> None:

@@ -9,8 +9,11 @@ import textwrap
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
+from thud.base._schema import VERDICTS
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from typing import Self
 
     Column = Sequence[str]
 
@@ -23,6 +26,39 @@ _MAX_KEPT = 26
 _MAX_WORD = WIDTH // 2 - _GAP
 # Cells are broken after spaces and underscores, but "1.2 ± 0.1", "5 %" and "3 to 4" stay whole.
 _WORD = re.compile(r"(?:[^ _]| (?=[±%]|to \S)|(?<=±) |(?<= to) )*[ _]*")
+# Marks without width before and behind a verdict, which a terminal shows as its color; the library
+# uses the same (src/base/text.f90).
+MARKS = {verdict: chr(number) for number, verdict in enumerate(VERDICTS, 1)}
+END_MARK = chr(4)
+_NO_MARKS = {ord(mark): None for mark in (*MARKS.values(), END_MARK)}
+
+
+class Result(str):
+    """Cell of a table that tells a verdict in words of its own.
+
+    Attributes
+    ----------
+    verdict : str
+        The verdict, an entry of `thud.base._schema.VERDICTS`.
+    """
+
+    verdict: str
+
+    def __new__(cls, text: str, verdict: str) -> Self:
+        """Return the text with its verdict."""
+        result = super().__new__(cls, text)
+        result.verdict = verdict
+        return result
+
+
+def marked(text: str, verdict: str) -> str:
+    """Return a text on a verdict between its marks."""
+    return f"{MARKS[verdict]}{text}{END_MARK}"
+
+
+def unmarked(text: str) -> str:
+    """Return a text without marks."""
+    return text.translate(_NO_MARKS)
 
 
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
@@ -65,7 +101,7 @@ def wrap(text: str) -> str:
 
 
 def _wrap_line(line: str) -> str:
-    if len(line) <= WIDTH:
+    if len(unmarked(line)) <= WIDTH:
         return line
     # Further lines of a comment are comments, too.
     indent = line[: len(line) - len(line.lstrip(" #"))] + "  "
@@ -87,11 +123,18 @@ def _format_columns(columns: Sequence[Column]) -> str:
         widths[max(wide, key=widths.__getitem__)] -= 1
     broken = [[_break(cell, w) for cell in c] for c, w in zip(columns, widths, strict=True)]
     widths = [max((len(line) for cell in c for line in cell), default=0) for c in broken]
-    return "\n".join(
-        (" " * _GAP).join(c.ljust(w) for c, w in zip(line, widths, strict=True)).rstrip()
-        for row in zip(*broken, strict=True)
-        for line in zip_longest(*row, fillvalue="")
-    )
+    lines = []
+    for row, cells in zip(zip(*broken, strict=True), zip(*columns, strict=True), strict=True):
+        for parts in zip_longest(*row, fillvalue=""):
+            shown = map(_padded, parts, widths, cells)
+            lines.append((" " * _GAP).join(shown).rstrip())
+    return "\n".join(lines)
+
+
+def _padded(part: str, width: int, cell: str) -> str:
+    """Return a line of a cell with a width, marked if the cell tells a verdict."""
+    shown = marked(part, cell.verdict) if part and isinstance(cell, Result) else part
+    return shown + " " * (width - len(part))
 
 
 def _min_widths(columns: Sequence[Column]) -> list[int]:

@@ -3,38 +3,29 @@
 from __future__ import annotations
 
 import os
-import re
 import sys
 from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
-from thud.base.tables import WIDTH, wrap
+from thud.base.tables import END_MARK, MARKS, WIDTH, unmarked, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
 RED, GREEN, YELLOW = 31, 32, 33
-# Words of verdicts in sentences, and alone in a line of a cell.
-_VERDICTS = {
-    RED: (
-        r"\bdo(?:es)? not(?: conform)?\b|\btoo (?:low|high)\b|(?<=\d )(?:low|high)\b"
-        r"|(?<=  )(?:does|not|conform|low|high)(?=  |$)"
-    ),
-    GREEN: r"(?<!that )\bconforms\b|(?<=criteria )conform\b",
-    YELLOW: r"\bundecided\b",
-}
-_COLORED = re.compile(
-    "|".join(f"(?P<color_{color}>{words})" for color, words in _VERDICTS.items()), re.MULTILINE
-)
+# Colors of verdicts by their marks.
+_COLORS = dict(zip(MARKS.values(), (GREEN, RED, YELLOW), strict=True))
 
 
 def print_results(text: str) -> None:
     """Print results above any progress bar, with colored verdicts if a terminal shows colors."""
     lines = wrap(text)
     if _has_colors(sys.stdout):
-        lines = _COLORED.sub(_color_verdict, lines)
-    tqdm.write(lines, file=sys.stdout)
+        for mark, color in _COLORS.items():
+            lines = lines.replace(mark, _sequence(color))
+        lines = lines.replace(END_MARK, _sequence(0))
+    tqdm.write(unmarked(lines), file=sys.stdout)
 
 
 def print_path(title: str, path: object) -> None:
@@ -86,10 +77,10 @@ def _has_colors(stream: TextIO) -> bool:
     return wanted and is_terminal(stream)
 
 
-def _color_verdict(match: re.Match[str]) -> str:
-    return _colored(match[0], int(str(match.lastgroup).removeprefix("color_")))
-
-
 def _colored(text: str, color: int) -> str:
-    """Return text in a color, by a control sequence of ECMA-48."""
-    return f"\033[{color}m{text}\033[0m"
+    return f"{_sequence(color)}{text}{_sequence(0)}"
+
+
+def _sequence(color: int) -> str:
+    """Return the control sequence of ECMA-48 for a color, 0 for none."""
+    return f"\033[{color}m"

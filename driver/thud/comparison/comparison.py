@@ -20,6 +20,7 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Page
+from thud.base.tables import Result
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.level.drop_force import ImpactOrRecording
@@ -95,7 +96,7 @@ class Comparison(Displayed, Page):
         ]
         if any(times):
             rows.append(("computing time, ms", *(f"{1e3 * t:.3g}" if t else "" for t in times)))
-        rows.append(("verdict", *(verdict.conforms for verdict in verdicts)))
+        rows.append(("verdict", *(Result(v.conforms, v.conforms) for v in verdicts)))
         # The criteria are the rows after the first three; the verdict is the last row.
         blank = [""] * (len(rows) - 4 - len(criteria))
         limits = (row[0].shown_limits for row in criteria)
@@ -131,7 +132,8 @@ def _cell(criterion: Criterion, quantity: Quantity) -> str:
         state = "low" if criterion.value < criterion.lower else "high"
     else:
         state = "undecided"
-    return f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
+    text = f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
+    return Result(text, criterion.conforms) if state else text
 
 
 def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:

@@ -12,6 +12,7 @@ from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
 from thud.base.files import Page
+from thud.base.tables import Result
 from thud.case.case import Case
 from thud.case.constructions import Construction, with_floor
 from thud.floors.prediction import RoomPrediction, predict_level
@@ -165,7 +166,8 @@ def _required(prediction: RoomPrediction) -> str:
     if required is None:
         return ""
     chance = f"{100 * required.probability:.0f} %"
-    return f"{required.limit:g} ({required.rating.name}): {required.verdict}, {chance}"
+    text = f"{required.limit:g} ({required.rating.name}): {required.verdict}, {chance}"
+    return Result(text, required.verdict)
 
 
 def _tapping(prediction: RoomPrediction) -> str:

@@ -16,7 +16,7 @@ from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
 from thud.base.quantity import Quantity
-from thud.base.tables import csv_text
+from thud.base.tables import Result, csv_text
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
 
@@ -219,7 +219,8 @@ class Criterion(Outcome):
         shown = self._shown_range()
         probability = self._shown_interval() if shown else ""
         values = (self.quantity.label, self.quantity.show(self.value), shown, self.shown_limits)
-        return [_SPREAD_COLUMNS, (*values, probability, self.main_unknown, self.conforms)]
+        result = Result(self.conforms, self.conforms)
+        return [_SPREAD_COLUMNS, (*values, probability, self.main_unknown, result)]
 
     def _shown_range(self) -> str:
         """Return the range in the display unit; empty if its ends are equal."""
@@ -239,7 +240,7 @@ class Criterion(Outcome):
         result = self.conforms
         if result == VERDICTS[1]:
             result = "too low" if self.value < self.lower else "too high"
-        return name, value, expanded, limits, result
+        return name, value, expanded, limits, Result(result, self.conforms)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -295,9 +296,10 @@ class Verdict(Outcome):
         """Return header and rows of text."""
         header, *_ = self.criteria[0].rows()
         rows = [criterion.rows()[1] for criterion in self.criteria]
+        result = Result(self.conforms, self.conforms)
         if not self.counts:
-            return [header, *rows, ("all criteria", "", "", "", self.conforms)]
-        all_of_them = ("all criteria", "", "", "", self._shown_interval(), "", self.conforms)
+            return [header, *rows, ("all criteria", "", "", "", result)]
+        all_of_them = ("all criteria", "", "", "", self._shown_interval(), "", result)
         return [header, *rows, all_of_them]
 
     def to_csv(self) -> str:

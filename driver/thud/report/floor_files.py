@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.bridge import version
 from thud.base.display import draw_all
-from thud.base.tables import csv_text
+from thud.base.tables import csv_text, marked
 from thud.base.workbooks import workbook
 from thud.floors.prediction_text import source_note
 from thud.level.rating import rated_bands
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
+    from thud.floors.prediction import RoomPrediction
     from thud.report.predicted_floor import PredictedFloor
 
 WORKBOOK = "predictions.xlsx"
@@ -36,7 +37,7 @@ def screen_text(floor: PredictedFloor) -> str:
     lines = [
         floor.name,
         f"  {title}: {', '.join(filter(None, (text, source_note(prediction))))}",
-        *([f"  {verdict}"] if (verdict := verdict_text(prediction)) else []),
+        *([f"  {_marked_verdict(prediction)}"] if prediction.requirement else []),
         f"  {CAVEAT.capitalize()}",
         *(f"    {title}: {text}" for title, _, _, text in others),
         f"    Octaves: {', '.join(f'{level:.1f} dB at {f:g} Hz' for f, level in octaves)}",
@@ -48,6 +49,11 @@ def screen_text(floor: PredictedFloor) -> str:
         fill(line, _WIDTH, subsequent_indent="    ") if len(line) > _WIDTH else line
         for line in lines
     )
+
+
+def _marked_verdict(prediction: RoomPrediction) -> str:
+    required = prediction.requirement
+    return marked(verdict_text(prediction), required.verdict) if required else ""
 
 
 def file_names(files: Iterable[str], *, report: bool = True) -> list[str]:

@@ -11,7 +11,7 @@ from thud.base.bridge import version
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
-from thud.base.tables import csv_text
+from thud.base.tables import csv_text, marked
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
 from thud.report import write
@@ -74,14 +74,13 @@ def _with_u(estimate: Estimate, unit: float, decimals: int) -> str:
 
 
 def verdict_text(recording: Recording) -> str:
-    """Return the verdict as a sentence, with a note on limits of the laboratory."""
+    """Return the verdict, marked, as a sentence with a note on limits of the laboratory."""
     assessment = recording.assess()
     name = assessment.source.replace("_", " ")
-    sentence = {
-        "conforms": f"The source conforms to the limits of the {name}",
-        "does not conform": f"The source does not conform to the limits of the {name}",
-        "undecided": f"The result is undecided by the limits of the {name}",
-    }[assessment.conforms]
+    subject = "The result is" if assessment.conforms == VERDICTS[2] else "The source"
+    relation = "by" if assessment.conforms == VERDICTS[2] else "to"
+    verdict = marked(assessment.conforms, assessment.conforms)
+    sentence = f"{subject} {verdict} {relation} the limits of the {name}"
     has_own_limits = any(
         not criterion["limits_of_standard"] for criterion in criteria_data(recording)
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.base.tables import Result
 from thud.level.assessment import criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.assumptions import AMPLITUDE_DECIBEL
@@ -82,7 +83,7 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
         risk_text(criterion["probability"]) if has_budget else "–",
         "–" if spread is None else width_text(spread / style.unit),
         criterion_style(criterion).text(criterion["background"], "–"),
-        criterion["verdict"],
+        Result(criterion["verdict"], criterion["verdict"]),
     )
 
 

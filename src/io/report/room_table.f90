@@ -8,7 +8,7 @@ module thud_room_table
    use thud_room, only: get_rating_index, room_level_type
    use thud_room_uncertainty, only: contribution_names, judge_requirement
    use thud_source_limits, only: verdict_names
-   use thud_text, only: fixed, newline, padded, replaced, significant, to_text
+   use thud_text, only: fixed, marked, newline, padded, replaced, significant, to_text
    implicit none (type, external)
    private
 
@@ -42,7 +42,7 @@ contains
          ! Without a decimal if it is whole.
          if (required > 0.0_wp) text = text//'; meets '//fixed(required, merge(0, 1, abs(required - nint(required)) &
             < tiny(required)))//' dB with '//fixed(100*prediction%probability, 0)//' %: ' &
-            //trim(verdict_names(judge_requirement(prediction)))
+            //marked(verdict_names(judge_requirement(prediction)), judge_requirement(prediction))
          if (required > 0.0_wp .and. .not. prediction%source_conforms) text = text//', the source does not conform'
       end associate
       text = text//newline//'  Standard uncertainties:'

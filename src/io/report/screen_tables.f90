@@ -15,7 +15,7 @@ module thud_screen_tables
    use thud_room_table, only: get_room_table
    use thud_source_limits, only: combine_verdicts, criterion_count, criterion_type, get_verdict, verdict_conforms, &
       verdict_names, verdict_undecided
-   use thud_text, only: fixed, flush_right, newline, padded, replaced, screen_width, significant, to_text
+   use thud_text, only: fixed, flush_right, get_width, marked, newline, padded, replaced, screen_width, significant, to_text
    implicit none (type, external)
    private
 
@@ -103,8 +103,12 @@ contains
          if (verbose) text = text//model_quantity_rows(history, '')
          text = text//error_rows(history, verdicts(:octave_count) == verdict_undecided)
          if (.not. history%numerical_error%known) text = text//row('numerical error', 'unknown', '')
-         verdict = 'the source '//trim(verdict_names(combine_verdicts(verdicts)))
-         if (combine_verdicts(verdicts) == verdict_undecided) verdict = 'it is undecided whether the source conforms'
+         verdict = marked(verdict_names(combine_verdicts(verdicts)), combine_verdicts(verdicts))
+         if (combine_verdicts(verdicts) == verdict_undecided) then
+            verdict = 'it is '//verdict//' whether the source conforms'
+         else
+            verdict = 'the source '//verdict
+         end if
          text = text//get_verification_rows(history)//newline//'  With these values '//verdict//' to the limits of the ' &
             //replaced(trim(case%source), '_', ' ')//': it meets ' &
             //to_text(count(verdicts == verdict_conforms))//' of '//to_text(size(criteria))//' criteria'
@@ -128,7 +132,7 @@ contains
                criterion, 1.0_wp)
             if (other == 0) return
             line = line(:len(line) - 1)
-            line = line//flush_right(fixed(assessment%level(band, other), 2)//' dB', screen_width - len(line))//newline
+            line = line//flush_right(fixed(assessment%level(band, other), 2)//' dB', screen_width - get_width(line))//newline
          end associate
       end function level_row
 
@@ -278,7 +282,7 @@ contains
          limits = flush_right(short(criterion%lower*scale), 7)
          ! A single number if both are equal.
          if (criterion%upper > criterion%lower) limits = limits//' to '//short(criterion%upper*scale)
-         text = text//padded(limits, 18)//get_verdict_word(criterion)
+         text = text//padded(limits, 18)//marked(get_verdict_word(criterion), get_verdict(criterion))
       end if
       text = trim(text)//newline
    end function row
