@@ -89,15 +89,15 @@ contains
 
    !> Text without bytes of the input that cannot be shown: control characters, the zero byte, which would end the message,
    !> and invalid UTF-8, which also arises when a shortened value ends within a character.
-   pure function shown(text)
+   pure function shown(text) result(plain)
       character(len=*), intent(in) :: text
-      character(len=len(text)) :: shown
+      character(len=len(text)) :: plain
       integer :: i, max_code
 
-      shown = text
+      plain = text
       max_code = merge(255, 126, is_utf8(text))
       do i = 1, len(text)
-         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > max_code) shown(i:i) = '?'
+         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > max_code) plain(i:i) = '?'
       end do
    end function shown
 

@@ -359,7 +359,8 @@ contains
       ! Without the quotes.
       call get_suggestion(value(2:len(value) - 1), self%choices(:self%n_choice), suggestion)
       call self%get_allowed(allowed, interval)
-      error = input_error('= '//shortened(value)//' is not allowed'//suggestion//'; allowed: '//allowed, self%group, self%key)
+      error = input_error('= '//shortened(value)//' is not allowed'//suggestion//'; allowed: '//allowed, self%group, &
+         self%key)
       if (.not. present(interval)) return
       error%value = self%get_number()
       error%low = interval%lower

@@ -369,14 +369,14 @@ contains
    end subroutine wrap_lines
 
    !> Text between marks without width, for which the screen shows a color or nothing.
-   pure function marked(text, kind)
+   pure function marked(text, kind) result(between)
       !> The text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
       !> Kind of the text, 1 to 3.
       integer, intent(in) :: kind
-      character(len=len_trim(text) + 2) :: marked
+      character(len=len_trim(text) + 2) :: between
 
-      marked = achar(kind)//trim(text)//end_mark
+      between = achar(kind)//trim(text)//end_mark
    end function marked
 
    !> Number of characters of a text.

@@ -106,7 +106,7 @@ contains
             validity_limit_type('drop', 'deflection over wall thickness', history%max_deflection/wall, highest=2.0_wp, &
             reason='a wall that is pressed further buckles inwards'), &
             get_wave_limit(ball, history, 0.25_wp), &
-            validity_limit_type('ball', 'stress of the wall by gauge pressure over Young''s modulus', &
+            validity_limit_type('ball', "stress of the wall by gauge pressure over Young's modulus", &
             ball%gauge_pressure*(radius - wall)/(2*wall*ball%youngs_modulus), highest=0.1_wp, &
             reason='the wall is free of stress before first touch')]
       end associate

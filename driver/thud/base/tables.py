@@ -42,6 +42,7 @@ class Result(str):
         The verdict, an entry of `thud.base._schema.VERDICTS`.
     """
 
+    __slots__ = ("verdict",)
     verdict: str
 
     def __new__(cls, text: str, verdict: str) -> Self:

@@ -54,15 +54,34 @@ _UNITS = {(key.owner, key.name): key.unit for key in KEYS}
 
 
 class Layer(NamedTuple):
-    """A layer of a floor; thickness, m, and mean density, kg/m3."""
+    """A layer of a floor.
+
+    Attributes
+    ----------
+    material : str
+        Its name.
+    thickness, density : float
+        Thickness, m, and mean density, kg/m3.
+    width, spacing : float
+        Width of members such as joists, and the distance between their axes, m; 0: none.
+    """
 
     material: str
     thickness: float
     density: float
+    width: float = 0.0
+    spacing: float = 0.0
 
     def __str__(self) -> str:
         """Return thickness and material."""
-        return f"{1e3 * self.thickness:g} mm {self.material}"
+        return f"{1e3 * self.thickness:g} mm {self.description}"
+
+    @property
+    def description(self) -> str:
+        """Material, and width and spacing of members."""
+        if not self.spacing:
+            return self.material
+        return f"{self.material}, {1e3 * self.width:g} mm wide, {self.spacing:g} m apart"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -420,10 +439,12 @@ def _read_layers(layers: object) -> tuple[Layer, ...]:
     if not isinstance(layers, list) or not layers:
         refuse_value("layers", layers, "a list of tables with material, thickness and density")
     for number, layer in enumerate(layers, 1):
-        if not isinstance(layer, Mapping) or set(layer) != set(Layer._fields):
-            refuse_value(f"layer {number}", layer, "a table of material, thickness and density")
+        known = set(layer) if isinstance(layer, Mapping) else set()
+        if not set(Layer._fields[:3]) <= known <= set(Layer._fields):
+            allowed = "a table of material, thickness and density, for members width and spacing"
+            refuse_value(f"layer {number}", layer, allowed)
         _require_text(f"layer {number}: material", layer["material"])
-        for key in ("thickness", "density"):
+        for key in sorted(known - {"material"}):
             require_number(f"layer {number}: {key}", layer[key])
             if layer[key] <= 0:
                 refuse_value(f"layer {number}: {key}", layer[key], "positive numbers")

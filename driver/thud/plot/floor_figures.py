@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -53,6 +52,8 @@ _PIECE, _BAR, _DRAWN = 0.8, 0.2, 1.2
 _LABEL_HEIGHT, _LINE, _LABEL = 0.23, 0.12, 30
 # Drawn time, as a multiple of the contact time.
 _SHOWN = 1.5
+# Maximum density of a layer that is air, kg/m3.
+_MAX_AIR = 2.0
 # Maximum number of mode shapes, and points along a side of the plate.
 MAX_SHAPES, POINTS = 30, 60
 # Frequencies per octave in plots of a mobility: peaks of lightly damped floors are narrow.
@@ -93,12 +94,12 @@ def draw_section(layers: Sequence[Layer], title: str = "") -> Figure:
     for layer, label, position in zip(layers, labels, positions, strict=True):
         color = COLORS[materials.index(layer.material) % len(COLORS)]
         thickness = layer.thickness * scale
-        members = _members(layer.material)
+        members = _members(layer)
         for left, right in members:
             axes.add_patch(
                 Rectangle(
                     (scale * left, top), scale * (right - left), thickness, linewidth=0.5,
-                    facecolor="white" if "cavity" in layer.material else to_rgba(color, 0.5),
+                    facecolor="white" if 0 < layer.density < _MAX_AIR else to_rgba(color, 0.5),
                     edgecolor="black",
                 )
             )  # fmt: skip
@@ -115,14 +116,13 @@ def draw_section(layers: Sequence[Layer], title: str = "") -> Figure:
     return figure
 
 
-def _members(material: str) -> list[tuple[float, float]]:
+def _members(layer: Layer) -> list[tuple[float, float]]:
     """Return the ends of the parts of a layer along the drawn piece, m."""
-    found = re.search(r"([\d.]+) mm wide, ([\d.]+) m apart", material)
-    if found is None:
+    if not layer.spacing:
         return [(0.0, _PIECE)]
-    width, spacing = float(found[1]) / 1e3, float(found[2])
-    axes = np.arange(_PIECE / 4 % spacing, _PIECE, spacing)
-    return [(max(x - width / 2, 0.0), min(x + width / 2, _PIECE)) for x in axes]
+    axes = np.arange(_PIECE / 4 % layer.spacing, _PIECE, layer.spacing)
+    half = layer.width / 2
+    return [(max(x - half, 0.0), min(x + half, _PIECE)) for x in axes]
 
 
 @own_style()

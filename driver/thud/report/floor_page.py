@@ -198,7 +198,7 @@ def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
 
 def page_texts(floor: PredictedFloor) -> str:
     """Return the texts of a page that users have stated, in any script."""
-    texts = [floor.name, *(layer.material for layer in floor.layers)]
+    texts = [floor.name, *(layer.description for layer in floor.layers)]
     texts += [text for row in [*floor.details, *floor.assumptions] for text in row]
     return "".join(texts + ([floor.construction.note] if floor.construction else []))
 

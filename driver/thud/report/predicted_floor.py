@@ -431,8 +431,8 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     floor, room = prediction.floor, prediction.room
     layers: list[Layer] = []
 
-    def add(material: str, thickness: float) -> None:
-        layers.append(Layer(material, round(thickness, 6), 0.0))
+    def add(material: str, thickness: float, *further: float) -> None:
+        layers.append(Layer(material, round(thickness, 6), *(further or (0.0,))))
 
     built = floor if isinstance(floor, RectangularFloor) else None
     if built and built.screed_thickness:
@@ -450,11 +450,12 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     else:
         assert isinstance(floor, JoistFloor)  # noqa: S101 - no other floor radiates
         add(f"sheathing, {floor.sheathing_density:g} kg/m³", floor.sheathing_thickness)
-        apart = f"{1e3 * floor.joist_width:g} mm wide, {floor.spacing:g} m apart"
-        add(f"joists, {apart}", floor.joist_height)
+        width, spacing = floor.joist_width, floor.spacing
+        mean_density = floor.joist_density * width / spacing
+        add("joists", floor.joist_height, mean_density, width, spacing)
         cavity -= floor.joist_height
     if cavity > 0:
-        add("cavity", cavity)
+        add("cavity", cavity, room.air_density)
     if below:
         add(f"subceiling, {below.subceiling_density:g} kg/m³", below.subceiling_thickness)
     if room.ceiling_mass:

@@ -107,13 +107,13 @@ contains
          ! A node of the lower half of the cavity has reached mid-height.
          if (any(pressed%body%mesh%z(:, 0) < -pressed%element_thickness .and. pressed%position(:, 0, 2) &
             >= (pressed%diameter - pressed%deflection)/2)) then
-            error = numerical_error('is too large: at '//significant(pressed%deflection, 3)//' m the walls of the cavity meet; ' &
-               //'allowed: less', 'compression', 'max_deflection')
+            error = numerical_error('is too large: at '//significant(pressed%deflection, 3)//' m the walls of the ' &
+               //'cavity meet; allowed: less', 'compression', 'max_deflection')
             return
          end if
          if (halvings > max_halvings) then
-            error = numerical_error('is too large: no state of rest was found beyond '//significant(pressed%deflection, 3)//' m; ' &
-               //'allowed: less, or more polar_elements', 'compression', 'max_deflection')
+            error = numerical_error('is too large: no state of rest was found beyond ' &
+               //significant(pressed%deflection, 3)//' m; allowed: less, or more polar_elements', 'compression', 'max_deflection')
             return
          end if
       end do
