@@ -268,7 +268,7 @@ def test_recording_is_assessed(client: TestClient) -> None:
     recording = thud.read_recording(path, height=1.0, mass=2.5, calibration=CALIBRATION)
     assert answer["levels"]["level"] == pytest.approx(recording.levels(), rel=1e-5)
     assert answer["criteria"][0]["uncertainty"] > 0
-    assert answer["criteria"][0]["uncertainty_name"] == "uncertainty (95 %)"
+    assert answer["criteria"][0]["uncertainty_kind"] == "measured"
     assert answer["result"] == RESULTS[recording.assess().conforms]
     assert answer["drops"] == 1
 

@@ -160,7 +160,7 @@ def test_missing_sample_rate_opens_its_field(browser: Browser, server: Served) -
     page = new_page(browser, server[0])
     open_door(page, "recording")
     drop_file(page, b"force, N\n" + b"1\n2\n3\n" * 99, "record.csv")
-    sync_api.expect(page.locator("#message")).to_contain_text("“Sample rate, Hz”")
+    sync_api.expect(page.locator("#message")).to_contain_text("sample rate")
     sync_api.expect(page.locator("#recording_sample_rate")).to_have_attribute(
         "aria-invalid", "true"
     )

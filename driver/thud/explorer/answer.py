@@ -181,7 +181,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
         "unit": unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
         "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
-        "uncertainty_name": criterion.uncertainty_name,
+        "uncertainty_kind": "numerical" if is_computed else "measured",
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
         "result": RESULTS[criterion.conforms],

@@ -47,15 +47,20 @@ export function numberOf(text) {
 
 /** Return what to enter in place of a text that states no number. */
 export function numberProblem(text, unit = "") {
-  const digits = text.trim();
-  if (AMBIGUOUS.test(digits)) return `“${digits}” may mean ${numberOf(`${digits}0`)} or ${digits.replace(",", "")}; enter one of them`;
+  const typed = text.trim();
+  if (AMBIGUOUS.test(typed)) return `“${typed}” may mean ${numberOf(`${typed}0`)} or ${typed.replace(",", "")}; enter one of them`;
   return `enter a number${unit ? `, in ${unit}` : ""}`;
 }
 
-/** Return the text of a number with its unit: levels with two decimals, others with four digits. */
-export function rounded(value, unit = "") {
+/** Return the text of a number in a unit, without it: levels with two decimals, others with four digits. */
+export function digits(value, unit = "") {
   if (value === null || value === undefined) return "not known";
-  return `${minus(unit === "dB" ? value.toFixed(2) : Number(value.toPrecision(4)))} ${unit}`.trim();
+  return minus(unit === "dB" ? value.toFixed(2) : Number(value.toPrecision(4)));
+}
+
+/** Return the text of a number with its unit. */
+export function rounded(value, unit = "") {
+  return value === null || value === undefined ? digits(value) : `${digits(value, unit)} ${unit}`.trim();
 }
 
 /** Return the text of a number with its sign: levels with `decimals` decimals, others with two digits. */

@@ -1,8 +1,9 @@
 // Display of answers: headline, plots, criteria, floor, room and warnings.
-import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
+import { byId, capitalize, digits, element, minus, rounded, signed, withSymbols } from "./page.js";
 import { interpolate, plot, swatch } from "./plot.js";
 
-const UNCERTAINTIES = { "numerical error": "numerical error of the computation", "uncertainty (95 %)": "measurement uncertainty (95 %)" };
+// Uncertainties by their codes: titles, and what stands below the criteria.
+const UNCERTAINTIES = { numerical: ["numerical error", "numerical error of the computation"], measured: ["uncertainty (95 %)", "measurement uncertainty (95 %)"] };
 // Verdicts on a source, and signs, by the code of the result.
 export const SOURCE_VERDICTS = { conforms: "conforms", does_not_conform: "does not conform", undecided: "undecided" };
 const SIGNS = { conforms: "✓", does_not_conform: "✕", undecided: "?", level: "" };
@@ -12,7 +13,7 @@ const MIN_UNCERTAINTY = 0.02;
 /** Return the headline of an answer as a text. */
 export const headlineText = ({ headline: { words, why, also } }) => `${words}${why}${also}`;
 
-const valueTextOf = (criterion) => criterion.value_text ?? rounded(criterion.value, criterion.unit).replace(criterion.unit && ` ${criterion.unit}`, "");
+const valueTextOf = (criterion) => criterion.value_text ?? digits(criterion.value, criterion.unit);
 const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${text ?? Number(uncertainty.toPrecision(2))}${mark ? ` ${mark}` : ""}`;
 
 /** Show the answer to the question; `variant` has a label and an answer. */
@@ -123,7 +124,7 @@ function marginOf(criterion) {
 
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
-  if (criterion.result === "undecided") return criterion.result;
+  if (criterion.result === "undecided") return SOURCE_VERDICTS.undecided;
   if (marginOf(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
@@ -132,7 +133,7 @@ function missedSide(criterion) {
 function showCriteria(variants) {
   const cell = (criterion) => {
     const value = element("td", { class: `value ${criterion.result}` }, valueTextOf(criterion));
-    if (criterion.uncertainty) value.append(" ", element("span", { title: criterion.uncertainty_name }, `± ${uncertaintyText(criterion)}`));
+    if (criterion.uncertainty) value.append(" ", element("span", { title: UNCERTAINTIES[criterion.uncertainty_kind][0] }, `± ${uncertaintyText(criterion)}`));
     return value;
   };
   const margin = (criterion) => {
@@ -151,8 +152,8 @@ function showCriteria(variants) {
     element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Criterion"), element("th", { scope: "col" }, "Limits"), ...heads)),
     element("tbody", {}, ...rows));
   byId("criteria_section").classList.toggle("half", Boolean(variants[0].answer.motion) && variants.length < 3);
-  const names = new Set(variants.flatMap(({ answer }) => answer.criteria).filter(({ uncertainty }) => uncertainty).map((criterion) => criterion.uncertainty_name));
-  const uncertainties = names.size ? `±: ${[...names].map((name) => UNCERTAINTIES[name]).join("; ")}. ` : "";
+  const names = new Set(variants.flatMap(({ answer }) => answer.criteria).filter(({ uncertainty }) => uncertainty).map((criterion) => criterion.uncertainty_kind));
+  const uncertainties = names.size ? `±: ${[...names].map((kind) => UNCERTAINTIES[kind][1]).join("; ")}. ` : "";
   byId("criteria_text").textContent = `${uncertainties}${variants[0].answer.criteria[0].standard ?? ""}`;
 }
 
