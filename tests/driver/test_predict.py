@@ -269,7 +269,10 @@ def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: li
             [0.06, 0.04, 0.02, 0.04, 0.02, 0.04]
         )
     rows = {meaning: (value, source) for meaning, value, source in floor.assumptions}
-    assert rows["mass per unit area of a suspended ceiling"] == ("9 kg/m²", "stated in the case")
+    assert rows["mass per unit area of a suspended ceiling; 0: none"] == (
+        "9 kg/m²",
+        "stated in the case",
+    )
     assert "width of the floor" in " ".join(rows)
     assert_clean(draw_levels(floor.prediction))
 

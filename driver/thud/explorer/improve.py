@@ -28,6 +28,7 @@ from thud.impact.ensemble import solve_many
 from thud.level.assessment import get_criteria
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
+from thud.studies.fitting.search import UNEXPLAINED, size_of_residuals, size_text
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
@@ -78,8 +79,6 @@ NOTE = (
     f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % "
     "of the range to those of other criteria, besides the numerical error."
 )
-# Words of a fit whose residuals exceed the uncertainty.
-UNEXPLAINED = "the model does not explain the data"
 # Significant digits of changed values.
 DIGITS = 3
 
@@ -394,13 +393,13 @@ def fit_recording(
 
 def _misfit_text(result: Fit) -> str:
     """Return the end of a sentence on a fit: the largest residual, if it is more than the noise."""
-    size = next((text for text in result.warnings if UNEXPLAINED in text), "")
-    if not size:
+    size = size_of_residuals(result)
+    if math.isnan(size):
         return "."
     columns = {name: np.asarray(values) for name, values in result.targets[0].columns().items()}
     residual = np.abs(columns["residual_N"])
     percent = 100 * residual.max() / columns["target_N"].max()
     return (
         f", but {UNEXPLAINED}: the largest residual is {residual.max():.0f} N, {percent:.2g} % of "
-        f"the peak, and {size.removesuffix(f': {UNEXPLAINED}')}."
+        f"the peak, and {size_text(size)}."
     )

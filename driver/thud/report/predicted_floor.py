@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from functools import cached_property
@@ -196,8 +195,7 @@ class PredictedFloor:
                 stated = getattr(construction.floor, key.name, value) if construction else value
                 if owner != "room" and value != stated:
                     source = "that of the case"
-                meaning = re.split("[;:(]|, 0", key.meaning)[0].strip()
-                yield humanize(key.name), meaning, _value_text(key, value), source
+                yield humanize(key.name), key.meaning, _value_text(key, value), source
 
     @cached_property
     def modes(self) -> list[tuple[str, float]]:

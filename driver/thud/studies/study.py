@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -42,7 +41,6 @@ COMMON_KEYS = ("name", "case", "fixed", "parameters")
 _MAX_LENGTH = 300
 # Quantiles of the parameters for trial cases.
 TRIAL_QUANTILES = (0.01, 0.5, 0.99)
-_NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 
 @dataclass(frozen=True)
@@ -125,8 +123,7 @@ def read_tables(
     try:
         yield {"name": path.stem, **content}, path.parent, text
     except InputError as error:
-        message = f"{path}: {error}"
-        raise InputError(message) from error
+        raise error.within(path) from error
 
 
 def named_files(value: object, folder: Path) -> Iterator[Path]:
@@ -252,16 +249,16 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
 def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     """Raise InputError if a fixed value is invalid for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
-    messages = []
+    errors = []
     for quantile in TRIAL_QUANTILES:
         try:
             check_case(impact_only(study.trial_case(quantile)))
         except InputError as error:
-            messages.append(str(error))
-    named = [_NAMED_KEY.match(message) for message in messages]
-    if len(named) == len(TRIAL_QUANTILES) and all(result and result[1] in keys for result in named):
-        message = f"[fixed]: {messages[0]}"
-        raise InputError(message)
+            errors.append(error)
+    named = [error.note.subject.rpartition(".")[2] for error in errors if error.note]
+    if len(named) == len(TRIAL_QUANTILES) and keys.issuperset(named):
+        error = errors[0].within("[fixed]")
+        raise error
 
 
 def with_density(case: Case, density: float) -> Case:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +50,8 @@ TOLERANCE = 1e-8
 AT_LIMIT = 1e-4
 # Minimum effect of an alternative, in standard deviations of a residual, that is tested.
 VISIBLE = 1e-3
+# What residuals that are larger than their uncertainty mean.
+UNEXPLAINED = "the model does not explain the data"
 # Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
 
@@ -316,7 +319,8 @@ def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[str], float]:
         rows = slice(first, first + misfit.size)
         first = rows.stop
         freedom = misfit.size - misfit.absorbed - len(fit.names) / len(fit.targets)
-        own = _size_warning(misfit, fit.residuals[rows], freedom)
+        size = size_of_residuals(fit, number - 1)
+        own = [] if math.isnan(size) else [f"{size_text(size)}: {UNEXPLAINED}"]
         own += misfit.warnings(target.impact, target.own, deviation, len(fit.names))
         if own:
             excess = misfit.excess(target.impact, target.own, unexplained[rows])
@@ -326,20 +330,27 @@ def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[str], float]:
     return result, ratio
 
 
-def _size_warning(misfit: Misfit, residuals: Array, freedom: float) -> list[str]:
-    """Return a warning if residuals are too large for the noise."""
+def size_text(size: float) -> str:
+    """Return `size_of_residuals` in words."""
+    return f"the residuals are {size:.3g} times as large as the uncertainty of the target"
+
+
+def size_of_residuals(fit: Fit, number: int = 0) -> float:
+    """Return how many times as large as its uncertainty the residuals of a target are.
+
+    NaN: they are not larger than noise is by chance, or the uncertainty is not known.
+    """
+    targets = fit.targets
+    misfit = targets[number].misfit
+    freedom = misfit.size - misfit.absorbed - len(fit.names) / len(targets)
+    first = sum(target.misfit.size for target in targets[:number])
+    residuals = fit.residuals[first : first + misfit.size]
     if not misfit.known_noise or freedom <= 0:
-        return []
+        return math.nan
     square = float(residuals @ residuals)
     tail = (
         stats.chi2.sf(square, freedom)
         if misfit.noise_freedom is None
         else stats.f.sf(square / freedom, freedom, misfit.noise_freedom)
     )
-    if tail > UNLIKELY:
-        return []
-    text = (
-        f"the residuals are {np.sqrt(square / freedom):.3g} times as large as the uncertainty "
-        "of the target: the model does not explain the data"
-    )
-    return [text]
+    return math.nan if tail > UNLIKELY else math.sqrt(square / freedom)
