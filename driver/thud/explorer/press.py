@@ -98,7 +98,7 @@ def fit_press(paths: Sequence[str], units: Mapping[str, str], values: Values) ->
         note,
         f"a curve determines the modulus only: radius {radius} and wall {wall} are as stated",
         "a press measures slowly: in an impact rubber is stiffer",
-        *(text.replace("youngs_modulus", "Young's modulus") for text in result.assumptions),
+        *result.assumptions,
     ]
     return {
         "values": values,

@@ -48,7 +48,7 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, object]) -> dict[
         entry["value_text"] = value_text(row)
         entry["uncertainty_text"] = expanded_text(row)
         entry["mark"] = INCOMPLETE if row["excluded"] else ""
-    excluded = excluded_text(rows).replace(f"{INCOMPLETE} U", f"{INCOMPLETE} The uncertainty")
+    excluded = excluded_text(rows, "The uncertainty")
     shown = {
         criterion.name: " ".join(filter(None, (
             entry["value_text"], "±", entry["uncertainty_text"], entry["mark"], entry["unit"]

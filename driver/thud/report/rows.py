@@ -112,8 +112,11 @@ def criterion_rows(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
     return [HEAD, *map(criterion_row, criteria)]
 
 
-def excluded_text(criteria: Sequence[dict[str, Any]]) -> str:
-    """Return what the marked uncertainties lack, as a sentence; empty if none is marked."""
+def excluded_text(criteria: Sequence[dict[str, Any]], name: str = "U") -> str:
+    """Return what the marked uncertainties lack, as a sentence; empty if none is marked.
+
+    `name` is what the sentence calls the uncertainty.
+    """
     names = list(dict.fromkeys(name for criterion in criteria for name in criterion["excluded"]))
     lacking = [name for name in names if name != SCATTER]
     parts = [f"{', '.join(lacking)} (uncertainty not stated: undecided)"] if lacking else []
@@ -124,7 +127,7 @@ def excluded_text(criteria: Sequence[dict[str, Any]]) -> str:
     allowed = (
         f" Stated standard uncertainties that decide: {'; '.join(decided)}." if decided else ""
     )
-    return f"{INCOMPLETE} U excludes {'; '.join(parts)}.{allowed}"
+    return f"{INCOMPLETE} {name} excludes {'; '.join(parts)}.{allowed}"
 
 
 def _allowance_text(criterion: dict[str, Any]) -> str:
