@@ -1,4 +1,4 @@
-from . import plot as plot
+from . import plot as plot, recordings as recordings
 from .base.errors import (
     FitWarning as FitWarning,
     InputError as InputError,

@@ -21,6 +21,7 @@ import scipy.signal
 
 import thud
 from thud.level.levels import low_pass, peak_count
+from thud.recordings.signal import Signal
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from synthetic import band_limited, make_recording
@@ -71,7 +72,7 @@ def told(force: np.ndarray, rate: float, rng: np.random.Generator) -> list[str]:
         before=float(np.exp(rng.uniform(np.log(0.005), 0))),
         after=float(np.exp(rng.uniform(np.log(0.005), 0))), seed=int(rng.integers(2**31)),
     )  # fmt: skip
-    found = thud.Recording.from_array(record, rate, height=1.0, mass=2.5)
+    found = thud.read_recording(Signal.from_array(record, rate), height=1.0, mass=2.5)
     return [note for note in found.drops[0].notes if note.code.startswith("plate_rings")]
 
 

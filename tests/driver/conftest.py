@@ -20,6 +20,8 @@ from hypothesis import settings
 
 import thud
 from thud import cli
+from thud.recordings.config import Config
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -56,7 +58,7 @@ def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
     quiet = int(0.1 * impact.sample_rate)
     force = np.pad(impact.floor_force, quiet)
     force += np.random.default_rng(1).normal(scale=0.5, size=len(force))
-    return thud.Recording.from_array(force, impact.sample_rate, **known)
+    return thud.read_recording(Signal.from_array(force, impact.sample_rate), config=Config(**known))
 
 
 def load_script(path: str) -> ModuleType:

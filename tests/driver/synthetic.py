@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from thud.level.estimate import Estimate
 from thud.recordings.contact import Contact, uniform_bounds
+from thud.recordings.drops import Section, cut_section, find_drops
 from thud.recordings.measured_drop import Drop
-from thud.recordings.noise import Background, Noise
+from thud.recordings.noise import Background
+
+if TYPE_CHECKING:
+    from thud.recordings.signal import Signal
 
 # Exponents of the power spectra of noise.
 COLOURS = {"white": 0, "pink": 1, "brown": 2}
@@ -141,29 +148,34 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     # The offset of white noise, from all the quiet.
     n_cell = len(uniform_bounds(*gate, rate)) - 1
     offset = np.full((n_cell, n_cell), draws[0, 0] / 2 * rate / quiet.sum())
-    touch, release = Estimate(0, 0), Estimate(0.02, 0)
+    touch, release = Estimate(before, 0), Estimate(before + 0.02, 0)
     force = half_sine(rate, before, len(time)) + noise
     return Drop(
         name=f"drop {seed + 1}",
-        begin=float(time[0]),
-        force=force,
-        sample_rate=rate,
         onset=before,
-        gate=gate,
-        contact_time=release,
-        restitution=Estimate.unknown(),
-        shared_effects={},
-        restitution_method="",
-        restitutions={},
-        peak_force=Estimate(1500, 0),
-        impulse=Estimate.unknown(),
-        effective_mass=Estimate.unknown(),
-        noise=Noise(deviation, "before and after", float(draws[0, 0])),
-        bounces=(),
-        notes=(),
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force,
             (np.zeros(1), np.zeros(1)), gate, offset, (before, after),
             Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
         ),
+        contact_time=Estimate(0.02, 0),
+        restitution=Estimate.unknown(),
+        peak_force=Estimate(1500, 0),
+        impulse=Estimate.unknown(),
+        effective_mass=Estimate.unknown(),
     )  # fmt: skip
+
+
+def cut_drops(signal: Signal) -> list[Section]:
+    """Return the sections of the drops in a signal."""
+    return [cut_section(signal, pulse) for pulse in find_drops(signal).drops]
+
+
+def with_force(drop: Drop, force: np.ndarray, white: float | None = None) -> Drop:
+    """Return a drop with another force, N, and another density of white noise, N2/Hz."""
+    contact = replace(drop.contact, force=force)
+    if white is not None:
+        draws = contact.background.draws.copy()
+        draws[:, 0] = white
+        contact = replace(contact, background=replace(contact.background, draws=draws))
+    return replace(drop, contact=contact)

@@ -172,7 +172,9 @@ def test_heights_of_recordings_are_those_of_the_drop_within_their_limits(
 
 def test_recording_stands_beside_its_model(shell: thud.Impact, tmp_path: Path) -> None:
     write_recording(tmp_path / "plate.csv", shell)
-    recording = thud.read_recording(tmp_path / "plate.csv", calibration_uncertainty=0.001)
+    recording = thud.read_recording(
+        tmp_path / "plate.csv", config=Config(calibration_uncertainty=0.001)
+    )
     assert recording.sample_rate == pytest.approx(44100)
     assert recording.contact_time == pytest.approx(shell.contact_time, abs=0.3e-3)
     assert recording.peak_force == pytest.approx(shell.peak_force, abs=3)

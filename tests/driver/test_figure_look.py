@@ -28,6 +28,7 @@ import thud
 from thud import cli, plot, report
 from thud.plot import documentation
 from thud.plot.style import COLORS, WIDTH, line_style, marker_style
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -183,11 +184,11 @@ def test_recording_is_drawn_from_first_touch_to_last_release(shell: thud.Impact)
         force[start : start + len(contact)] += part * contact
     once = force.copy()
     once[20000:] = 0
-    low, high = limits(thud.Recording.from_array(once, 44100))
+    low, high = limits(thud.read_recording(Signal.from_array(once, 44100)))
     assert -1.5 < low < 0
     assert 20 < high < 22
     # A bounce is a contact of its own.
-    low, high = limits(thud.Recording.from_array(force, 44100))
+    low, high = limits(thud.read_recording(Signal.from_array(force, 44100)))
     assert -1.5 < low < 0
     assert 20 < high < 22
 

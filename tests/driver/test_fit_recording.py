@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, SHELL, naming
-from synthetic import make_recording
+from synthetic import cut_drops, make_recording, with_force
 
 import thud
-from thud.recordings.read_recording import read_recording
+from thud.recordings.config import Config
+from thud.recordings.read_recording import measure_stages, read_recording
 from thud.recordings.recording import Recording
 from thud.recordings.signal import Signal
 from thud.studies.fit import KIND
@@ -117,7 +118,7 @@ def test_noise_above_the_band_does_not_count(record: tuple[Recording, float]) ->
     random = np.random.default_rng(5)
     # Differences of white noise have little of it at low frequencies.
     blue = np.diff(random.normal(scale=5.0, size=len(drop.force) + 1))
-    target = ForceTarget(replace(record[0], drops=(replace(drop, force=drop.force + blue),)))
+    target = ForceTarget(replace(record[0], drops=(with_force(drop, drop.force + blue),)))
     frequency = np.linspace(0, target.below, 1000)
     density = (2 * np.sin(np.pi * frequency / drop.sample_rate)) ** 2
     expected = np.hypot(record[1], 5.0 * np.sqrt(density.mean()))
@@ -130,7 +131,7 @@ def test_slow_noise_of_fast_records_has_weights(shell: thud.Impact) -> None:
     force, _ = make_recording(
         pulse(shell), shell.sample_rate, rate=96e3, noise_db=NOISE_DB, colour="brown", seed=1
     )
-    record = thud.Recording.from_array(force, 96e3)
+    record = thud.read_recording(Signal.from_array(force, 96e3))
     target = ForceTarget(record, below=355.0)
     found = thud.fit(target, ["youngs_modulus"], case=SHELL)
     modulus, error = found.values["youngs_modulus"], found.standard_errors["youngs_modulus"]
@@ -146,14 +147,9 @@ def test_too_little_quiet_leaves_the_noise_to_the_residuals(shell: thud.Impact) 
 
 def _measured(force: np.ndarray, rate: float) -> Recording:
     """Return the recording of a force in memory."""
-    from thud.recordings.drops import search_drops
-    from thud.recordings.measured_drop import measure_drop
-    from thud.recordings.restitution import DropConditions
-
-    windows = search_drops(Signal.from_array(force, rate)).windows
-    return Recording(
-        "memory", tuple(measure_drop(window, DropConditions()) for window in windows), ()
-    )
+    sections = cut_drops(Signal.from_array(force, rate))
+    drops = tuple(measure_stages(section, Config()).drop for section in sections)
+    return Recording("memory", drops, ())
 
 
 @pytest.fixture

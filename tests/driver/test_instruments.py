@@ -16,7 +16,7 @@ from thud.recordings.assumptions import PulseSpectra, instrument_contributions
 from thud.recordings.config import Config
 from thud.recordings.plate import Plate
 from thud.recordings.recorder_filter import RecorderFilter, assumed_filter
-from thud.recordings.response import Chain, Response
+from thud.recordings.response import Chain
 from thud.recordings.signal import Signal
 
 RATE = 48_000.0
@@ -33,7 +33,7 @@ STATED: dict[str, Any] = {
 FLAT = {"plate": Plate(flat_limit=1e5), "filter": RecorderFilter("none")}
 
 
-def felt(response: Response) -> np.ndarray:
+def felt(response: Plate | RecorderFilter) -> np.ndarray:
     """Return the pulse after an instrument, by its response to the pulse's spectrum."""
     length = 2**17
     frequency = np.fft.rfftfreq(length, 1 / RATE)
@@ -44,8 +44,8 @@ def felt(response: Response) -> np.ndarray:
 def measured(force: np.ndarray, noise: float = 0.5, **config: Any) -> thud.Recording:  # noqa: ANN401
     """Return the recording of a force with white noise, N."""
     noisy = force + np.random.default_rng(1).normal(scale=noise, size=len(force))
-    return thud.Recording.from_signals(
-        [Signal.from_array(noisy, RATE, "pulse")], Config(**STATED, **config)
+    return thud.read_recording(
+        [Signal.from_array(noisy, RATE, "pulse")], config=Config(**STATED, **config)
     )
 
 
@@ -77,7 +77,9 @@ def names(recording: thud.Recording) -> list[str]:
         ),
     ],
 )
-def test_stated_instrument_is_undone(instrument: Response, stated: dict[str, Any]) -> None:
+def test_stated_instrument_is_undone(
+    instrument: Plate | RecorderFilter, stated: dict[str, Any]
+) -> None:
     truth = measured(PULSE, 1e-3, **FLAT).levels()
     force = felt(instrument)
     assert abs(measured(force, 1e-3, **FLAT).levels() - truth)[-1] > 0.2
@@ -162,7 +164,7 @@ def test_stated_plate_that_is_not_in_the_record_is_told() -> None:
 def test_unstated_filter_is_assumed_by_the_rate() -> None:
     slow = Signal.from_array(PULSE[::19], RATE / 19, "slow")
     config = Config(**STATED, plate=Plate(flat_limit=1e5))
-    recording = thud.Recording.from_signals([slow], config)
+    recording = thud.read_recording([slow], config=config)
     assert "filter_assumed" in codes(recording.notes)
     effect = PulseSpectra(recording.drops).level_change(
         lambda f: np.abs(assumed_filter(RATE / 19).response(f))

@@ -90,7 +90,9 @@ def test_noise_and_offset_leave_the_contact_time(flagship: thud.Impact) -> None:
     for quiet, noise, offset in ((0.01, 5.0, 0.0), (0.1, 5.0, 0.0), (0.1, 0.5, 12.0)):
         force = np.pad(flagship.floor_force, int(quiet * flagship.sample_rate)) + offset
         force += random.normal(scale=noise, size=len(force))
-        found = thud.Recording.from_array(force, flagship.sample_rate, height=1.0, mass=2.5)
+        found = thud.read_recording(
+            Signal.from_array(force, flagship.sample_rate), height=1.0, mass=2.5
+        )
         assert found.contact_time == pytest.approx(flagship.contact_time_as_recorded, abs=1e-4)
         assert found.restitution == pytest.approx(flagship.restitution, abs=0.01)
         np.testing.assert_allclose(found.levels(), flagship.levels(), atol=0.3)
@@ -113,7 +115,9 @@ def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -
     known = {"height": 1.0, "mass": 2.5, "height_uncertainty": 0.002, "mass_uncertainty": 0.01}
 
     def criteria(**stated: float) -> dict[str, Criterion]:
-        recording = thud.Recording.from_array(force, 24_000, **{**known, **stated})
+        recording = thud.read_recording(
+            Signal.from_array(force, 24_000), config=Config(**{**known, **stated})
+        )
         return {entry.name: entry for entry in recording.assess().criteria}
 
     lowest = criteria()["octave_31_5"]
@@ -195,7 +199,7 @@ def test_recording_has_the_name_of_its_first_signal() -> None:
         Signal.from_array(half_sine(24e3, 0.1, 5280, duration=duration), 24e3, name)
         for name, duration in (("a.b", 0.02), ("c", 0.021))
     ]
-    assert thud.Recording.from_signals(signals, Config()).name == "a"
+    assert thud.read_recording(signals, config=Config()).name == "a"
 
 
 def test_limits_given_from_python_are_those_of_the_verdict() -> None:
@@ -273,7 +277,7 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             force, _ = make_recording(
                 pulse, impact.sample_rate, rate=rate, noise_db=level, seed=seed
             )
-            found = thud.Recording.from_array(force, rate).estimates["contact_time"]
+            found = thud.read_recording(Signal.from_array(force, rate)).estimates["contact_time"]
             assert abs(found.value - truth) <= found.expanded
 
 
@@ -297,14 +301,14 @@ def test_uncertainty_of_the_calibration_is_counted_where_it_is_known() -> None:
     for known in (
         thud.read_recording(file, config=config, calibration="5000 N/FS"),
         thud.read_recording(table, config=replace(config, calibration=None)),
-        thud.read_recording(table, calibration_uncertainty=0.005),
-        thud.read_recording(table, unit="V", config=number),
+        thud.read_recording(table, config=Config(calibration_uncertainty=0.005)),
+        thud.read_recording(table, config=number.updated(unit="V")),
     ):
         assert known.calibration_uncertainty == 0.005
         assert not any("calibration" in warning for warning in known.warnings)
         assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
     with pytest.raises(thud.InputError, match=naming("calibration_uncertainty", -1)):
-        thud.read_recording(table, calibration_uncertainty=-1)
+        thud.read_recording(table, config=Config(calibration_uncertainty=-1))
 
 
 def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> None:
@@ -323,7 +327,7 @@ def test_peaks_of_noise_are_not_exact() -> None:
     double = pulse * (1 - 0.35 * np.exp(-(((time - 0.01) / 0.002) ** 2)))
     for force, noise_db, expected in ((pulse, 60, 1), (double, 60, 2), (double, 20, np.nan)):
         record, _ = make_recording(force, 48_000, noise_db=noise_db, seed=1)
-        found = thud.Recording.from_array(record, 48_000)
+        found = thud.read_recording(Signal.from_array(record, 48_000))
         np.testing.assert_equal(found.estimates["peaks"].value, expected)
         peaks = next(d for d in found.assess().criteria if d.name == "peak_count")
         known = "conforms" if expected == 1 else "does not conform"
@@ -335,7 +339,7 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
     file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
     config = replace(config, mass_uncertainty=None, height_uncertainty=None)
     for share in (0.0, 0.005, 0.5):
-        recording = thud.read_recording(file, config=config, calibration_uncertainty=share)
+        recording = thud.read_recording(file, config=config.updated(calibration_uncertainty=share))
         for drop in recording.drops:
             by, other = drop.restitutions["impulse"], drop.restitutions["bounces"]
             speed = np.sqrt(2 * 9.81 * 1.0)
@@ -407,7 +411,9 @@ def test_outliers_of_all_quantities_are_marked() -> None:
     longer = 1500 * np.sin(np.pi * np.arange(0, 0.021, 1 / 24_000) / 0.021)
     pieces = [make_recording(pulse, 24_000, noise_db=60, seed=i)[0] for i in range(6)]
     pieces.insert(3, make_recording(longer, 24_000, noise_db=60, seed=9)[0])
-    found = thud.Recording.from_array(np.concatenate(pieces), 24_000, height=1.0, mass=2.5)
+    found = thud.read_recording(
+        Signal.from_array(np.concatenate(pieces), 24_000), height=1.0, mass=2.5
+    )
     marked = {str(outlier.others["quantity"]).split(",")[0] for outlier in found.outliers}
     assert {"contact time", "restitution"} <= marked
     assert {outlier.subject for outlier in found.outliers} == {"recording, drop 4"}

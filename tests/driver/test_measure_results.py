@@ -21,6 +21,7 @@ from thud.base.errors import ReportWarning
 from thud.base.files import Results
 from thud.base.note import Note
 from thud.recordings.config import Instrument
+from thud.recordings.signal import Signal
 from thud.report import recording_files
 from thud.report.rows import HEAD
 from thud.report.write import PDF
@@ -41,7 +42,9 @@ def noisy() -> thud.Recording:
     impact = thud.solve(model="hollow_sphere")
     force = np.pad(impact.floor_force, int(0.1 * impact.sample_rate))
     force += np.random.default_rng(1).normal(scale=100, size=len(force))
-    recording = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)
+    recording = thud.read_recording(
+        Signal.from_array(force, impact.sample_rate), height=1.0, mass=2.5
+    )
     assert recording.average().flag[-1] == "background"
     return replace(recording, calibration_uncertainty=0.01)
 

@@ -23,6 +23,7 @@ from thud.cli import main
 from thud.floors.prediction import _force_change
 from thud.impact.compute import new_room_level
 from thud.level.assessment import octave_limits
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -142,7 +143,9 @@ def test_room_hears_the_mean_of_the_drops_without_noise(shell: thud.Impact) -> N
     drops = [np.concatenate([quiet, gain * shell.floor_force, quiet]) for gain in (0.9, 1.1)]
     force = np.concatenate(drops)
     force += np.random.default_rng(1).normal(scale=15.0, size=len(force))
-    recording = thud.Recording.from_array(force, shell.sample_rate, mass=2.5, height=1.0)
+    recording = thud.read_recording(
+        Signal.from_array(force, shell.sample_rate), mass=2.5, height=1.0
+    )
     mean = thud.force_exposure_levels(recording.mean_force(), shell.sample_rate, "third")
     assert mean == pytest.approx(recording.levels("third"), abs=0.01)
     plate, room = thud.Plate(), thud.Room(length=5.0, width=4.0)

@@ -21,7 +21,8 @@ from thud.base.errors import InputError
 from thud.level.estimate import Budget, Estimate
 from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config
-from thud.recordings.load_cells import add_signals, require_channels
+from thud.recordings.config_values import require_channels
+from thud.recordings.load_cells import add_signals
 from thud.recordings.recorded_levels import average_levels, measure_levels
 from thud.recordings.signal import Signal
 
@@ -78,9 +79,9 @@ def test_load_cells_are_added(channels: Any, tmp_path: Path) -> None:  # noqa: A
     (signal,) = opened(path, channels=channels)
     np.testing.assert_allclose(signal.read(0, signal.n_sample), sum(cells()), atol=1e-3)
     assert (signal.notes[-1].code, signal.notes[-1].value) == ("cells_added", 4)
-    found = thud.read_recording(path, channels=channels)
+    found = thud.read_recording(path, config=Config(channels=channels))
     (whole,) = opened(write_table(tmp_path / "sum.csv", [sum(cells())], ["F"]))
-    expected = thud.Recording.from_signals([whole], Config())
+    expected = thud.read_recording([whole], config=Config())
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=1e-3)
 
 
@@ -116,7 +117,9 @@ def test_configuration_and_keywords_select_channels(tmp_path: Path) -> None:
     total = thud.read_recording(path, config=lab)
     peak = total.peak_force
     assert peak == pytest.approx(1500, rel=0.01)
-    one = thud.read_recording(path, config=lab, channel="F4", calibration="1 N/V")
+    one = thud.read_recording(
+        path, calibration="1 N/V", config=read_config(lab).updated(channel="F4")
+    )
     assert one.peak_force == pytest.approx(SHARES[3] * peak, rel=0.01)
     with pytest.raises(InputError, match=naming("both channel and channels")):
         opened(path, channel=1, channels="sum")
@@ -169,7 +172,7 @@ def test_channels_to_be_added_must_be_forces(tmp_path: Path) -> None:
         opened(path, channels="sum")
     path = write_table(tmp_path / "total.csv", [*cells(), sum(cells())], [*NAMES, "Fz"])
     with pytest.raises(InputError, match=naming("Fz", "is the sum of the other channels")):
-        thud.read_recording(path, channels="sum")
+        thud.read_recording(path, config=Config(channels="sum"))
 
 
 def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
@@ -194,19 +197,19 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     first, *others = cells()
     path = write_table(tmp_path / "clipped.csv", [np.minimum(first, 200), *others], NAMES)
     with pytest.raises(InputError, match=naming("F1", "clipped at 200 N")):
-        thud.read_recording(path, channels="sum")
+        thud.read_recording(path, config=Config(channels="sum"))
     path = write_table(tmp_path / "dead.csv", [np.zeros(len(first)), *others], NAMES)
     with pytest.raises(InputError, match=naming("F1", "all samples are 0")):
-        thud.read_recording(path, channels="sum")
+        thud.read_recording(path, config=Config(channels="sum"))
     path = write_table(tmp_path / "inverted.csv", [-first, *others], NAMES)
     assert warned(opened(path, channels="sum")) == [("cell_sign", "inverted.csv, F1")]
     lost = first.copy()
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
     path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)
-    found = thud.read_recording(path, channels="sum")
+    found = thud.read_recording(path, config=Config(channels="sum"))
     lost = noted(found.notes, "dropouts")
     assert (lost.others["cell"], lost.value) == ("dropout.csv, F1", pytest.approx(0.5))
-    expected = thud.read_recording(write_table(path, cells(), NAMES), channels="sum")
+    expected = thud.read_recording(write_table(path, cells(), NAMES), config=Config(channels="sum"))
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=0.02)
 
 
@@ -222,7 +225,7 @@ def loads(**changed: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 
 def cell_notes(path: Path) -> list[Note]:
     """Return the notes on a load cell of the first drop."""
-    found = thud.read_recording(path, channels="sum")
+    found = thud.read_recording(path, config=Config(channels="sum"))
     return [note for note in found.drops[0].notes if "cell" in note.others]
 
 
@@ -322,7 +325,7 @@ def test_a_file_is_given_once(tmp_path: Path) -> None:
         thud.read_recording([path, path], calibration=2000)
     signal = Signal.from_array(record(0), RATE, "array")
     with pytest.raises(InputError, match=naming("array: is given twice")):
-        thud.Recording.from_signals([signal, signal], Config())
+        thud.read_recording([signal, signal], config=Config())
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])

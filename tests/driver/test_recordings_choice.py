@@ -11,7 +11,7 @@ from conftest import codes, naming, noted
 import thud
 from thud.recordings.config import Config
 from thud.recordings.config_values import parse_numbers
-from thud.recordings.drops import Search, search_drops
+from thud.recordings.drops import Search, find_drops
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def disturbed(kind: str) -> Search:
             force += half_sine(time, begin, 60 if begin < 2 else 150, 0.006)
     elif kind == "tap between bounces":
         force += half_sine(time, 5.3, 120, 0.008)
-    return search_drops(Signal.from_array(force, RATE, "record"))
+    return find_drops(Signal.from_array(force, RATE, "record"))
 
 
 @pytest.mark.parametrize(
@@ -69,11 +69,11 @@ def disturbed(kind: str) -> Search:
 )
 def test_only_drops_are_drops(kind: str) -> None:
     search = disturbed(kind)
-    assert [len(window.bounces) for window in search.windows] == [2, 2, 2]
-    for window, begin in zip(search.windows, (5.0, 8.5, 12.0), strict=True):
-        touch = (window.start + window.contact[0]) / RATE
+    assert [len(drop.bounces) for drop in search.drops] == [2, 2, 2]
+    for drop, begin in zip(search.drops, (5.0, 8.5, 12.0), strict=True):
+        touch = drop.contact[0] / RATE
         assert touch == pytest.approx(begin, abs=0.004)
-        landing = (window.bounces[0].start + window.bounces[0].contact[0]) / RATE
+        landing = drop.bounces[0].contact[0] / RATE
         assert landing == pytest.approx(begin + 0.72, abs=0.004)
     if kind in {"taps", "tap between bounces"}:
         assert {*codes(search.ignored)} == {"pulse_ignored"}
@@ -83,7 +83,7 @@ def test_only_drops_are_drops(kind: str) -> None:
 def measured(**choice: Any) -> thud.Recording:  # noqa: ANN401
     """Return the recording of the three drops with a choice."""
     _, force = three_drops()
-    return thud.Recording.from_signals([Signal.from_array(force, RATE, "r")], Config(**choice))
+    return thud.read_recording([Signal.from_array(force, RATE, "r")], config=Config(**choice))
 
 
 def test_drops_are_chosen_by_number_and_time() -> None:
@@ -118,9 +118,9 @@ def test_small_drop_keeps_its_number_and_is_left_out_unless_it_is_chosen() -> No
         ({"end": 4.0}, [3.0]),
         ({"begin": 13.0, "end": 15.0}, [14.0]),
     ):
-        recording = thud.Recording.from_signals([signal], Config(**choice))  # type: ignore[arg-type]
+        recording = thud.read_recording([signal], config=Config(**choice))  # type: ignore[arg-type]
         assert [round(drop.onset, 1) for drop in recording.drops] == onsets
-    notes = thud.Recording.from_signals([signal], Config()).notes
+    notes = thud.read_recording([signal], config=Config()).notes
     small = [note for note in notes if note.code == "drop_too_small"]
     assert [note.value for note in small] == [1, 5]
     assert [note.others["time"] for note in small] == pytest.approx([3.0, 14.0], abs=0.005)
@@ -139,15 +139,17 @@ def test_bounce_is_no_drop_of_a_section_that_begins_before_it() -> None:
 def test_spike_of_one_sample_hides_no_drop(instant: float) -> None:
     _, force = three_drops()
     force[int(instant * RATE)] += 1e6
-    windows = search_drops(Signal.from_array(force, RATE, "record")).windows
-    assert [len(window.bounces) for window in windows] == [2, 2, 2]
+    found = find_drops(Signal.from_array(force, RATE, "record")).drops
+    assert [len(drop.bounces) for drop in found] == [2, 2, 2]
 
 
 def test_drops_left_out_by_an_argument_join_those_of_the_configuration(tmp_path: Path) -> None:
     _, force = three_drops()
     np.savetxt(tmp_path / "drops.csv", force, header="Force (N)", comments="")
     config = Config(sample_rate=RATE, leave_out={"3": "touched"})
-    recording = thud.read_recording(tmp_path / "drops.csv", config=config, leave_out={"1": "noise"})
+    recording = thud.read_recording(
+        tmp_path / "drops.csv", config=config.updated(leave_out={"1": "noise"})
+    )
     assert [round(drop.onset, 1) for drop in recording.drops] == [8.5]
 
 
@@ -156,7 +158,7 @@ def test_impossible_restitution_is_a_warning() -> None:
         _, force = three_drops(bounces=0)
         signal = Signal.from_array(scale * force, RATE, "r")
         # The impulse is 19.1 N s: with 2.5 kg and 1 m the restitution is 0.68.
-        recording = thud.Recording.from_signals([signal], Config(mass=2.5, height=1.0))
+        recording = thud.read_recording([signal], config=Config(mass=2.5, height=1.0))
         found = any("impossible" in warning for warning in recording.warnings)
         assert found == is_impossible
 

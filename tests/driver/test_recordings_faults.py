@@ -14,6 +14,8 @@ from scipy.ndimage import median_filter
 
 import thud
 from thud.base.errors import InputError
+from thud.recordings.config import Config
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,7 +52,7 @@ def drop_force(  # noqa: PLR0913 - each is one property of the force
 
 
 def measured(force: np.ndarray, rate: float) -> thud.Recording:
-    return thud.Recording.from_array(force, rate)
+    return thud.read_recording(Signal.from_array(force, rate))
 
 
 @pytest.mark.parametrize("rate", [8e3, 51.2e3])
@@ -193,7 +195,7 @@ def test_inverted_load_cell_does_not_make_another_one_the_sum(tmp_path: Path) ->
     rows = np.column_stack([np.arange(len(shape)) / 25.6e3, *cells])
     header = "time_s,F1_N,F2_N,F3_N,F4_N"
     np.savetxt(tmp_path / "cells.csv", rows, "%.9g", ",", header=header, comments="")
-    found = thud.read_recording(tmp_path / "cells.csv", channels="sum")
+    found = thud.read_recording(tmp_path / "cells.csv", config=Config(channels="sum"))
     (warning,) = [text for text in found.warnings if "load cell" in text]
     assert "F4" in warning
     assert "sign" in warning

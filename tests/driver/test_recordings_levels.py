@@ -14,7 +14,7 @@ from scipy import stats
 from scipy.optimize import brentq
 from scipy.signal import lsim, lti
 from scipy.stats import binom, norm, t as student
-from synthetic import make_drop
+from synthetic import make_drop, with_force
 
 import thud
 from thud.level.assessment import assess_levels
@@ -149,7 +149,7 @@ def test_many_drops_at_once_are_those_one_by_one() -> None:
     drops = [make_drop(2.0, rate, seed=i) for i, rate in enumerate((25600.0, 8000.0, 25600.0))]
     longer = (drops[0].gate[0] - 9, drops[0].gate[1])
     contact = replace(drops[0].contact, gate=longer)
-    drops[0] = replace(drops[0], gate=longer, contact=contact)
+    drops[0] = replace(drops[0], contact=contact)
     together = measure_levels(drops, "third")
     for drop, found in zip(drops, together, strict=True):
         (alone,) = measure_levels([drop], "third")
@@ -264,7 +264,7 @@ def test_average_is_that_of_energies() -> None:
     drops = [make_drop(2.0, seed=i) for i in range(5)]
     scales = [1.0, 1.01, 0.99, 1.02, 0.98]
     pairs = zip(scales, drops, strict=True)
-    found = measure_levels([replace(drop, force=scale * drop.force) for scale, drop in pairs])
+    found = measure_levels([with_force(drop, scale * drop.force) for scale, drop in pairs])
     average = average_levels(found)
     energies = np.array([10 ** (f.level / 10) for f in found])
     np.testing.assert_allclose(average.level, 10 * np.log10(energies.mean(axis=0)), atol=1e-9)
@@ -285,7 +285,7 @@ def test_drops_that_differ_are_marked_and_kept() -> None:
     found = measure_levels([make_drop(1.0, seed=i) for i in range(6)])
     assert average_levels(found).outliers == ()
     odd = make_drop(1.0, seed=6)
-    found += measure_levels([replace(odd, force=1.05 * odd.force, name="odd")])
+    found += measure_levels([replace(with_force(odd, 1.05 * odd.force), name="odd")])
     average = average_levels(found)
     assert {note.subject for note in average.outliers} == {"odd"}
     assert "odd" in average.names
@@ -339,7 +339,7 @@ def test_outliers_begin_at_the_critical_value_and_beyond_their_own_uncertainty()
 @pytest.mark.parametrize("bands", ["octave", "third"])
 def test_outliers_of_many_bands_share_the_probability(bands: Any) -> None:  # noqa: ANN401
     """Bonferroni: any band of drops that differ by chance is marked with 5 % together."""
-    drops = [replace(drop, force=scale * drop.force) for drop, scale in zip(
+    drops = [with_force(drop, scale * drop.force) for drop, scale in zip(
         [make_drop(0.01, seed=i) for i in range(6)], [1.0, 1.01, 0.99, 1.005, 0.995, 1.3],
         strict=True)]  # fmt: skip
     average = average_levels(measure_levels(drops, bands))

@@ -9,22 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import codes, noted
-from synthetic import half_sine
+from synthetic import cut_drops, half_sine
 
 import thud
 from thud.level.levels import force_exposure_levels
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_mass
 from thud.recordings.config import Config
-from thud.recordings.drops import search_drops
-from thud.recordings.measure_drops import measure_window
 from thud.recordings.quantization import (
     find_quantization,
     find_step,
     offset_deviation,
     slow_deviation,
 )
-from thud.recordings.recording import Recording
+from thud.recordings.read_recording import measure_stages, read_recording
 from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
 
@@ -32,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.measured_drop import Drop
+    from thud.recordings.recording import Recording
 
 RATE = 48_000.0
 PEAK, DURATION = 1500.0, 0.02
@@ -58,12 +57,12 @@ def measured(force: NDArray[np.float64], rate: float = RATE) -> Recording:
     config = Config(
         mass=MASS, height=1.0, mass_uncertainty=0, height_uncertainty=0, calibration_uncertainty=0
     )
-    return Recording.from_signals([Signal.from_array(force, rate, "scope")], config)
+    return read_recording([Signal.from_array(force, rate, "scope")], config=config)
 
 
 def one_drop(force: NDArray[np.float64]) -> Drop:
-    (window,) = search_drops(Signal.from_array(force, RATE, "scope")).windows
-    return measure_window(window, Config(height=1.0, mass=MASS))
+    (section,) = cut_drops(Signal.from_array(force, RATE, "scope"))
+    return measure_stages(section, Config(height=1.0, mass=MASS)).drop
 
 
 @pytest.mark.parametrize("step", [0.03, 1.0, 15.625, 156.25])
@@ -126,7 +125,7 @@ def test_offset_lies_within_its_deviation() -> None:
 def test_noise_that_covers_the_step_needs_no_budget() -> None:
     drop = one_drop(record(15.625, 12.0, 3))
     assert find_quantization(
-        search_drops(Signal.from_array(record(15.625, 12.0, 3), RATE)).windows[0]
+        cut_drops(Signal.from_array(record(15.625, 12.0, 3), RATE))[0]
     ).offset == 0.0  # fmt: skip
     assert not len(drop.contact.quantization_errors)
     assert drop.contact.quantization_impulse == 0.0
@@ -169,23 +168,23 @@ def test_constant_background_next_to_a_steep_flank_is_no_dropout() -> None:
     time = np.arange(2400) / 8000 - 0.1
     x = np.clip(time / DURATION, 0, 1)
     force = np.rint(PEAK * np.sin(np.pi * x**0.8) / 15.625) * 15.625
-    (window,) = search_drops(Signal.from_array(force, 8000.0)).windows
-    drop = measure_window(window, Config())
+    (window,) = cut_drops(Signal.from_array(force, 8000.0))
+    drop = measure_stages(window, Config()).drop
     assert "dropouts" not in codes(drop.notes)
 
 
 def test_few_digits_are_coarser_at_the_peak() -> None:
     force = half_sine(RATE, 0.1, 10_000)
     digits = np.array([float(f"{value:.2g}") for value in force])
-    (window,) = search_drops(Signal.from_array(digits, RATE)).windows
+    (window,) = cut_drops(Signal.from_array(digits, RATE))
     assert find_quantization(window).step == pytest.approx(100.0)
-    assert find_quantization(replace(window, signal=Signal.from_array(force, RATE))).step == 0.0
+    assert find_quantization(cut_drops(Signal.from_array(force, RATE))[0]).step == 0.0
 
 
 def test_load_cells_add_their_steps() -> None:
     cells = [Signal.from_array(record(step, 0.01, 1), RATE, "F") for step in (5.0, 12.0)]
-    (window,) = search_drops(replace(cells[0], cells=tuple(cells))).windows
-    alone = [find_quantization(replace(window, signal=cell)) for cell in cells]
+    (window,) = cut_drops(replace(cells[0], cells=tuple(cells)))
+    alone = [find_quantization(cell) for cell in window.cells]
     both = find_quantization(window)
     assert both.step == pytest.approx(12.0)
     assert both.offset == pytest.approx(math.hypot(*(one.offset for one in alone)))

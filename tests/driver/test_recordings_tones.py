@@ -9,6 +9,7 @@ import pytest
 from conftest import codes, noted
 
 import thud
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from thud.base.note import Note
@@ -22,7 +23,7 @@ FORCE = 1500 * np.sin(np.pi * PHASE) ** 1.3 + NOISE
 
 def notes(force: np.ndarray) -> list[Note]:
     """Return the notes on tones of a recording."""
-    (drop,) = thud.Recording.from_array(force, RATE).drops
+    (drop,) = thud.read_recording(Signal.from_array(force, RATE)).drops
     return [note for note in drop.notes if note.code == "tone_removed"]
 
 
@@ -37,8 +38,8 @@ def test_tones_are_removed(tones: dict[float, float]) -> None:
     for note, (frequency, size) in zip(found, tones.items(), strict=True):
         assert note.others["frequency"] == pytest.approx(frequency, abs=0.6)
         assert note.value == pytest.approx(size, rel=0.02)
-    expected = thud.Recording.from_array(FORCE, RATE)
-    result = thud.Recording.from_array(force, RATE)
+    expected = thud.read_recording(Signal.from_array(FORCE, RATE))
+    result = thud.read_recording(Signal.from_array(force, RATE))
     np.testing.assert_allclose(result.levels(), expected.levels(), rtol=0, atol=0.03)
 
 
@@ -49,7 +50,7 @@ def test_levels_without_noise_and_tones_have_no_notes() -> None:
     draws = np.random.default_rng(81).normal(0, 0.3, 30720)
     time = np.arange(len(draws)) / 51.2e3
     pulse = 1500 * np.sin(np.pi * np.clip((time - 0.2) / 0.018, 0, 1))
-    (drop,) = thud.Recording.from_array(pulse + draws, 51.2e3).drops
+    (drop,) = thud.read_recording(Signal.from_array(pulse + draws, 51.2e3)).drops
     assert "tone_removed" not in codes(drop.notes)
 
 
@@ -85,7 +86,7 @@ def test_tones_near_multiples_of_the_rate_of_the_search_stay(frequency: float) -
 def test_held_samples_are_found_beside_a_tone() -> None:
     force = FORCE + 3 * np.sin(2 * np.pi * 450 * TIME)
     force[14800:14820] = force[14800]
-    (drop,) = thud.Recording.from_array(force, RATE).drops
+    (drop,) = thud.read_recording(Signal.from_array(force, RATE)).drops
     tone = noted(drop.notes, "tone_removed")
     assert tone.others["frequency"] == pytest.approx(450, abs=0.5)
     assert tone.value == pytest.approx(3, rel=0.05)

@@ -18,7 +18,7 @@ import pytest
 from conftest import REPOSITORY, names_in, naming
 from matplotlib import font_manager
 from scipy.special import stdtrit
-from synthetic import make_recording
+from synthetic import make_recording, with_force
 from test_comparison_page import assert_scrolls_inside, open_in_browser
 from test_figure_look import assert_clean
 
@@ -108,7 +108,7 @@ def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
     force = np.full_like(drop.force, 500.0)
     force[first:stop] = drop.force[first:stop]
     assert 0 < first < stop < len(force)
-    disturbed = replace(one, drops=(replace(drop, force=force),))
+    disturbed = replace(one, drops=(with_force(drop, force),))
     np.testing.assert_array_equal(disturbed.levels(), one.levels())
     # The gate contains the contact, with a margin of less than 3 ms on either side.
     contact_time = drop.contact_time.value

@@ -17,6 +17,7 @@ from thud.recordings.config import read_config
 from thud.recordings.plate import Plate
 from thud.recordings.response import Chain
 from thud.recordings.ringing import find_ringing
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from thud.base.note import Note
@@ -42,7 +43,9 @@ def force() -> np.ndarray:
 def said(force: np.ndarray, colour: str = "white", deviation: float = 2.0) -> tuple[Note, ...]:
     """Return the notes on ringing in a force with noise, N."""
     noise = coloured_noise(len(force), RATE, deviation, colour, np.random.default_rng(1))
-    (drop,) = thud.Recording.from_array(force + noise, RATE, height=1.0, mass=2.5).drops
+    (drop,) = thud.read_recording(
+        Signal.from_array(force + noise, RATE), height=1.0, mass=2.5
+    ).drops
     return tuple(note for note in drop.notes if note.code.startswith("plate_rings"))
 
 
@@ -81,7 +84,7 @@ def test_plate_that_is_stated_wrongly_rings_on() -> None:
 
 
 def test_short_quiet_tells_nothing(force: np.ndarray) -> None:
-    recording = thud.Recording.from_array(np.pad(force, QUIET), RATE)
+    recording = thud.read_recording(Signal.from_array(np.pad(force, QUIET), RATE))
     contact = recording.drops[0].contact
     short = replace(contact, force=contact.force[: contact.gate[1] - contact.span[0] + 100])
     assert find_ringing(short, Chain((Plate(1100.0, 25.0),))) is None

@@ -48,7 +48,8 @@ many: thud.Ensemble = thud.solve_many({"height": [0.5, 1.0]}, case, source=thud.
 noise = np.random.default_rng(1).normal(scale=0.5, size=8000 + len(flagship.time))
 plate = np.pad(flagship.floor_force, 4000) + noise
 np.savetxt(folder / "record.csv", np.c_[np.arange(len(plate)) / flagship.sample_rate, plate])
-record: thud.Recording = thud.read_recording(folder / "record.csv", height=1.0, mass=2.5)
+known = thud.recordings.Config(height=1.0, mass=2.5)
+record: thud.Recording = thud.read_recording(folder / "record.csv", config=known)
 contact: thud.Estimate = record.estimates["contact_time"]
 page: thud.Comparison = thud.compare({**impacts, "record": record}, force="floor")
 restored: thud.Case = thud.read_case(folder / "mine.nml")

@@ -12,6 +12,7 @@ from campaign import Finding
 from public_calls import PLATE, ROOM, quiet
 
 import thud
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     import random
@@ -72,7 +73,9 @@ def calls() -> dict[str, Call]:
         ),
         "recording": Call(
             [record],
-            lambda force: thud.Recording.from_array(force, 44100.0, height=1.0, mass=2.5),
+            lambda force: thud.read_recording(
+                Signal.from_array(force, 44100.0), height=1.0, mass=2.5
+            ),
         ),
         "fit": Call([levels], lambda target: thud.LevelTarget(target, 1.0, frequencies=bands)),
         "force target": Call(

@@ -11,7 +11,8 @@ import numpy as np
 
 import thud
 from thud.comparison.comparison import read_all
-from thud.recordings.recording import Recording
+from thud.recordings.read_recording import read_recording
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     import random
@@ -123,7 +124,9 @@ def slow_calls(folder: Path) -> Calls:
         "read_results": lambda: thud.read_results(results).floor_force,
         "read_recording": measured,
         "from_array": lambda: str(
-            Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5).levels()
+            read_recording(
+                Signal.from_array(force, impact.sample_rate), height=1.0, mass=2.5
+            ).levels()
         ),
         "sweep": lambda: thud.sweep({"parameters": HEIGHTS}).dataset.peak_elastic_force,
         "read_sweep": lambda: thud.read_sweep(folder / "kept.nc").dataset.peak_elastic_force,
@@ -169,7 +172,9 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
         impact = thud.solve(replace(case(chance), floor=None))
         force = np.pad(impact.floor_force, chance.randint(4000, 8000))
         force += np.random.default_rng(chance.getrandbits(32)).normal(scale=0.5, size=force.size)
-        return Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5).levels()
+        return read_recording(
+            Signal.from_array(force, impact.sample_rate), height=1.0, mass=2.5
+        ).levels()
 
     def room(chance: random.Random) -> object:
         plate = thud.Plate(thickness=chance.uniform(0.15, 0.25))

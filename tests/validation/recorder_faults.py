@@ -19,7 +19,7 @@ from recorder_model import KINDS, Ball, Chain, Scene, drop_pulse, electric, plat
 
 from thud.base.errors import InputError
 from thud.recordings.config import config_from
-from thud.recordings.recording import Recording
+from thud.recordings.read_recording import read_recording
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ def measure(name: str, seed: int) -> Outcome:
     stated = {key: STATED[key] for key in CONDITIONS[name].stated}
     config = config_from({"mass": ball.mass, "height": ball.height, **stated})
     try:
-        recording = Recording.from_signals([Signal.from_array(values, rate, "record")], config)
+        recording = read_recording([Signal.from_array(values, rate, "record")], config=config)
     except InputError as error:
         return Outcome(refusal=str(error))
     estimates = (*recording.level_estimates(), recording.estimates["contact_time"])

@@ -25,7 +25,7 @@ from thud.level.estimate import Estimate
 from thud.recordings import contact as contact_module
 from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact
-from thud.recordings.drops import Window
+from thud.recordings.drops import Section
 from thud.recordings.noise import MAINS, Background
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
 from thud.recordings.signal import Signal
@@ -140,7 +140,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
         record += draw.hum * peak * part * wave
     record += coloured_noise(n, rate, deviation, draw.colour, rng)
     try:
-        recording = thud.Recording.from_array(record, rate, height=HEIGHT, mass=MASS)
+        recording = thud.read_recording(Signal.from_array(record, rate), height=HEIGHT, mass=MASS)
     except InputError as error:
         return draw, str(error)
     drop, levels = recording.drops[0], measure_levels(recording.drops)[0]
@@ -223,11 +223,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     ones = np.full((1, last - first), 1 / rate)
     spread = float(np.sqrt(contact.covariance_of(ones)[0, 0])) / (MASS * speed)
     truth = clean.sum() / rate / (MASS * speed) - 1 - GRAVITY * contact_time / speed
-    time = np.arange(first, last) / rate - onset
-    oracle = replace(
-        drop, begin=float(time[0]), force=clean[first:last], gate=(0, last - first), contact=contact
-    )
-    return oracle, Estimate(float(truth), spread)
+    return replace(drop, contact=contact), Estimate(float(truth), spread)
 
 
 def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, float]:
@@ -239,12 +235,11 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     """
     rate, contact = draw.rate, oracle.contact
     touch, release = contact.touch.value, contact.release.value
-    signal = Signal.from_array(record, rate, "record")
-    window = Window("record", signal, 0, len(record), contact.span)
+    section = Section("record", record, rate, 0, contact.span)
     saved = contact_module.BACKGROUND_CELLS
     contact_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
-        found = contact_module.find_edges(window, record, contact.background, passes=2)
+        found = contact_module.find_edges(section, contact.background, passes=2)
     finally:
         contact_module.BACKGROUND_CELLS = saved
     spread = float(np.hypot(*(edge.edge_times()[1][1] for edge in (found.touch, found.release))))

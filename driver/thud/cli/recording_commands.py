@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
@@ -23,11 +23,14 @@ from thud.cli.command import (
     results_of,
 )
 from thud.cli.screen import print_notes, print_path, print_results, shows_progress
-from thud.level.levels import SOURCES
 from thud.recordings.channel import channel_of
+from thud.recordings.config import Config, read_config
+from thud.recordings.config_values import Choice, Number
 
 if TYPE_CHECKING:
     import argparse
+
+    from thud.cli.command import Argument
 
 
 # Maximum number of drops that are printed.
@@ -36,7 +39,7 @@ MAX_PRINTED = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings.read_recording import read_recording
+    from thud.recordings.read_recording import first_stages, read_recording
     from thud.report import recording_files
     from thud.report.notes import processing, warnings
 
@@ -44,31 +47,18 @@ def measure(options: argparse.Namespace) -> int:
     files = results_of(
         options, Path(options.recordings[0]).stem, [*options.recordings, options.config]
     )
-    files.require(recording_files.file_names(figures=figures))
+    files.require(recording_files.file_names(figures=figures, stages=options.stages))
     folder = files.folder
-    recording = read_recording(
-        options.recordings,
-        height=options.height,
-        mass=options.mass,
-        height_uncertainty=options.height_uncertainty,
-        mass_uncertainty=options.mass_uncertainty,
-        source=options.source,
-        channel=channel_of(options.channel),
-        channels=options.channels,
-        unit=options.unit,
-        calibration=_single(options.calibration),
-        calibration_uncertainty=options.calibration_uncertainty,
-        polarity=options.polarity,
-        sample_rate=options.sample_rate,
-        drops=options.drops,
+    config = read_config(options.config) if options.config else Config()
+    config = config.updated(
         leave_out=_left_out(options) or None,
-        begin=options.begin,
-        end=options.end,
-        config=options.config,
-        progress=shows_progress(quiet=options.quiet),
+        **{name: getattr(options, name) for name in OF_THE_CONFIGURATION},
     )
+    progress = shows_progress(quiet=options.quiet)
+    recording = read_recording(options.recordings, config=config, progress=progress)
     verdict = recording.assess()
-    recording_files.save(recording, files, figures=figures)
+    stages = first_stages(options.recordings, config) if options.stages else None
+    recording_files.save(recording, files, figures=figures, stages=stages)
     if not options.quiet:
         rows = recording_files.drop_table(recording)
         print_results(format_rows(rows[: MAX_PRINTED + 1]))
@@ -89,11 +79,6 @@ def measure(options: argparse.Namespace) -> int:
     return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0
 
 
-def _single(values: list[str] | None) -> list[str] | str | None:
-    """Return the values of a repeated option, and the value itself if there is one."""
-    return values[0] if values and len(values) == 1 else values
-
-
 def _left_out(options: argparse.Namespace) -> dict[str, str]:
     """Return the numbers of the drops to be left out, with their reasons."""
     numbers, reasons = options.leave_out or [], options.because or []
@@ -106,6 +91,34 @@ def _left_out(options: argparse.Namespace) -> dict[str, str]:
     return dict(zip(numbers, reasons, strict=True))
 
 
+# Keys of the configuration that are options of `measure`, and the words for their values.
+OF_THE_CONFIGURATION = {
+    "source": "", "mass": "KG", "height": "M", "mass_uncertainty": "KG", "height_uncertainty": "M",
+    "channel": "NAME|NUMBER", "channels": "sum|F1+F2", "unit": "UNIT", "calibration": "N/UNIT",
+    "calibration_uncertainty": "FRACTION", "polarity": "", "sample_rate": "HZ", "drops": "NUMBERS",
+    "begin": "S", "end": "S",
+}  # fmt: skip
+FLAGS = {"begin": "--from", "end": "--to"}
+
+
+def _option(name: str) -> Argument:
+    """Return the option of a key of the configuration."""
+    entry = Config.__dataclass_fields__[name].metadata
+    check = entry["check"]
+    settings: dict[str, Any] = {"dest": name, "help": entry["meaning"]}
+    if isinstance(check, Choice):
+        settings["choices"] = tuple(check.words)
+    else:
+        settings["metavar"] = OF_THE_CONFIGURATION[name]
+    if isinstance(check, Number):
+        settings["type"] = number
+    if name == "channel":
+        settings["type"] = channel_of
+    if name == "calibration":
+        settings["action"] = "append"
+    return argument(FLAGS.get(name, f"--{name.replace('_', '-')}"), **settings)
+
+
 MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
@@ -116,59 +129,19 @@ MEASURE = Command(
             metavar="FILE",
             help="recordings of one or more drops each",
         ),
-        argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
-        argument("--mass", type=number, metavar="KG", help="mass of the source"),
-        argument("--height", type=number, metavar="M", help="drop height"),
-        argument(
-            "--mass-uncertainty", type=number, metavar="KG", help="standard uncertainty of the mass"
-        ),
-        argument(
-            "--height-uncertainty",
-            type=number,
-            metavar="M",
-            help="standard uncertainty of the height",
-        ),
         argument(
             "--config", metavar="LAB.toml", help="file on laboratory, instruments, calibration"
         ),
-        argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
-        argument(
-            "--channels",
-            metavar="sum|F1+F2",
-            help="load cells whose forces are added: sum for all channels of force",
-        ),
-        argument("--unit", help="unit of the recorded values, if the file does not state it"),
-        argument(
-            "--calibration",
-            metavar="N/UNIT",
-            action="append",
-            help='such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"; repeated: one for each of '
-            "--channels",
-        ),
-        argument(
-            "--calibration-uncertainty",
-            type=number,
-            metavar="FRACTION",
-            help="relative standard uncertainty of the calibration, such as 0.005",
-        ),
-        argument(
-            "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
-        ),
-        argument(
-            "--sample-rate",
-            type=number,
-            metavar="HZ",
-            help="sample rate, if the file does not state it",
-        ),
-        argument("--drops", metavar="NUMBERS", help='drops to be measured, such as "1-5,8"'),
+        *map(_option, OF_THE_CONFIGURATION),
         argument("--leave-out", action="append", metavar="NUMBERS", help="drops to be left out"),
         argument("--because", action="append", metavar="TEXT", help="why drops are left out"),
-        argument(
-            "--from", dest="begin", type=number, metavar="S", help="begin of the searched section"
-        ),
-        argument("--to", dest="end", type=number, metavar="S", help="end of the searched section"),
         *output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
+        argument(
+            "--stages",
+            action="store_true",
+            help="draw the first drop after each stage of its measurement (stages.svg)",
+        ),
         NO_FIGURES,
         QUIET,
     ),

@@ -17,7 +17,7 @@ from thud.explorer.recording_fields import TABLES
 from thud.plot.impact_figures import contact_force
 from thud.recordings.assumptions import ASSUMED_SHARE
 from thud.recordings.config import config_from
-from thud.recordings.recording import Recording
+from thud.recordings.read_recording import read_recording
 from thud.recordings.signal_files import open_signals
 from thud.report.contents import criteria_data, report_data
 from thud.report.page import report_page
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from thud.level.assessment import Verdict
     from thud.recordings.config import Config
+    from thud.recordings.recording import Recording
 
 # Ending of the name of the file on laboratory, instruments and calibration.
 LABORATORY = ".toml"
@@ -91,7 +92,7 @@ def read_copies(paths: Sequence[str], table: Mapping[str, object]) -> Recording:
     if not recorded:
         refuse(f"{names[0]}: is the file of a laboratory", "together with recordings")
     signals = (signal for name in recorded for signal in open_signals(name, config))
-    return replace(Recording.from_signals(signals, config), name=Path(recorded[0]).stem)
+    return replace(read_recording(signals, config=config), name=Path(recorded[0]).stem)
 
 
 def _is_laboratory(name: str) -> bool:

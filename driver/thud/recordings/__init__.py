@@ -1,1 +1,5 @@
-"""Recordings of drops: from the files of a laboratory to levels, verdict and report."""
+"""Force recordings: reading and measurement, stage by stage (docs/recordings.md)."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -10,50 +10,50 @@ from thud.base.note import Note
 from thud.recordings.config_values import parse_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
-    from thud.recordings.drops import Window
+    from thud.recordings.config import Config
+    from thud.recordings.drops import Pulse
 
 
 def choose(
-    windows: Sequence[Window], first: int, drops: str | None, leave_out: Mapping[str, str]
-) -> tuple[list[Window], tuple[Note, ...]]:
-    """Return the chosen windows, and notes on those that are left out.
+    found: Sequence[Pulse], first: int, rate: float, config: Config
+) -> tuple[list[Pulse], list[Note]]:
+    """Return the drops to be measured, and notes on those that are left out.
 
-    The windows have the numbers from `first` on. `drops` are the numbers of those to be measured,
-    all but those whose windows say why not if None; `leave_out` are numbers of others, with the
-    reason.
+    The drops found in a signal of a sample rate, Hz, have the numbers from `first` on. Without
+    chosen numbers all are measured but those that say why not.
     """
-    chosen: list[Window] = []
+    chosen: list[Pulse] = []
     notes: list[Note] = []
-    excluded = [(parse_numbers(text, "leave_out"), why) for text, why in leave_out.items()]
-    included = None if drops is None else parse_numbers(drops, "drops")
-    for number, window in enumerate(windows, start=first):
-        reason = next((why for ranges, why in excluded if _holds(ranges, number)), "")
-        note = window.left_out if included is None else None
-        if reason:
-            note = Note("drop_left_out", others={"reason": reason})
-        elif included is not None and not _holds(included, number):
-            note = Note("drop_not_chosen", others={"chosen": drops or ""})
+    reasons = {
+        number: reason
+        for numbers, reason in config.leave_out.items()
+        for number in range(first, first + len(found))
+        if _holds(numbers, number, "leave_out")
+    }
+    for number, drop in enumerate(found, start=first):
+        note = None if config.drops else drop.left_out
+        if number in reasons:
+            note = Note("drop_left_out", others={"reason": reasons[number]})
+        elif config.drops and not _holds(config.drops, number, "drops"):
+            note = Note("drop_not_chosen", others={"chosen": config.drops})
         if note is None:
-            chosen.append(window)
+            chosen.append(drop)
             continue
-        time = (window.start + window.contact[0]) / window.sample_rate
-        notes.append(replace(note, value=number, others={**note.others, "time": time}))
-    return chosen, tuple(notes)
+        others = {**note.others, "time": drop.contact[0] / rate}
+        notes.append(replace(note, value=number, others=others))
+    return chosen, notes
 
 
-def _holds(ranges: Sequence[range], number: int) -> bool:
-    return any(number in numbers for numbers in ranges)
+def _holds(text: str, number: int, key: str) -> bool:
+    return any(number in numbers for numbers in parse_numbers(text, key))
 
 
-def require_chosen(
-    count: int, chosen: int, drops: str | None, leave_out: Mapping[str, str]
-) -> None:
+def require_chosen(count: int, chosen: int, config: Config) -> None:
     """Raise InputError if a number exceeds that of the drops, or none of the drops is chosen."""
-    stated = {"leave_out": ",".join(leave_out), "drops": drops or ""}
-    for key, text in stated.items():
-        highest = max((r.stop - 1 for r in parse_numbers(text, key)), default=0) if text else 0
+    for key, text in (("leave_out", ",".join(config.leave_out)), ("drops", config.drops)):
+        highest = max(numbers.stop - 1 for numbers in parse_numbers(text, key)) if text else 0
         if highest > count:
             refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}", subject=key)
     if not chosen:

@@ -20,6 +20,7 @@ from thud.recordings.config_values import (
     Number,
     Table,
     key,
+    require_channels,
     to_calibrations,
     to_channel,
     to_date,
@@ -30,7 +31,6 @@ from thud.recordings.config_values import (
     to_reasons,
 )
 from thud.recordings.force_units import Calibration, require_unit
-from thud.recordings.load_cells import require_channels
 from thud.recordings.picture import read_picture
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES

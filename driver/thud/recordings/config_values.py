@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import date
 from typing import Any, ClassVar, Self
@@ -24,6 +24,10 @@ from thud.recordings.force_units import Calibration, plain_number, read_chain
 MAX_TEXT = 500
 # Maximum number of digits of the number of a drop.
 MAX_DIGITS = 6
+SUM = "sum"
+# Maximum number of channels that are added.
+MAX_CELLS = 64
+EXAMPLES = '"sum", "F1+F2+F3+F4" or a list of names or numbers'
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,28 @@ def to_channel(value: object, key: str) -> int | str:
     """Return the number or the name of a channel."""
     is_number = isinstance(value, int) and not isinstance(value, bool)
     return Whole(1, 1_000_000)(value, key) if is_number else to_line(value, key)
+
+
+def require_channels(value: object, key: str = "channels") -> str | tuple[int | str, ...]:
+    """Return ``"sum"`` or names and numbers of channels; raise InputError if they are neither.
+
+    >>> require_channels("F1 + F2 + 3")
+    ('F1', 'F2', 3)
+    """
+    if isinstance(value, str):
+        if value.strip().casefold() == SUM:
+            return SUM
+        names: Sequence[object] = [
+            int(name) if name.isdecimal() else name for name in map(str.strip, value.split("+"))
+        ]
+    else:
+        names = value if isinstance(value, list | tuple) else ()
+    allowed = 1 < len(names) <= MAX_CELLS and all(
+        isinstance(name, int | str) and not isinstance(name, bool) and name for name in names
+    )
+    if not allowed or len(set(names)) < len(names):
+        refuse_value(key, value, f"{EXAMPLES}, 2 to {MAX_CELLS} different")
+    return tuple(name for name in names if isinstance(name, int | str))
 
 
 def to_calibration(value: object, key: str) -> Calibration | str | float:

@@ -22,6 +22,7 @@ from thud.recordings.noise import MAINS, N_HARMONIC, Background
 from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.recordings.response import Chain
@@ -102,6 +103,12 @@ class Contact(Immutable):
     background_lengths: tuple[float, float]
     background: Background
     sample_rate: float
+
+    def plot(self) -> Figure:
+        """Draw the force next to the contact, the removed background, and the gate."""
+        from thud.plot.stage_figures import draw_contact
+
+        return draw_contact(self)
 
     @property
     def notes(self) -> tuple[Note, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from thud.recordings.quantization import Quantization
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.recordings.response import Chain
@@ -84,86 +85,124 @@ class SecondPeak:
     time: float
 
 
-@dataclass(frozen=True, eq=False)
-class Window:
-    """Section of a signal around one drop.
+@dataclass(frozen=True)
+class Pulse:
+    """Where a drop, or a bounce, lies in a signal.
 
     Attributes
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    signal : Signal
-        Signal, read when the force is requested.
-    start, stop : int
-        First and stop index of the section in the signal.
+    section : tuple of int
+        First and stop index of the pulse and its background, up to the pulses next to it.
     contact : tuple of int
-        First and stop index of the contact in the section, accurate to about 1 ms.
-    bounces : tuple of Window
-        Windows of the bounces after the drop.
-    notes : tuple of Note
-        Possible faults of the pulse as a whole.
+        First and stop index of the contact, accurate to about 1 ms.
+    bounces : tuple of Pulse
+        Bounces after the drop.
     second_peak : SecondPeak or None
         A second impact in the pulse.
     left_out : Note or None
         Why the drop is measured only if it is chosen.
-    chain : Chain or None
-        Instruments whose responses were corrected in the signal.
-    quantization : Quantization
-        Errors of the recorded force by quantization.
+    notes : tuple of Note
+        Possible faults of the pulse as a whole.
     """
 
     name: str
-    signal: Signal
-    start: int
-    stop: int
+    section: tuple[int, int]
     contact: tuple[int, int]
-    bounces: tuple[Window, ...] = ()
-    notes: tuple[Note, ...] = ()
+    bounces: tuple[Pulse, ...] = ()
     second_peak: SecondPeak | None = None
     left_out: Note | None = None
-    chain: Chain | None = None
+    notes: tuple[Note, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """Samples of a signal around one drop or bounce.
+
+    Each stage takes a section and returns one: `thud.recordings.faults.repair`,
+    `thud.recordings.tones.remove_tones`, `thud.recordings.response.correct`.
+
+    Attributes
+    ----------
+    name, second_peak
+        As in `Pulse`.
+    force : ndarray, shape (n_sample,)
+        Force, N.
+    sample_rate : float
+        Samples per second, Hz.
+    start : int
+        Index of the first sample in the signal.
+    contact : tuple of int
+        First and stop index of the contact in the section.
+    bounces : tuple of Section
+        Sections of the bounces after the drop.
+    cells : tuple of Section
+        Sections of the load cells whose sum this is.
+    full_scale : float or None
+        Largest force that the sample format can hold, N; None if unknown.
+    quantization : Quantization
+        Errors of the recorded force by quantization.
+    chain : Chain or None
+        Instruments whose responses were corrected.
+    notes : tuple of Note
+        What was done in each stage, and possible faults.
+    """
+
+    name: str
+    force: NDArray[np.float64]
+    sample_rate: float
+    start: int
+    contact: tuple[int, int]
+    bounces: tuple[Section, ...] = ()
+    cells: tuple[Section, ...] = ()
+    second_peak: SecondPeak | None = None
+    full_scale: float | None = None
     quantization: Quantization = field(default_factory=Quantization)
+    chain: Chain | None = None
+    notes: tuple[Note, ...] = ()
 
     @property
-    def sample_rate(self) -> float:
-        """Samples per second, Hz."""
-        return self.signal.sample_rate
+    def background(self) -> NDArray[np.float64]:
+        """Force before and after the contact, N."""
+        return np.concatenate([self.force[: self.contact[0]], self.force[self.contact[1] :]])
 
-    @property
-    def force(self) -> NDArray[np.float64]:
-        """Force as read, N, shape (stop - start,)."""
-        return self.signal.read(self.start, self.stop)
+    def plot(self) -> Figure:
+        """Draw the force of the drop and its bounces."""
+        from thud.plot.stage_figures import draw_section
+
+        return draw_section(self)
 
 
 @dataclass
-class _Pulse:
-    """One pulse: first and stop index in the signal, its height, N, and whether the force stays."""
+class _Candidate:
+    """A pulse: first and stop index in the signal, its height, N, and whether the force stays."""
 
     start: int
     stop: int
     peak: float
     is_step: bool
     second_peak: SecondPeak | None
-    bounces: list[_Pulse] = field(default_factory=list)
+    bounces: list[_Candidate] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     left_out: Note | None = None
 
 
 @dataclass(frozen=True)
 class Search:
-    """Windows of the drops in a signal, in order, and the pulses that are no drops."""
+    """The drops in a signal, in order, and notes on the pulses that are no drops."""
 
-    windows: list[Window]
+    drops: tuple[Pulse, ...]
     ignored: tuple[Note, ...]
 
 
-def search_drops(
+def find_drops(
     signal: Signal, begin: float = 0.0, end: float = math.inf, *, progress: bool = False
 ) -> Search:
     """Return the drops in a signal that begin between two times, s.
 
-    The signal is read twice: in blocks for the search, then around each drop. Raise InputError if
-    there is no impact, the section is empty, or the rate is too low.
+    The signal is read in blocks. Raise InputError if there is no impact, the section is empty, or
+    the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
     section = min(int(begin * rate), signal.n_sample)
@@ -176,7 +215,7 @@ def search_drops(
         )
     if not rate >= MIN_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
-    pulses: list[_Pulse] = []
+    pulses: list[_Candidate] = []
     width = max(1, round(rate * CELL))
     for first, cells in _pieces(signal, first_sample, stop_sample, progress=progress):
         # Pulses that the end of a piece may cut are left to the next piece; the last accepts all.
@@ -199,8 +238,34 @@ def search_drops(
     drops = [drop for drop in drops if section <= drop.start]
     if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
-    windows = list(_windows(signal, drops, pulses, section, stop_sample))
-    return Search(windows, tuple(ignored))
+    located = tuple(_locate(name, rate, drops, pulses, (section, stop_sample)))
+    return Search(located, tuple(ignored))
+
+
+def cut_section(signal: Signal, pulse: Pulse) -> Section:
+    """Return the samples around a drop and around its bounces."""
+    first, stop = pulse.section
+    contact = pulse.contact[0] - first, pulse.contact[1] - first
+    parts = [
+        Section(part.name, part.read(first, stop), signal.sample_rate, first, contact,
+                full_scale=part.full_scale)
+        for part in signal.cells or (signal,)
+    ]  # fmt: skip
+    force = parts[0].force
+    for part in parts[1:]:
+        force = force + part.force
+    return Section(
+        pulse.name,
+        force,
+        signal.sample_rate,
+        first,
+        contact,
+        tuple(cut_section(signal, bounce) for bounce in pulse.bounces),
+        tuple(parts) if signal.cells else (),
+        pulse.second_peak,
+        signal.full_scale,
+        notes=pulse.notes,
+    )
 
 
 def _pieces(
@@ -256,7 +321,7 @@ def _without_spikes(cells: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(is_spike, neighbors, cells)
 
 
-def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]:
+def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Candidate]:
     """Return the pulses in cells; `first` is the first sample of the cells."""
     width = max(1, round(rate * CELL))
     level = uniform_filter1d(_without_spikes(cells), 3, mode="nearest") - _baseline(cells)
@@ -268,7 +333,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         return []
     above = np.flatnonzero(level > max(threshold, 0.01 * highest))
     groups = np.split(above, np.flatnonzero(np.diff(above) > MAX_GAP) + 1)
-    pulses: list[_Pulse] = []
+    pulses: list[_Candidate] = []
     for group in groups:
         top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
         earliest = -(-(pulses[-1].stop - first) // width) if pulses else 0
@@ -302,7 +367,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         )
         change = [float(np.median(side)) if side.size else 0.0 for side in sides]
         is_step = abs(change[1] - change[0]) > MAX_CHANGE * peak
-        pulses.append(_Pulse(*span, peak, is_step, second_peak))
+        pulses.append(_Candidate(*span, peak, is_step, second_peak))
     return pulses
 
 
@@ -331,17 +396,17 @@ def _second_peak(envelope: NDArray[np.float64], time: float) -> SecondPeak | Non
 
 
 def _assign_bounces(
-    pulses: list[_Pulse], section: int, rate: float
-) -> tuple[list[_Pulse], list[Note]]:
+    pulses: list[_Candidate], section: int, rate: float
+) -> tuple[list[_Candidate], list[Note]]:
     """Return the drops with their bounces, and the pulses that are neither.
 
     Drops below MIN_DROP times the highest pulse from the sample `section` on are left out, with
     their numbers.
     """
-    drops: list[_Pulse] = []
+    drops: list[_Candidate] = []
     ignored: list[Note] = []
     flight = MAX_FLIGHT
-    before: _Pulse | None = None
+    before: _Candidate | None = None
     highest = max((p.peak for p in pulses if not p.is_step and p.start >= section), default=0.0)
     for pulse in pulses:
         gap = np.inf if before is None else (pulse.start - before.stop) / rate
@@ -371,33 +436,31 @@ def _assign_bounces(
     return drops, ignored
 
 
-def _windows(
-    signal: Signal,
-    drops: list[_Pulse],
-    pulses: list[_Pulse],
-    first_sample: int,
-    stop_sample: int,
-) -> Iterator[Window]:
-    """Yield the windows of drops, which end before the pulses next to them."""
+def _locate(
+    name: str,
+    rate: float,
+    drops: list[_Candidate],
+    pulses: list[_Candidate],
+    limits: tuple[int, int],
+) -> Iterator[Pulse]:
+    """Yield the drops with their sections, which end before the pulses next to them."""
     indices = {id(p): k for k, p in enumerate(pulses)}
+    guard, (first_sample, stop_sample) = round(2 * CELL * rate), limits
 
-    def cut(pulse: _Pulse, name: str) -> Window:
+    def locate(pulse: _Candidate, title: str) -> Pulse:
         k = indices[id(pulse)]
-        guard = round(2 * CELL * signal.sample_rate)
         low = pulses[k - 1].stop + guard if k else first_sample
         high = pulses[k + 1].start - guard if k + 1 < len(pulses) else stop_sample
-        low = max(low, pulse.start - round(BEFORE * signal.sample_rate))
-        high = min(high, pulse.stop + round(AFTER * signal.sample_rate), stop_sample)
-        low, high = min(low, pulse.start), max(high, min(pulse.stop, stop_sample))
-        contact = (pulse.start - low, min(pulse.stop, stop_sample) - low)
-        return Window(
-            name, signal, low, high, contact, (), tuple(pulse.notes), pulse.second_peak,
-            pulse.left_out,
+        low = max(low, pulse.start - round(BEFORE * rate))
+        high = min(high, pulse.stop + round(AFTER * rate), stop_sample)
+        stop = min(pulse.stop, stop_sample)
+        bounces = tuple(
+            locate(bounce, f"{title}, bounce {j}") for j, bounce in enumerate(pulse.bounces, 1)
+        )
+        return Pulse(
+            title, (min(low, pulse.start), max(high, stop)), (pulse.start, stop), bounces,
+            pulse.second_peak, pulse.left_out, tuple(pulse.notes),
         )  # fmt: skip
 
     for k, drop in enumerate(drops, start=1):
-        name = signal.name if len(drops) == 1 else f"{signal.name}, drop {k}"
-        bounces = tuple(
-            cut(bounce, f"{name}, bounce {j}") for j, bounce in enumerate(drop.bounces, start=1)
-        )
-        yield replace(cut(drop, name), bounces=bounces)
+        yield locate(drop, name if len(drops) == 1 else f"{name}, drop {k}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,13 +12,14 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from thud.base.checks import refuse
 from thud.base.note import Note
+from thud.recordings.load_cells import check_cells
+from thud.recordings.quantization import find_quantization
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.contact import Contact
-    from thud.recordings.drops import Window
-    from thud.recordings.signal import Signal
+    from thud.recordings.drops import Section
 
 # Minimum length of the background on either side, s and samples.
 MIN_BACKGROUND = 1e-3
@@ -88,21 +90,22 @@ MIN_JUMP_RATIO = 3.0
 MIN_SIDE_RATIO = 6.0
 
 
-def repair(window: Window) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
-    """Return the force with its dropouts and spikes filled, and notes.
+def repair(section: Section) -> Section:
+    """Return a section with its dropouts and spikes filled, in each load cell, and with notes.
 
-    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts or spikes.
+    Raise InputError if the pulse is cut off, clipped or doubled, has long dropouts or spikes, or a
+    load cell is the sum of the others.
     """
-    rate, (first, stop), name = window.sample_rate, window.contact, window.name
+    rate, (first, stop), name = section.sample_rate, section.contact, section.name
     minimum = min_background(rate)
-    if first < minimum or window.stop - window.start - stop < minimum:
+    if first < minimum or len(section.force) - stop < minimum:
         side = "starts" if first < minimum else "ends"
         refuse(
             f"{name}: the signal {side} within the pulse or less than 1 ms "
             f"{'before' if first < minimum else 'after'} it",
             "background of 1 ms or more, better 100 ms, before and after the contact",
         )
-    if second := window.second_peak:
+    if second := section.second_peak:
         refuse(
             f"{name}: two impacts overlap: a second peak of {second.peak:.0f} N rises from "
             f"{second.valley:.0f} N; the force does not return to the background between them, at "
@@ -110,13 +113,26 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
             "one impact, with background before and after it; --leave-out (leave_out) with the "
             "number of this drop, or --from and --to (begin, end) without it",
         )
-    force = window.force
-    if window.chain is not None:
-        # The recorded force is repaired; its correction rings next to a fault.
-        return force, ()
-    refuse_clipped(window, force)
-    _refuse_missing_codes(window, force)
-    return fill_dropouts(window, force)
+    section = replace(section, quantization=find_quantization(section))
+    if section.cells:
+        section = _repair_cells(section)
+    refuse_clipped(section)
+    _refuse_missing_codes(section)
+    force, notes = fill_dropouts(section)
+    return replace(section, force=force, notes=(*section.notes, *notes))
+
+
+def _repair_cells(section: Section) -> Section:
+    """Return the sum of load cells whose dropouts and spikes are filled."""
+    peak = float(np.ptp(section.force[slice(*section.contact)]))
+    forces, notes = [], [*section.notes]
+    for cell in section.cells:
+        refuse_clipped(cell)
+        force, faults = fill_dropouts(replace(cell, quantization=section.quantization), peak)
+        forces.append(force)
+        notes += (replace(note, others={**note.others, "cell": cell.name}) for note in faults)
+    notes += check_cells(section, forces)
+    return replace(section, force=np.sum(forces, axis=0), cells=(), notes=tuple(notes))
 
 
 def min_background(rate: float) -> int:
@@ -130,10 +146,10 @@ def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return starts, np.diff(np.append(starts, len(force)))
 
 
-def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
+def refuse_clipped(section: Section) -> None:
     """Raise InputError if the top of a recorded force, N, is clipped."""
-    first, stop = window.contact
-    force = record[first:stop]
+    first, stop = section.contact
+    force = section.force[first:stop]
     starts, lengths = _runs(force)
     top = force.max()
     at_top = force[starts] == top
@@ -147,30 +163,30 @@ def refuse_clipped(window: Window, record: NDArray[np.float64]) -> None:
         force[min(start + length - 1 + distance, len(force) - 1)],
     ]
     # Samples that are held, or the median of several, are equal elsewhere, too.
-    quiet = record[: max(first // 2, 1)]
+    quiet = section.force[: max(first // 2, 1)]
     is_noisy = float(np.ptp(quiet)) > MIN_FALL * step
     beside = ~at_top & (force[starts] > (top + force.min()) / 2)
     elsewhere = max(lengths[beside].max(initial=0), _runs(quiet)[1].max() if is_noisy else 0)
     falls = top - max(neighbors) > MIN_FALL * step
     clipped = length >= MIN_CLIPPED and falls and length > MAX_ELSEWHERE * elsewhere
-    if window.signal.full_scale is not None:
-        at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * window.signal.full_scale)
+    if section.full_scale is not None:
+        at_scale = np.count_nonzero(force >= CLIPPED_FRACTION * section.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
     if clipped:
         refuse(
-            f"{window.name}: the force is clipped at {top:.4g} N for "
-            f"{1e3 * length / window.sample_rate:.3g} ms",
+            f"{section.name}: the force is clipped at {top:.4g} N for "
+            f"{1e3 * length / section.sample_rate:.3g} ms",
             "a measuring range that includes the peak",
         )
 
 
-def _refuse_missing_codes(window: Window, record: NDArray[np.float64]) -> None:
+def _refuse_missing_codes(section: Section) -> None:
     """Raise InputError if half of the values of a converter never occur in the contact.
 
     These are the values in which a bit is set, or not set, of all within its period. A smooth force
     may well leave out values.
     """
-    step, force = window.quantization.step, record[slice(*window.contact)]
+    step, force = section.quantization.step, section.force[slice(*section.contact)]
     if not step or _deviation(force) < step:
         return
     codes = np.unique(np.rint((force - force.min()) / step).astype(np.int64))
@@ -179,7 +195,7 @@ def _refuse_missing_codes(window: Window, record: NDArray[np.float64]) -> None:
         occupied = len(np.unique(codes % period))
         if occupied <= period // 2:
             refuse(
-                f"{window.name}: of {period} successive values of the converter, {step:.3g} N "
+                f"{section.name}: of {period} successive values of the converter, {step:.3g} N "
                 f"apart, {period - occupied} never occur",
                 "a converter without missing codes",
             )
@@ -187,22 +203,21 @@ def _refuse_missing_codes(window: Window, record: NDArray[np.float64]) -> None:
 
 
 def fill_dropouts(
-    window: Window, force: NDArray[np.float64], peak: float | None = None
+    section: Section, peak: float | None = None
 ) -> tuple[NDArray[np.float64], tuple[Note, ...]]:
     """Return the force with dropouts and spikes interpolated, and notes, on a flat top too.
 
-    A jump of a dropout is relative to the peak, N: that of the
-    force, if None. Raise InputError if dropouts and spikes last too long.
+    A jump of a dropout is relative to the peak, N: that of the force, if None. Raise InputError if
+    dropouts and spikes last too long.
     """
-    rate = window.sample_rate
-    background = np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
-    offset = float(np.median(background))
+    rate, force = section.sample_rate, section.force
+    offset = float(np.median(section.background))
     if peak is None:
-        contact = force[slice(*window.contact)]
+        contact = force[slice(*section.contact)]
         peak = float(median_filter(contact, MEDIAN).max()) - offset
-    dropouts = _find_dropouts(window, force, offset, peak)
+    dropouts = _find_dropouts(section, force, offset, peak)
     filled = _interpolated(force, dropouts)
-    spikes = _find_spikes(window, filled, peak)
+    spikes = _find_spikes(section, filled, peak)
     filled = _interpolated(filled, dropouts | spikes)
     notes = [
         Note(
@@ -213,31 +228,31 @@ def fill_dropouts(
         if bad.any()
     ]  # fmt: skip
     margin = int(CONTACT_MARGIN * rate)
-    near = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
+    near = slice(max(section.contact[0] - margin, 0), section.contact[1] + margin)
     if np.count_nonzero((dropouts | spikes)[near]) > MAX_REPAIRED * rate:
-        group = int(np.median(_runs(force[slice(*window.contact)])[1]))
+        group = int(np.median(_runs(force[slice(*section.contact)])[1]))
         if group >= MIN_FROZEN:
             refuse(
-                f"{window.name}: {group} samples each are equal: the record was drawn up from "
+                f"{section.name}: {group} samples each are equal: the record was drawn up from "
                 f"{rate / group:g} Hz",
                 f"each sample once, at {rate / group:g} Hz",
             )
         summaries = [f"{n.others['count']} {n.code} of {n.value:.3g} ms in all" for n in notes]
         refuse(
-            f"{window.name}: the record has {' and '.join(summaries)}",
+            f"{section.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
         )
-    top = _check_top(window, filled[slice(*window.contact)] - offset)
-    return filled, (*notes, *check_constant(window, force), *top)
+    top = _check_top(section, filled[slice(*section.contact)] - offset)
+    return filled, (*notes, *check_constant(section), *top)
 
 
-def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[Note, ...]:
+def check_constant(section: Section) -> tuple[Note, ...]:
     """Return a warning if the background is constant, at least in part, and the contact noisy.
 
     Raise InputError if the force is held over first touch or release.
     """
-    rate, (first, stop) = window.sample_rate, window.contact
-    contact, step = force[first:stop], window.quantization.step
+    rate, force, (first, stop) = section.sample_rate, section.force, section.contact
+    contact, step = force[first:stop], section.quantization.step
     noise = _deviation(contact)
     if not noise > max(step, MIN_NOISE * float(np.ptp(contact))):
         return ()
@@ -252,7 +267,7 @@ def check_constant(window: Window, force: NDArray[np.float64]) -> tuple[Note, ..
     outside = len(force) - (stop - first)
     if inside.any() and total < MAX_CONSTANT * 1e3 * outside / rate:
         refuse(
-            f"{window.name}: the force is held, or filled by a line, for {total:.3g} ms at the "
+            f"{section.name}: the force is held, or filled by a line, for {total:.3g} ms at the "
             "contact while the samples around it are noisy",
             "a recording without lost samples",
         )
@@ -292,15 +307,15 @@ def check_jumps(contact: Contact) -> tuple[Note, ...]:
     return ()
 
 
-def _check_top(window: Window, force: NDArray[np.float64]) -> tuple[Note, ...]:
+def _check_top(section: Section, force: NDArray[np.float64]) -> tuple[Note, ...]:
     """Return a warning if the top of a force without offset, N, is flat."""
-    rate = window.sample_rate
+    rate = section.sample_rate
     width = max(1, round(SMOOTHING * rate))
     if len(force) < 2 * width + len(DIFFERENCE):
         return ()
     smooth = uniform_filter1d(force, width)
     peak = smooth.max()
-    noise, step = _deviation(force), window.quantization.step
+    noise, step = _deviation(force), section.quantization.step
     # Noise averages the steps.
     least = max(noise / math.sqrt(width), step if noise < step / 2 else 0.0, MIN_NOISE * peak)
     lowest = MIN_FLAT * least / peak
@@ -341,12 +356,12 @@ def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray
 
 
 def _find_dropouts(
-    window: Window, force: NDArray[np.float64], offset: float, peak: float
+    section: Section, force: NDArray[np.float64], offset: float, peak: float
 ) -> NDArray[np.bool_]:
     """Return whether samples of a force, N, are lost: held, or zero between jumps."""
     lost = np.zeros(len(force), dtype=bool)
-    margin = int(MIN_BACKGROUND * window.sample_rate)
-    first, stop = window.contact[0] + margin, window.contact[1] - margin
+    margin = int(MIN_BACKGROUND * section.sample_rate)
+    first, stop = section.contact[0] + margin, section.contact[1] - margin
     pulse = force[first:stop] - offset
     if not pulse.size:
         return lost
@@ -354,7 +369,7 @@ def _find_dropouts(
     before = np.abs(pulse[starts] - pulse[np.maximum(starts - 1, 0)])
     ends = starts + lengths - 1
     after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
-    limit = max(MIN_JUMP * peak, MIN_STEPS * window.quantization.step)
+    limit = max(MIN_JUMP * peak, MIN_STEPS * section.quantization.step)
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
     # A constant background next to a steep flank is no dropout: it has one jump.
     is_background = np.abs(pulse[starts]) < limit / 2
@@ -364,31 +379,20 @@ def _find_dropouts(
     return lost
 
 
-def _find_spikes(window: Window, force: NDArray[np.float64], peak: float) -> NDArray[np.bool_]:
+def _find_spikes(section: Section, force: NDArray[np.float64], peak: float) -> NDArray[np.bool_]:
     """Return whether samples of a force, N, stand out alone or in pairs."""
     spikes = np.zeros(len(force), dtype=bool)
-    margin = int(SPIKE_MARGIN * window.sample_rate)
-    section = slice(max(window.contact[0] - margin, 0), window.contact[1] + margin)
-    part = force[section]
+    margin = int(SPIKE_MARGIN * section.sample_rate)
+    searched = slice(max(section.contact[0] - margin, 0), section.contact[1] + margin)
+    part = force[searched]
     padded = np.pad(part, 3, mode="edge")
     from_cubic = np.abs(np.convolve(padded, DIFFERENCE, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
     usual = 1.4826 * float(np.median(from_cubic))
     least = max(
-        MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * window.quantization.step
+        MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * section.quantization.step
     )
     limit = np.maximum(MIN_SPIKE_RATIO * _largest_beside(from_cubic, *CLEAN).max(axis=0), least)
-    spikes[section] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
+    spikes[searched] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
     return spikes
-
-
-def read_repaired(
-    signal: Signal, begin: int, repaired: NDArray[np.float64], start: int, stop: int
-) -> NDArray[np.float64]:
-    """Return a force, N, from start to before stop, with repaired samples from `begin` on."""
-    force = signal.read(start, stop)
-    first, last = max(start, begin), min(stop, begin + len(repaired))
-    if first < last:
-        force[first - start : last - start] = repaired[first - begin : last - begin]
-    return force

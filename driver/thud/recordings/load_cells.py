@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, refuse_value
+from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.faults import fill_dropouts, read_repaired, refuse_clipped
+from thud.recordings.config_values import SUM
 from thud.recordings.polarity import MIN_PEAK_RATIO, scan
 
 if TYPE_CHECKING:
@@ -19,13 +19,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Window
+    from thud.recordings.drops import Section
     from thud.recordings.signal import Signal
 
-SUM = "sum"
-# Maximum number of channels that are added.
-MAX_CELLS = 64
-EXAMPLES = '"sum", "F1+F2+F3+F4" or a list of names or numbers'
 HINT = 'channels = "sum" for load cells under one plate, or channel = the force'
 # A direction at the end of a name: Fx, Force_Y, z1.
 AXIS = re.compile(r"(?:^|[^a-z])f?(?P<axis>[xyz])\d*$")
@@ -36,28 +32,6 @@ MAX_DEVIATION = 0.05
 # Minimum magnitude of the impulse of a cell as a fraction of that of the sum: without one of four
 # cells, levels are 2.5 dB too low.
 MIN_SHARE = 0.005
-
-
-def require_channels(value: object, key: str = "channels") -> str | tuple[int | str, ...]:
-    """Return ``"sum"`` or names and numbers of channels; raise InputError if they are neither.
-
-    >>> require_channels("F1 + F2 + 3")
-    ('F1', 'F2', 3)
-    """
-    if isinstance(value, str):
-        if value.strip().casefold() == SUM:
-            return SUM
-        names: Sequence[object] = [
-            int(name) if name.isdecimal() else name for name in map(str.strip, value.split("+"))
-        ]
-    else:
-        names = value if isinstance(value, list | tuple) else ()
-    allowed = 1 < len(names) <= MAX_CELLS and all(
-        isinstance(name, int | str) and not isinstance(name, bool) and name for name in names
-    )
-    if not allowed or len(set(names)) < len(names):
-        refuse_value(key, value, f"{EXAMPLES}, 2 to {MAX_CELLS} different")
-    return tuple(name for name in names if isinstance(name, int | str))
 
 
 def refuse_directions(names: Sequence[str], file: str) -> None:
@@ -120,41 +94,19 @@ def check_signs(cells: Sequence[Signal], peak: float) -> tuple[Note, ...]:
     return tuple(notes)
 
 
-def repair_cells(window: Window) -> tuple[Window, tuple[Note, ...]]:
-    """Return a window whose dropouts are filled in each load cell, and notes.
+def check_cells(section: Section, forces: Sequence[NDArray[np.float64]]) -> list[Note]:
+    """Return a warning for each load cell of a section without a force in the contact.
 
-    Raise InputError if a cell is clipped or has long dropouts, or a cell is the sum of the others.
+    `forces` are those of the cells, N. Raise InputError if a channel is the sum of the others,
+    which would count twice.
     """
-    cells = window.signal.cells
-    forces = [cell.read(window.start, window.stop) for cell in cells]
-    first, stop = window.contact
-    peak = float(np.ptp(np.sum(forces, axis=0)[first:stop]))
-    notes: list[Note] = []
-    filled = []
-    for cell, force in zip(cells, forces, strict=True):
-        section = replace(window, name=cell.name, signal=cell)
-        refuse_clipped(section, force)
-        values, faults = fill_dropouts(section, force, peak)
-        filled.append(values)
-        notes += (replace(note, others={**note.others, "cell": cell.name}) for note in faults)
-    notes += _check_shares(cells, filled, first, stop)
-    repaired = partial(read_repaired, window.signal, window.start, np.sum(filled, axis=0))
-    signal = replace(window.signal, samples=repaired, cells=())
-    return replace(window, signal=signal), tuple(notes)
-
-
-def _check_shares(
-    cells: Sequence[Signal], forces: Sequence[NDArray[np.float64]], first: int, stop: int
-) -> list[Note]:
-    """Return a warning for each cell without a force in a contact, the samples first to stop.
-
-    Raise InputError if a channel is the sum of the others, which would count twice.
-    """
+    first, stop = section.contact
     levels = [
         force[first:stop] - np.median(np.delete(force, slice(first, stop))) for force in forces
     ]
     total = np.sum(levels, axis=0)
     shares = [float(level.sum() / total.sum()) for level in levels]
+    cells = section.cells
     # Two cells may have equal forces, and a cell of the wrong sign, which `check_signs` names,
     # makes another one the sum of the others.
     if len(cells) > 2 and min(shares) > -MIN_OPPOSITE:  # noqa: PLR2004

@@ -6,8 +6,8 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,17 +20,18 @@ from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import find_offset_step, remove_background, step_errors
 from thud.recordings.contact import Contact, find_contact
-from thud.recordings.faults import check_jumps, min_background, repair
+from thud.recordings.faults import check_jumps, min_background
 from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.recordings.drops import Window
+    from thud.recordings.drops import Section
     from thud.recordings.response import Chain
     from thud.recordings.ringing import Ringing
 
@@ -70,34 +71,22 @@ class Drop(Immutable):
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    begin : float
-        Time of the first sample, s; zero is the first touch.
-    force : ndarray, shape (n,)
-        Force without offset, drift, hum and slow noise, N.
-    sample_rate : float
-        Samples per second, Hz.
     onset : float
         Time of first touch in the file, s.
-    gate : tuple of int
-        First and stop index of the contact with its margins: the samples whose levels are measured.
+    contact : Contact
+        Times, background and gate of the contact.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         Units: s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg. NaN if unknown.
+    restitutions : dict of str to Estimate
+        Restitution by ``"impulse"`` and by ``"bounces"``, as far as they are known.
     shared_effects : dict of str to float
         Change of the restitution by one standard uncertainty of calibration, mass, drop height and
         quantized background, which all drops share and the uncertainty of the restitution excludes.
-    restitution_method : str
-        ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
-    restitutions : dict of str to Estimate
-        Restitution by each method.
-    noise : Noise
-        Noise estimated from the background.
     bounces : tuple of float
         Times at which the measured bounces begin, s since first touch: one bounce if the drop
         height is known, else up to two.
     notes : tuple of Note
         Processing of the signal, and possible faults.
-    contact : Contact
-        Times, background and gate of the contact.
     offset_step : float
         Change of the offset during the contact, N; zero if there is none.
     ringing : Ringing or None
@@ -108,31 +97,55 @@ class Drop(Immutable):
     """
 
     name: str
-    begin: float
-    force: NDArray[np.float64]
-    sample_rate: float
     onset: float
-    gate: tuple[int, int]
+    contact: Contact
     contact_time: Estimate
     restitution: Estimate
-    shared_effects: dict[str, float]
-    restitution_method: str
-    restitutions: dict[str, Estimate]
     peak_force: Estimate
     impulse: Estimate
     effective_mass: Estimate
-    noise: Noise
-    bounces: tuple[float, ...]
-    notes: tuple[Note, ...]
-    contact: Contact
+    restitutions: dict[str, Estimate] = field(default_factory=dict)
+    shared_effects: dict[str, float] = field(default_factory=dict)
+    bounces: tuple[float, ...] = ()
+    notes: tuple[Note, ...] = ()
     offset_step: float = 0.0
     ringing: Ringing | None = None
     plate_recorded: bool | None = None
 
     @property
+    def force(self) -> NDArray[np.float64]:
+        """Force without offset, drift, hum and slow noise, N, shape (n,)."""
+        return self.contact.force
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second, Hz."""
+        return self.contact.sample_rate
+
+    @property
+    def begin(self) -> float:
+        """Time of the first sample, s; zero is the first touch."""
+        return self.contact.span[0] / self.sample_rate - self.contact.touch.value
+
+    @property
     def time(self) -> NDArray[np.float64]:
         """Time since first touch, s, shape (n,)."""
         return np.asarray(self.begin + np.arange(len(self.force)) / self.sample_rate)
+
+    @property
+    def gate(self) -> tuple[int, int]:
+        """First and stop index of the contact with its margins, whose levels are measured."""
+        first = self.contact.span[0]
+        return self.contact.gate[0] - first, self.contact.gate[1] - first
+
+    @cached_property
+    def noise(self) -> Noise:
+        """Noise estimated from the background."""
+        first, stop = self.gate
+        force = np.concatenate([self.force[:first], self.force[stop:]])
+        deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
+        white, pink, brown = map(float, self.contact.background.variances[:3])
+        return Noise(deviation, "before and after", white, pink, brown)
 
     def levels(self, bands: BandSet = "octave", method: str = "exact") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
@@ -142,41 +155,22 @@ class Drop(Immutable):
         """
         return measure_levels([self], bands, method)[0].level.copy()
 
+    def plot(self) -> Figure:
+        """Draw the force without background, its gate, and the levels."""
+        from thud.plot.stage_figures import draw_drop
 
-def measure_drop(window: Window, conditions: DropConditions) -> Drop:
-    """Measure one drop in the window around it.
+        return draw_drop(self)
 
-    Raise InputError if the pulse is clipped, cut off or doubled, or has long dropouts.
+
+def measure_drop(section: Section, contact: Contact, conditions: DropConditions) -> Drop:
+    """Return contact time, peak, impulse, restitution and effective mass of a drop.
+
+    `section` is that of the contact, with its bounces. Raise InputError if the contact cannot be
+    distinguished from the noise.
     """
-    force, faults = repair(window)
-    notes, rate = [*window.notes, *faults], window.sample_rate
-    try:
-        quiet, removed, background = remove_background(
-            force, rate, window.contact, window.quantization
-        )
-        contact = find_contact(quiet, removed, background, rate, window.contact, window.chain)
-    except np.linalg.LinAlgError as error:
-        refuse(
-            f"{window.name}: the background is not noise",
-            "a background of noise, drift and hum",
-            error,
-        )
-    for side, length in zip(("before", "after"), contact.background_lengths, strict=True):
-        if length < SHORT_BACKGROUND:
-            note = Note("short_background", unit="ms", others={"side": side})
-            notes.append(replace(note, value=1e3 * length, low=1e3 * SHORT_BACKGROUND))
-    contact_time = _between(contact.begin, contact.end)
-    if not contact_time.value > MIN_CONTACT_RATIO * contact_time.uncertainty:
-        refuse(
-            f"{window.name}: the contact cannot be distinguished from the noise: "
-            f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
-            f"{1e3 * contact_time.uncertainty:.2g} ms",
-            f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
-        )
-    if window.chain is None:
-        notes += check_jumps(contact)
+    notes = [*section.notes, *contact.notes, *_check_contact(section, contact)]
     impulse, peak_force = _impulse(contact), _peak(contact)
-    offset_step = find_offset_step(background, impulse.value)
+    offset_step = find_offset_step(contact.background, impulse.value)
     if offset_step:
         notes.append(Note("offset_step", value=offset_step, unit="N", effect=0.0))
         errors = step_errors(offset_step, len(contact.gated))
@@ -184,55 +178,83 @@ def measure_drop(window: Window, conditions: DropConditions) -> Drop:
         impulse = _with_half_width(impulse, float(np.abs(error_impulses).max()))
         peak_force = _with_half_width(peak_force, float(np.abs(errors).max()))
     # The first flight gives the restitution; without the height two flights are compared.
-    landings = _landings(window, contact, 1 if conditions.height else 2)
-    if conditions.height and landings:
-        flight = _between(contact.release, landings[0][0]).value
-        peak = _peak_above_background(window.bounces[0]) / contact.peak
-        expected = GRAVITY * flight / (2 * conditions.speed)
-        if not peak / MAX_BOUNCE_RATIO < expected < peak * MAX_BOUNCE_RATIO:
-            landings = []
-            others = {"ratio": peak, "height": conditions.height}
-            notes.append(
-                Note("no_bounce", value=1e3 * flight, unit="ms", effect=0.0, others=others)
-            )
+    landings = _landings(section, contact, 1 if conditions.height else 2)
+    no_bounce = _check_bounce(section, contact, landings, conditions)
+    landings = [] if no_bounce else landings
     ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     duration = _between(contact.touch, contact.release)
     methods, unknown = conditions.restitutions(impulse, duration, flights)
-    notes += (*_check_aliasing(contact, window.chain), *_check_step(window, contact), *unknown)
+    notes += (*no_bounce, *_check_aliasing(contact, section.chain), *_check_step(contact), *unknown)
     restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
-    first = contact.span[0]
     return Drop(
-        name=window.name,
-        begin=first / rate - contact.touch.value,
-        force=contact.force,
-        sample_rate=rate,
-        onset=window.start / rate + contact.touch.value,
-        gate=(contact.gate[0] - first, contact.gate[1] - first),
-        contact_time=contact_time,
+        name=section.name,
+        onset=section.start / section.sample_rate + contact.touch.value,
+        contact=contact,
+        contact_time=_between(contact.begin, contact.end),
         restitution=restitution,
-        shared_effects=shared,
-        restitution_method=" and ".join(methods),
-        restitutions=methods,
         peak_force=peak_force,
-        offset_step=offset_step,
         impulse=impulse,
         effective_mass=conditions.effective_mass(impulse, duration, methods.get(BOUNCES)),
-        noise=_noise(contact),
+        restitutions=methods,
+        shared_effects=shared,
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
-        notes=(*contact.notes, *notes),
-        contact=contact,
+        notes=tuple(notes),
+        offset_step=offset_step,
     )
+
+
+def _check_contact(section: Section, contact: Contact) -> list[Note]:
+    """Return warnings on a short background and on jumps of the force.
+
+    Raise InputError if the contact cannot be distinguished from the noise.
+    """
+    time = _between(contact.begin, contact.end)
+    if not time.value > MIN_CONTACT_RATIO * time.uncertainty:
+        refuse(
+            f"{section.name}: the contact cannot be distinguished from the noise: "
+            f"{1e3 * time.value:.3g} ms with a standard uncertainty of "
+            f"{1e3 * time.uncertainty:.2g} ms",
+            f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
+        )
+    notes = [
+        Note(
+            "short_background", value=1e3 * length, low=1e3 * SHORT_BACKGROUND, unit="ms",
+            others={"side": side},
+        )
+        for side, length in zip(("before", "after"), contact.background_lengths, strict=True)
+        if length < SHORT_BACKGROUND
+    ]  # fmt: skip
+    return notes if section.chain else [*notes, *check_jumps(contact)]
+
+
+def _check_bounce(
+    section: Section,
+    contact: Contact,
+    landings: list[tuple[Estimate, Estimate]],
+    conditions: DropConditions,
+) -> tuple[Note, ...]:
+    """Return a warning if the force of a bounce contradicts its flight."""
+    if not (conditions.height and landings):
+        return ()
+    flight = _between(contact.release, landings[0][0]).value
+    bounce = section.bounces[0]
+    peak = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
+    ratio, expected = peak / contact.peak, GRAVITY * flight / (2 * conditions.speed)
+    if ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
+        return ()
+    others = {"ratio": ratio, "height": conditions.height}
+    return (Note("no_bounce", value=1e3 * flight, unit="ms", effect=0.0, others=others),)
 
 
 def _between(start: Estimate, end: Estimate) -> Estimate:
     return Estimate(end.value - start.value, math.hypot(end.uncertainty, start.uncertainty))
 
 
-def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
+def _landings(section: Section, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
     """Return first touch and release of each of the first bounces, s from the start."""
     landings = []
-    for bounce in window.bounces[:count]:
+    for bounce in section.bounces[:count]:
         first, stop = bounce.contact
         minimum = min_background(bounce.sample_rate)
         if first < minimum or len(bounce.force) - stop < minimum:
@@ -242,20 +264,13 @@ def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate,
             bounce.force, rate, bounce.contact, bounce.quantization, drop.background
         )
         landing = find_contact(quiet, removed, background, rate, bounce.contact, bounce.chain)
-        delay = (bounce.start - window.start) / rate
+        delay = (bounce.start - section.start) / rate
         begin, end = (
             Estimate(delay + edge.value, edge.uncertainty)
             for edge in (landing.touch, landing.release)
         )
         landings.append((begin, end))
     return landings
-
-
-def _peak_above_background(window: Window) -> float:
-    first, stop = window.contact
-    force = window.force
-    background = np.concatenate([force[:first], force[stop:]])
-    return float(force[first:stop].max() - np.median(background))
 
 
 def _impulse(contact: Contact) -> Estimate:
@@ -310,20 +325,13 @@ def _interpolated(force: NDArray[np.float64], rate: float) -> NDArray[np.float64
     return np.asarray(resample(low, factor * len(low))) if factor > 1 else low
 
 
-def _noise(contact: Contact) -> Noise:
-    first, stop = (index - contact.span[0] for index in contact.gate)
-    force = np.concatenate([contact.force[:first], contact.force[stop:]])
-    deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
-    white, pink, brown = map(float, contact.background.variances[:3])
-    return Noise(deviation, "before and after", white, pink, brown)
-
-
-def _check_step(window: Window, contact: Contact) -> tuple[Note, ...]:
+def _check_step(contact: Contact) -> tuple[Note, ...]:
     """Return a warning if the background of a coarse record lies within a quantization step."""
-    step, offset = window.quantization.step, contact.background.quantization.offset
-    if offset < MAX_OFFSET * contact.peak:
+    quantization = contact.background.quantization
+    if quantization.offset < MAX_OFFSET * contact.peak:
         return ()
-    return (Note("coarse_steps", value=offset, unit="N", others={"step": step}),)
+    others = {"step": quantization.step}
+    return (Note("coarse_steps", value=quantization.offset, unit="N", others=others),)
 
 
 def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[Note, ...]:

@@ -28,8 +28,6 @@ TOLERANCE = 0.02
 # Minimum ratio 1/r of resonance and highest band edge: an error of 1 % of the resonance causes an
 # error of 2 r**2 / (1 - r**2) = 2 % of the force at this edge, the tolerance of the standard.
 MIN_RATIO = math.sqrt(2)
-# Duration of the ringing of a plate: periods per quality factor.
-RINGING = 2.0
 
 
 @dataclass(frozen=True)
@@ -80,11 +78,6 @@ class Plate(Table):
     def highest(self) -> float:
         """Highest corrected frequency, Hz: above the resonance the response falls to 1/3 there."""
         return self.f0 * math.sqrt(1 + self.mode_share / (4 / 3 - self.mode_share))
-
-    @property
-    def decay(self) -> float:
-        """Duration of the ringing, s."""
-        return RINGING * self.Q / self.f0
 
     def note(self, sample_rate: float) -> Note:
         """Return a note on the correction at a sample rate, Hz."""

@@ -12,7 +12,7 @@ from scipy.special import ndtr
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Window
+    from thud.recordings.drops import Section
 
 # Maximum length of the background on either side of the contact, s: a longer one lowers the noise
 # of the offset by less than 5 %. Margin between them, s.
@@ -50,12 +50,9 @@ class Quantization:
     offset: float = 0.0
 
 
-def find_quantization(window: Window) -> Quantization:
+def find_quantization(section: Section) -> Quantization:
     """Return the errors due to quantization of a recorded drop; of load cells, their sum."""
-    found = [
-        _quantization(cell.read(window.start, window.stop), window)
-        for cell in window.signal.cells or (window.signal,)
-    ]
+    found = [_quantization(part) for part in section.cells or (section,)]
     return Quantization(
         max(entry.step for entry in found),
         sum(entry.density for entry in found),
@@ -63,9 +60,8 @@ def find_quantization(window: Window) -> Quantization:
     )
 
 
-def _quantization(force: NDArray[np.float64], window: Window) -> Quantization:
-    first, stop = window.contact
-    rate = window.sample_rate
+def _quantization(section: Section) -> Quantization:
+    force, rate, (first, stop) = section.force, section.sample_rate, section.contact
     length, margin = int(MAX_BACKGROUND * rate), int(MARGIN * rate)
     before = force[max(first - length, 0) : max(first - margin, 1)]
     after = force[min(stop + margin, len(force) - 1) : stop + length]

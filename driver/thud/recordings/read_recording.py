@@ -1,42 +1,111 @@
-"""Recorded drops of one source, from files."""
+"""Recorded drops of one source: from files to levels, stage by stage."""
 
 from __future__ import annotations
 
+import math
 import os
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+from tqdm import tqdm
 
 from thud.base.arguments import check_arguments
+from thud.base.checks import refuse
+from thud.base.note import Note, about
+from thud.recordings.assumptions import with_assumptions
+from thud.recordings.background import remove_background
+from thud.recordings.choice import choose, require_chosen
 from thud.recordings.config import Config, read_config
-from thud.recordings.recording import Recording
+from thud.recordings.contact import find_contact
+from thud.recordings.drops import Section, cut_section, find_drops
+from thud.recordings.faults import repair
+from thud.recordings.measured_drop import Drop, measure_drop
+from thud.recordings.polarity import check_peak, scan
+from thud.recordings.recording import Origin, Recording
+from thud.recordings.response import correct
+from thud.recordings.ringing import with_plate
+from thud.recordings.same_drops import (
+    Record,
+    Spans,
+    refuse_copy,
+    refuse_same_drops,
+    refuse_simultaneous_channels,
+)
+from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
-    from thud.base._schema import LimitsSource
+    from matplotlib.figure import Figure
+
+    from thud.recordings.force_units import Calibration
+
+    Source = str | os.PathLike[str] | Signal
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """One drop after each stage of its measurement.
+
+    Attributes
+    ----------
+    section : Section
+        As recorded.
+    repaired : Section
+        With dropouts and spikes filled.
+    corrected : Section
+        After the correction of the instruments.
+    drop : Drop
+        Without background, measured.
+    """
+
+    section: Section
+    repaired: Section
+    corrected: Section
+    drop: Drop
+
+    def plot(self) -> Figure:
+        """Draw the force after each stage, and the levels."""
+        from thud.plot.stage_figures import draw_stages
+
+        return draw_stages(self)
+
+
+def measure_stages(section: Section, config: Config, calibration: float | None = None) -> Stages:
+    """Measure the drop in a section; `calibration` is the relative uncertainty of the force.
+
+    The levels of drops are `thud.recordings.recorded_levels.measure_levels`, their budget is
+    `Recording.level_estimates`. Raise InputError if the drop cannot be measured.
+    """
+    repaired = repair(section)
+    corrected = correct(repaired, config.chain)
+    force, rate, span = corrected.force, corrected.sample_rate, corrected.contact
+    try:
+        quiet, removed, background = remove_background(force, rate, span, corrected.quantization)
+        contact = find_contact(quiet, removed, background, rate, span, config.chain)
+    except np.linalg.LinAlgError as error:
+        allowed = "a background of noise, drift and hum"
+        refuse(f"{section.name}: the background is not noise", allowed, error)
+    drop = measure_drop(corrected, contact, config.conditions(calibration))
+    drop = with_plate(drop, repaired, config)
+    drop = with_assumptions(drop, config)
+    # A copy without the cached factors of the background, which are no longer needed.
+    contact = replace(contact, background=replace(contact.background))
+    drop = replace(drop, contact=contact, notes=about(drop.name, drop.notes))
+    return Stages(section, repaired, corrected, drop)
 
 
 @check_arguments
-def read_recording(  # noqa: PLR0913 - the keys of the configuration
-    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
+    paths: Source | Iterable[Source],
     *,
     height: float | None = None,
     mass: float | None = None,
-    height_uncertainty: float | None = None,
-    mass_uncertainty: float | None = None,
-    source: LimitsSource | None = None,
-    channel: int | str | None = None,
-    channels: str | Sequence[int | str] | None = None,
-    unit: str | None = None,
-    calibration: float | str | Sequence[float | str] | None = None,
-    calibration_uncertainty: float | None = None,
-    polarity: str | None = None,
-    sample_rate: float | None = None,
-    drops: str | None = None,
-    leave_out: Mapping[str, str] | None = None,
-    begin: float | None = None,
-    end: float | None = None,
+    calibration: Calibration | float | str | Sequence[Calibration | float | str] | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> Recording:
@@ -45,27 +114,16 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     Parameters
     ----------
     paths
-        Files; see docs/recordings_reading.md for the formats.
+        Files (docs/recordings_reading.md states the formats), or signals.
     height
         Drop height, m.
     mass
         Mass of the source, kg. Mass and height give the restitution by the impulse.
-    height_uncertainty, mass_uncertainty
-        Their standard uncertainties, m and kg.
-    source
-        Source whose limits apply, ``"rubber_ball"`` or ``"tyre"``.
-    channel, channels, unit, calibration, polarity, sample_rate
-        As for `open_signals`.
-    calibration_uncertainty
-        Relative standard uncertainty of the force.
-    drops
-        Numbers of the drops to be measured, such as ``"1-5, 8"``. They count over all files.
-    leave_out
-        Numbers of drops to be left out, with the reason: ``{"3": "touched"}``.
-    begin, end
-        Section of each file that is searched for drops, s.
+    calibration
+        N per unit of the file, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or one for each
+        load cell.
     config
-        Configuration of the laboratory, or its file; other arguments override it.
+        What else the laboratory states, or its file; other arguments override it.
     progress
         Show progress bars.
 
@@ -78,22 +136,78 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     InputError
         If a file cannot be read or a drop cannot be measured.
     """
-    settings = config if isinstance(config, Config) else read_config(config) if config else Config()
-    stated: dict[str, Any] = {
-        "height": height, "mass": mass, "height_uncertainty": height_uncertainty,
-        "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel,
-        "channels": channels, "unit": unit,
-        "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
-        "polarity": polarity, "sample_rate": sample_rate,
-        "drops": drops, "leave_out": leave_out, "begin": begin, "end": end,
-    }  # fmt: skip
-    stated = {key: value for key, value in stated.items() if value is not None}
-    # Either choice of channels overrides both of the configuration.
-    if stated.keys() & {"channel", "channels"}:
-        settings = replace(settings, channel=None, channels=None)
-    if leave_out:
-        stated["leave_out"] = {**settings.leave_out, **leave_out}
-    settings = replace(settings, **stated)
-    files = [paths] if isinstance(paths, str | os.PathLike) else paths
-    signals = (signal for path in files for signal in open_signals(path, settings))
-    return Recording.from_signals(signals, settings, progress=progress)
+    config = config if isinstance(config, Config) else read_config(config) if config else Config()
+    config = config.updated(height=height, mass=mass, calibration=calibration)
+    records: list[Record] = []
+    searched: list[Spans] = []
+    origins: list[Origin] = []
+    uncertainties: list[float | None] = []
+    count = 0
+    # BLAS threads slow down the many small matrix products.
+    with threadpool_limits(1, "blas"):
+        for signal in _open(paths, config):
+            refuse_copy(signal, records)
+            search = find_drops(
+                signal, config.begin or 0.0, config.end or math.inf, progress=progress
+            )
+            # Small pulses may be what a channel picks up of another one.
+            spans = Spans.of(signal, [drop for drop in search.drops if not drop.left_out])
+            refuse_simultaneous_channels(spans, searched)
+            searched.append(spans)
+            chosen, left_out = choose(search.drops, count + 1, signal.sample_rate, config)
+            count += len(search.drops)
+            uncertainty = signal.calibration_uncertainty
+            if config.calibration_uncertainty is not None:
+                uncertainty = config.calibration_uncertainty
+            uncertainties.append(uncertainty)
+            bar = tqdm(chosen, unit="drop", desc=signal.name, disable=not progress, leave=False)
+            drops = tuple(
+                measure_stages(cut_section(signal, pulse), config, uncertainty).drop
+                for pulse in bar
+            )
+            records.append(Record(signal.name, signal.path, signal.checksum, drops))
+            notes = (*_section(signal, config), *search.ignored, *left_out)
+            origins.append(Origin.of(signal, len(drops), notes))
+    if not records:
+        refuse("there are no recordings", "one file or more")
+    drops = tuple(drop for record in records for drop in record.drops)
+    require_chosen(count, len(drops), config)
+    refuse_same_drops(records)
+    known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
+    largest = max(known) if len(known) == len(uncertainties) else None
+    name = Path(origins[0].path or origins[0].name).stem
+    return Recording(name, drops, tuple(origins), config, largest)
+
+
+def first_stages(paths: Source | Iterable[Source], config: Config) -> Stages:  # noqa: RET503
+    """Return the stages of the first measured drop; the arguments are those of `read_recording`."""
+    count = 0
+    for signal in _open(paths, config):
+        found = find_drops(signal, config.begin or 0.0, config.end or math.inf).drops
+        chosen, _ = choose(found, count + 1, signal.sample_rate, config)
+        count += len(found)
+        if chosen:
+            return measure_stages(cut_section(signal, chosen[0]), config)
+    refuse("every drop is left out", "at least one drop")
+
+
+def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
+    """Yield the signals of files, and signals themselves, whose peaks are checked."""
+    for item in [paths] if isinstance(paths, str | os.PathLike | Signal) else paths:
+        if not isinstance(item, Signal):
+            yield from open_signals(item, config)
+        elif item.path:
+            yield item
+        else:
+            extremes = scan(item.read, item.n_sample, item.name)
+            notes = check_peak(extremes, 1.0, item.name, assumed=False)
+            yield replace(item, notes=(*item.notes, *notes))
+
+
+def _section(signal: Signal, config: Config) -> tuple[Note, ...]:
+    """Return a note if a section of a signal is searched, not all of it."""
+    length = signal.n_sample / signal.sample_rate
+    begin, end = config.begin or 0.0, min(config.end or math.inf, length)
+    if begin == 0 and end == length:
+        return ()
+    return (Note("section_searched", low=begin, high=end, unit="s"),)

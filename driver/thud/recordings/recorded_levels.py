@@ -22,6 +22,7 @@ from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -77,6 +78,12 @@ class DropLevels(Immutable):
         """Combined standard uncertainty by `contributions`, dB, shape (n_band,)."""
         squares = [value**2 for value in self.contributions.values()]
         return np.asarray(np.sqrt(np.sum(squares, axis=0)))
+
+    def plot(self) -> Figure:
+        """Draw the levels with their standard uncertainty, and the background."""
+        from thud.plot.stage_figures import draw_levels
+
+        return draw_levels(self)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import bessel, butter, freqs_zpk
 
 from thud.base.checks import refuse
 from thud.base.note import Note
@@ -21,8 +20,6 @@ KINDS = ("bessel", "butterworth")
 MAX_ORDER = 12
 # Response at the highest corrected frequency: there the correction amplifies the noise by 3.
 LOWEST_RESPONSE = 1 / 3
-# Duration of the response to an impulse, in periods of the cutoff.
-DECAY = 8.0
 # If no filter is stated, it is assumed to be at worst a Bessel filter of this order whose cutoff is
 # this fraction of the sample rate.
 ASSUMED_ORDER = 4
@@ -54,6 +51,9 @@ class RecorderFilter(Table):
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the ratio of output and input, at frequencies in Hz."""
+        # SciPy is slow to import, and a configuration is read by every command.
+        from scipy.signal import bessel, butter, freqs_zpk
+
         if self.kind == "bessel":
             zpk = bessel(self.order, self.cutoff, analog=True, output="zpk", norm="mag")
         else:
@@ -66,11 +66,6 @@ class RecorderFilter(Table):
         frequency = self.cutoff * np.geomspace(1, 8, 400)
         falling = np.abs(self.response(frequency))[::-1]
         return float(np.interp(LOWEST_RESPONSE, falling, frequency[::-1]))
-
-    @property
-    def decay(self) -> float:
-        """Duration of the response to an impulse, s."""
-        return DECAY / self.cutoff
 
     def note(self, sample_rate: float) -> Note:
         """Return a note on the correction at a sample rate, Hz."""

@@ -5,30 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
-from thud.base.checks import require_kind, require_whole
+from thud.base.checks import require_whole
 from thud.base.extras import data_frame, require_extra
-from thud.base.note import Note
+from thud.base.note import Note, about
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
 from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.recordings.assumptions import check_assumptions, instrument_contributions
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
-from thud.recordings.measure_drops import measure_signals
 from thud.recordings.measured_drop import ESTIMATES
-from thud.recordings.polarity import check_peak, scan
 from thud.recordings.recorded_levels import (
     average_levels,
     compare_methods,
     mean_force,
     measure_levels,
 )
-from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -36,15 +32,47 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
     from thud.impact.impact import Impact
     from thud.level.assessment import Verdict
     from thud.level.estimate import Estimate
-    from thud.recordings.measure_drops import Origin
     from thud.recordings.measured_drop import Drop
     from thud.recordings.recorded_levels import AverageLevels
+    from thud.recordings.signal import Signal
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Signal from which drops were measured: attributes of `Signal`, and the number of drops.
+
+    Its notes are those of the signal, and on pulses that are not measured.
+    """
+
+    name: str
+    path: str
+    checksum: str
+    date: str
+    calibration: str
+    sample_rate: float
+    notes: tuple[Note, ...]
+    drops: int
+
+    @classmethod
+    def of(cls, signal: Signal, drops: int, notes: Iterable[Note]) -> Origin:
+        """Return the origin of a number of drops of a signal, with notes on others."""
+        return cls(
+            signal.name,
+            signal.path,
+            signal.checksum,
+            signal.date,
+            signal.calibration,
+            signal.sample_rate,
+            (*signal.notes, *about(signal.name, notes)),
+            drops,
+        )
+
 
 # Uncertainties of levels that a laboratory may not have stated.
 LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
@@ -71,6 +99,15 @@ class Recording(ImpactOrRecording):
         Relative standard uncertainty of the force; None if unknown.
     """
 
+    # Of every `ImpactResult`: a recording has only the force on the floor, and no floor or room.
+    touch_time: ClassVar[float] = 0.0
+    level_method: ClassVar[LevelsMethod] = "exact"
+    # Relative tolerance of the velocity, for a drop height of at least 0.85 m ± 1 cm.
+    velocity_tolerance: ClassVar[float] = 0.015
+    case: ClassVar[Case] = Case(model=None)
+    on_floor: ClassVar[None] = None
+    room_level: ClassVar[None] = None
+
     name: str
     drops: tuple[Drop, ...]
     origins: tuple[Origin, ...]
@@ -92,63 +129,6 @@ class Recording(ImpactOrRecording):
         """Return the criteria as rows of text with a header."""
         return self.assess().rows()
 
-    @classmethod
-    def from_array(  # noqa: PLR0913 - keys of the configuration
-        cls,
-        force: ArrayLike,
-        sample_rate: float,
-        *,
-        height: float | None = None,
-        mass: float | None = None,
-        height_uncertainty: float | None = None,
-        mass_uncertainty: float | None = None,
-        calibration_uncertainty: float | None = None,
-        name: str = "recording",
-    ) -> Recording:
-        """Measure the drops in a force record.
-
-        Parameters
-        ----------
-        force : array_like, shape (n_sample,)
-            Force, N, positive in compression, with background before and after each drop.
-        sample_rate
-            Samples per second, Hz.
-        height, mass, height_uncertainty, mass_uncertainty, calibration_uncertainty, name
-            As for `read_recording`.
-
-        Raises
-        ------
-        InputError
-            If a drop cannot be measured.
-        """
-        config = Config(
-            height=height,
-            mass=mass,
-            height_uncertainty=height_uncertainty,
-            mass_uncertainty=mass_uncertainty,
-            calibration_uncertainty=calibration_uncertainty,
-        )
-        signal = Signal.from_array(force, sample_rate, name)
-        notes = check_peak(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
-        return cls.from_signals([replace(signal, notes=notes)], config)
-
-    @classmethod
-    def from_signals(
-        cls,
-        signals: Iterable[Signal],
-        config: Config,
-        *,
-        progress: bool = False,
-    ) -> Recording:
-        """Measure the drops of signals; the other arguments are those of `read_recording`.
-
-        Raise InputError if a drop cannot be measured.
-        """
-        require_kind("config", config, Config)
-        drops, origins, uncertainty = measure_signals(signals, config, progress=progress)
-        name = Path(origins[0].path or origins[0].name).stem
-        return cls(name, drops, origins, config, uncertainty)
-
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of the first drop since first touch, s, shape (n_sample,)."""
@@ -159,32 +139,9 @@ class Recording(ImpactOrRecording):
         """Samples per second of the first drop, Hz."""
         return self.drops[0].sample_rate
 
-    @property
-    def touch_time(self) -> float:
-        """Time of first touch, s: 0."""
-        return 0.0
-
-    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - as for impacts
+    def assessed_force(self, _: LevelsForce | None = None) -> LevelsForce:
         """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
-
-    @property
-    def level_method(self) -> LevelsMethod:
-        """Method of the levels: ``"exact"``."""
-        return "exact"
-
-    @property
-    def case(self) -> Case:
-        """Case without a model, a floor or a room."""
-        return Case(model=None)
-
-    @property
-    def on_floor(self) -> None:
-        """None: the force on a mobile floor is not known."""
-
-    @property
-    def room_level(self) -> None:
-        """None: a recording has no room."""
 
     @property
     def limits_source(self) -> LimitsSource | None:
@@ -200,11 +157,6 @@ class Recording(ImpactOrRecording):
     def impact_velocity(self) -> float:
         """Velocity at first touch from the stated drop height, m/s; NaN if none is stated."""
         return self.config.conditions(None).speed
-
-    @property
-    def velocity_tolerance(self) -> float:
-        """Relative tolerance of the velocity, for a drop height of at least 0.85 m ± 1 cm."""
-        return 0.015
 
     @property
     def contact_time(self) -> float:
@@ -282,8 +234,8 @@ class Recording(ImpactOrRecording):
             return float(np.mean([getattr(drop, name).value for drop in self.drops]))
         return super().quantity(name)
 
-    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - as for impacts
-        """Return the corrected force of the first drop, N, shape (n_sample,), for any `kind`."""
+    def force(self, _: LevelsForce | None = None) -> NDArray[np.float64]:
+        """Return the corrected force of the first drop, N, shape (n_sample,)."""
         return self.drops[0].force
 
     def mean_force(self) -> NDArray[np.float64]:
@@ -294,7 +246,7 @@ class Recording(ImpactOrRecording):
         """
         return mean_force(self.drops, self.average("third").level)
 
-    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - as for impacts
+    def peak(self, _: LevelsForce | None = None) -> float:
         """Return the mean maximum force, N."""
         return self.peak_force
 
@@ -379,11 +331,14 @@ class Recording(ImpactOrRecording):
         return impact_dataset(self, histories, {"recording": self.name})
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the force of the first drop over time.
+        """Return the forces of all drops over time, N and s since first touch, with their numbers.
 
         Raise InputError if pandas is not installed.
         """
-        return data_frame({"floor_force_N": self.force()}, self.time)
+        numbers = [np.full(len(drop.force), k) for k, drop in enumerate(self.drops, start=1)]
+        forces = np.concatenate([drop.force for drop in self.drops])
+        times = np.concatenate([drop.time for drop in self.drops])
+        return data_frame({"drop": np.concatenate(numbers), "floor_force_N": forces}, times)
 
     def drop_force(self, drop: int = 1) -> DropForce:
         """Return the force of one contact, zero before and after; `drop` is its number from 1."""

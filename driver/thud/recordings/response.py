@@ -4,68 +4,34 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len
 
 from thud.level.levels import get_bands
-from thud.recordings.faults import read_repaired, repair
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.base.note import Note
-    from thud.recordings.drops import Window
-    from thud.recordings.signal import Signal
+    from thud.recordings.drops import Section
+    from thud.recordings.plate import Plate
+    from thud.recordings.recorder_filter import RecorderFilter
 
 # Minimum response by which a spectrum is divided.
 MIN_RESPONSE = 0.05
-
-
-class Response(Protocol):
-    """Response of one instrument between force and record."""
-
-    @property
-    def highest(self) -> float:
-        """Highest corrected frequency, Hz."""
-        ...
-
-    @property
-    def decay(self) -> float:
-        """Duration of the response to an impulse, s."""
-        ...
-
-    def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the ratio of measured and applied force, at frequencies in Hz."""
-        ...
-
-    def note(self, sample_rate: float) -> Note:
-        """Return a note on the correction at a sample rate, Hz."""
-        ...
-
-    def require_above(self, edge: float) -> None:
-        """Raise InputError if bands up to an edge, Hz, cannot be corrected."""
-        ...
 
 
 @dataclass(frozen=True)
 class Chain:
     """Instruments in series whose responses are corrected: force plate, filter of the recorder."""
 
-    instruments: tuple[Response, ...]
+    instruments: tuple[Plate | RecorderFilter, ...]
 
     @property
     def highest(self) -> float:
         """Highest corrected frequency, Hz."""
         return min(instrument.highest for instrument in self.instruments)
-
-    @property
-    def decay(self) -> float:
-        """Duration of the response to an impulse, s."""
-        return max(instrument.decay for instrument in self.instruments)
 
     def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the ratio of measured and applied force, at frequencies in Hz."""
@@ -92,6 +58,8 @@ def correct_force(
     is in Hz. Raise InputError if a response does not allow a correction up to the highest edge of
     the bands.
     """
+    from scipy.fft import next_fast_len
+
     for instrument in chain.instruments:
         instrument.require_above(get_bands(bands).upper[-1])
     # The impulse response decays within some periods of the highest corrected frequency.
@@ -110,26 +78,18 @@ def correct_force(
     return corrected
 
 
-def correct_window(window: Window, chain: Chain) -> tuple[Window, tuple[Note, ...]]:
-    """Return a window of the applied force, and notes.
+def correct(section: Section, chain: Chain | None) -> Section:
+    """Return a section of the applied force, and of its bounces, with notes on the instruments.
 
-    Raise InputError if the pulse is cut off, clipped or doubled, or has long dropouts.
+    Faults must be repaired before: a dropout would ring in the correction.
     """
-    # Faults must be found in the recorded force; the correction would make a dropout ring.
-    force, notes = repair(window)
-    repaired = replace(
-        window.signal, samples=partial(read_repaired, window.signal, window.start, force)
+    if chain is None:
+        return section
+    rate = section.sample_rate
+    return replace(
+        section,
+        force=correct_force(section.force, rate, chain),
+        bounces=tuple(correct(bounce, chain) for bounce in section.bounces),
+        chain=chain,
+        notes=(*section.notes, *(instrument.note(rate) for instrument in chain.instruments)),
     )
-    applied = replace(
-        window.signal, samples=partial(_read_corrected, repaired, chain), full_scale=None
-    )
-    bounces = tuple(replace(bounce, signal=applied, chain=chain) for bounce in window.bounces)
-    notes += tuple(instrument.note(window.sample_rate) for instrument in chain.instruments)
-    return replace(window, signal=applied, bounces=bounces, chain=chain), notes
-
-
-def _read_corrected(signal: Signal, chain: Chain, start: int, stop: int) -> NDArray[np.float64]:
-    margin = math.ceil(chain.decay * signal.sample_rate)
-    first, last = max(start - margin, 0), min(stop + margin, signal.n_sample)
-    corrected = correct_force(signal.read(first, last), signal.sample_rate, chain)
-    return corrected[start - first : stop - first]

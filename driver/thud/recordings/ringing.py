@@ -14,8 +14,10 @@ from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, reso
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.recordings.config import Config
     from thud.recordings.contact import Contact
-    from thud.recordings.drops import Window
+    from thud.recordings.drops import Section
+    from thud.recordings.measured_drop import Drop
     from thud.recordings.plate import Plate
     from thud.recordings.response import Chain
 
@@ -65,6 +67,20 @@ class Ringing:
         code = "plate_rings_differently" if self.corrected else "plate_rings"
         others = {"frequency": self.frequency, "quality": self.quality}
         return Note(code, value=self.amplitude, unit="N", effect=0.0, others=others)
+
+
+def with_plate(drop: Drop, recorded: Section, config: Config) -> Drop:
+    """Return a drop with the ringing of the plate, and whether its resonance is in the record.
+
+    `recorded` is the section before the correction of the plate.
+    """
+    ringing, plate = find_ringing(drop.contact, config.chain), config.resonance
+    return replace(
+        drop,
+        ringing=ringing,
+        plate_recorded=None if plate is None else is_in_record(recorded, drop.contact, plate),
+        notes=(*drop.notes, ringing.note) if ringing else drop.notes,
+    )
 
 
 def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None:
@@ -122,7 +138,7 @@ def _fitted(
     return resonance(frequency, decay)
 
 
-def is_in_record(recorded: Window, contact: Contact, plate: Plate) -> bool | None:
+def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | None:
     """Return whether the resonance of a stated plate is in the recorded force; None if unclear.
 
     It is if the recorded force rings at its frequency. Else the energy of the pulse near the

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Window
+    from thud.recordings.drops import Pulse
     from thud.recordings.measured_drop import Drop
     from thud.recordings.signal import Signal
 
@@ -69,34 +69,34 @@ def refuse_copy(signal: Signal, others: Sequence[Record]) -> None:
             )
 
 
-def refuse_simultaneous_channels(
-    windows: Sequence[Window], others: Sequence[tuple[str, Sequence[Window]]]
-) -> None:
-    """Raise InputError if another channel of a file has a drop at the same instant.
+@dataclass(frozen=True)
+class Spans:
+    """Begins and ends of the contacts in one channel of a file, s, shape (n_drop,)."""
 
-    `others` are the path and the windows of other channels.
-    """
-    signal = windows[0].signal
-    spans = _spans(windows)
-    for path, other in others:
-        if path != signal.path or not path:
+    name: str
+    path: str
+    begin: NDArray[np.float64]
+    end: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, signal: Signal, drops: Sequence[Pulse]) -> Spans:
+        """Return the spans of the drops that were found in a signal."""
+        begin, end = np.array([drop.contact for drop in drops]).T / signal.sample_rate
+        return cls(signal.name, signal.path, begin, end)
+
+
+def refuse_simultaneous_channels(spans: Spans, others: Sequence[Spans]) -> None:
+    """Raise InputError if another channel of a file has a drop at the same instant."""
+    for other in others:
+        if other.path != spans.path or not other.path:
             continue
-        begin, end = _spans(other)
-        if ((spans[0][:, None] < end) & (spans[1][:, None] > begin)).any():
+        if ((spans.begin[:, None] < other.end) & (spans.end[:, None] > other.begin)).any():
             refuse(
-                f"{signal.name}: has drops at the same instants as {other[0].signal.name}; "
-                "simultaneous forces are never averaged",
+                f"{spans.name}: has drops at the same instants as {other.name}; simultaneous "
+                "forces are never averaged",
                 HINT,
                 subject="channels",
             )
-
-
-def _spans(windows: Sequence[Window]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return begins and ends of contacts, s."""
-    rate = windows[0].signal.sample_rate
-    starts = np.array([window.start for window in windows])
-    contacts = np.array([window.contact for window in windows])
-    return (starts + contacts[:, 0]) / rate, (starts + contacts[:, 1]) / rate
 
 
 def refuse_same_drops(records: Sequence[Record]) -> None:
@@ -122,7 +122,7 @@ def _refuse_equal_noise(records: Sequence[Record]) -> None:
     ratio = np.array([drop.impulse.value / drop.peak_force.value for drop in drops])
     order = np.argsort(ratio)
     stops = np.searchsorted(ratio[order], ratio[order] * (1 + MAX_RATIO_CHANGE))
-    sections = [_Section(drop) for drop in drops]
+    sections = [_Contact(drop) for drop in drops]
     for k, i in enumerate(order):
         for j in order[k + 1 : stops[k]]:
             is_equal = math.isclose(drops[i].sample_rate, drops[j].sample_rate, rel_tol=SAME_RATE)
@@ -137,7 +137,7 @@ def _refuse_equal_noise(records: Sequence[Record]) -> None:
                 )
 
 
-class _Section:
+class _Contact:
     """Background before a drop without hum and slow noise, N, and its contact."""
 
     def __init__(self, drop: Drop) -> None:
@@ -154,7 +154,7 @@ class _Section:
         self.is_constant = self.deviation < MAX_ROUNDING * drop.peak_force.value
 
 
-def _is_same(one: _Section, other: _Section) -> bool:
+def _is_same(one: _Contact, other: _Contact) -> bool:
     """Whether two records of drops, of equal rate, have the same noise."""
     rate = one.drop.sample_rate
     limit = MAX_SHIFT_SAMPLES + int(MAX_SHIFT * rate)
@@ -178,7 +178,7 @@ def _is_same(one: _Section, other: _Section) -> bool:
     return _difference(one, other, -shift) < MAX_DIFFERENCE * noise
 
 
-def _difference(one: _Section, other: _Section, shift: int) -> float:
+def _difference(one: _Contact, other: _Contact, shift: int) -> float:
     """Return the standard deviation of the difference of two contacts at the best scale, N.
 
     `shift` is the sample of the other gate at the begin of the first one.

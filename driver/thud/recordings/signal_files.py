@@ -11,6 +11,7 @@ from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.recordings.channel import MIN_SAMPLES, Channel, regular_file, shown_path, shown_text
 from thud.recordings.config import Config
+from thud.recordings.config_values import SUM
 from thud.recordings.force_units import (
     ALLOWED,
     ASSUMED,
@@ -21,7 +22,7 @@ from thud.recordings.force_units import (
     unit_of_chain,
 )
 from thud.recordings.formats import read_channels
-from thud.recordings.load_cells import HINT, SUM, add_signals, check_signs, refuse_directions
+from thud.recordings.load_cells import HINT, add_signals, check_signs, refuse_directions
 from thud.recordings.polarity import POLARITIES, check_peak, find_sign, scan
 from thud.recordings.signal import Signal
 

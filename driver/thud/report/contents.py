@@ -26,9 +26,8 @@ if TYPE_CHECKING:
     from thud.level.assessment import Criterion
     from thud.level.estimate import Estimate
     from thud.recordings.config import Config
-    from thud.recordings.measure_drops import Origin
     from thud.recordings.measured_drop import Drop
-    from thud.recordings.recording import Recording
+    from thud.recordings.recording import Origin, Recording
 
 FORMAT = "thud calibration report 1"
 # What ISO/IEC 17025:2017, 7.8.2 to 7.8.4, asks of a report, by the key that states it.
@@ -243,7 +242,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "name": drop.name,
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in ESTIMATES},
-        "restitution_method": drop.restitution_method,
+        "restitution_method": " and ".join(drop.restitutions),
         "restitutions": {method: _estimate(value) for method, value in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from thud.base.files import Results
+    from thud.recordings.read_recording import Stages
     from thud.recordings.recording import Recording
 
 # Columns of the page that the printed table has.
@@ -32,6 +33,7 @@ _SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")
 _PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
 DATASET = "recording.nc"
 _PAGE = (HTML, PDF, "force.svg", "levels.svg")
+STAGES = "stages"
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
@@ -149,13 +151,18 @@ def criteria_csv(data: dict[str, Any]) -> str:
     return comment + csv_text([head.split(), *rows])
 
 
-def file_names(*, figures: bool = True) -> list[str]:
+def file_names(*, figures: bool = True, stages: bool = False) -> list[str]:
     """Return the names of the files that `save` writes."""
-    return ["levels.csv", "criteria.csv", JSON, DATASET, *(_PAGE if figures else ())]
+    drawn = (*(_PAGE if figures else ()), *([f"{STAGES}.svg"] if stages else ()))
+    return ["levels.csv", "criteria.csv", JSON, DATASET, *drawn]
 
 
-def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
+def save(
+    recording: Recording, results: Results, *, figures: bool = True, stages: Stages | None = None
+) -> None:
     """Write levels, criteria and data; with `figures` also the figures and the page.
+
+    With the stages of a drop, they are drawn too.
 
     The directory of the results is replaced as a whole.
 
@@ -181,6 +188,10 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     if figures and _has_matplotlib():
         drawings = write.figures(recording)
         contents |= page_contents(recording, data, drawings, results.folder) | drawings
+    if stages and _has_matplotlib():
+        from thud.plot.save_figures import figure_files
+
+        contents |= figure_files({STAGES: stages.plot()})
     write_files(results, data, contents)
 
 

@@ -1,0 +1,137 @@
+"""A recorded drop after each stage of its measurement."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.plot.style import COLORS, GRAY, LEVEL, WIDTH, new_figure, octave_axis, own_style
+from thud.recordings.recorded_levels import measure_levels
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from thud.recordings.contact import Contact
+    from thud.recordings.drops import Section
+    from thud.recordings.measured_drop import Drop
+    from thud.recordings.read_recording import Stages
+    from thud.recordings.recorded_levels import DropLevels
+
+# Height of a panel, inch.
+HEIGHT = 2.05
+# Time around the contact that is drawn, s.
+AROUND = 0.01
+# Range of forces around the background, in standard deviations of the noise.
+RANGE = 8.0
+
+
+@own_style()
+def draw_stages(stages: Stages) -> Figure:
+    """Draw the force as recorded, after each stage, and without background, and the levels."""
+    figure = new_figure(2 * HEIGHT, 2 * WIDTH)
+    (recorded, changed), (background, levels) = figure.subplots(2, 2)
+    _draw_section(recorded, stages.section)
+    _draw_changes(changed, stages)
+    _draw_contact(background, stages.drop.contact)
+    _draw_levels(levels, measure_levels([stages.drop])[0])
+    return figure
+
+
+@own_style()
+def draw_section(section: Section) -> Figure:
+    """Draw the force of a drop and of its bounces, and their contacts."""
+    figure = new_figure(HEIGHT)
+    _draw_section(figure.subplots(), section)
+    return figure
+
+
+@own_style()
+def draw_contact(contact: Contact) -> Figure:
+    """Draw the force next to a contact, the removed background, and the gate of the levels."""
+    figure = new_figure(HEIGHT)
+    _draw_contact(figure.subplots(), contact)
+    return figure
+
+
+@own_style()
+def draw_drop(drop: Drop) -> Figure:
+    """Draw the contact of a drop, and its levels above the background."""
+    figure = new_figure(HEIGHT, 2 * WIDTH)
+    force, levels = figure.subplots(1, 2)
+    _draw_contact(force, drop.contact)
+    _draw_levels(levels, measure_levels([drop])[0])
+    return figure
+
+
+@own_style()
+def draw_levels(levels: DropLevels) -> Figure:
+    """Draw the levels of a drop with their standard uncertainty, and the background."""
+    figure = new_figure(HEIGHT)
+    _draw_levels(figure.subplots(), levels)
+    return figure
+
+
+def _draw_section(axes: Axes, section: Section) -> None:
+    for part in (*section.bounces[::-1], section):
+        time = (part.start + np.arange(len(part.force))) / part.sample_rate
+        is_drop = part is section
+        axes.plot(
+            time, 1e-3 * part.force, color=COLORS[0] if is_drop else "0.55", linewidth=0.8,
+            label="as recorded" if is_drop else None,
+        )  # fmt: skip
+        axes.axvspan(*time[[part.contact[0], part.contact[1] - 1]], color=GRAY, linewidth=0)
+    axes.set_xlabel("Time in the file, s")
+    axes.set_ylabel("Force, kN")
+    axes.legend(loc="upper right", title=section.name)
+
+
+def _draw_changes(axes: Axes, stages: Stages) -> None:
+    """Draw what each stage has changed in the force next to the contact."""
+    section, rate = stages.section, stages.section.sample_rate
+    margin = round(AROUND * rate)
+    shown = slice(max(section.contact[0] - margin, 0), section.contact[1] + margin)
+    time = (np.arange(len(section.force)) - section.contact[0])[shown] / rate
+    changes = {
+        "repair": stages.repaired.force - section.force,
+        "instruments": stages.corrected.force - stages.repaired.force,
+    }
+    for (name, change), color in zip(changes.items(), COLORS, strict=False):
+        label = name if change.any() else f"{name} (no change)"
+        axes.plot(1e3 * time, change[shown], color=color, linewidth=0.8, label=label)
+    axes.set_xlabel("Time, ms")
+    axes.set_ylabel("Change of the force, N")
+    axes.legend()
+
+
+def _draw_contact(axes: Axes, contact: Contact) -> None:
+    """Draw force and removed background on the scale of the noise."""
+    rate, touch = contact.sample_rate, contact.touch.value
+    time = 1e3 * (np.arange(*contact.span) / rate - touch)
+    recorded, removed = contact.force + contact.removed, contact.removed
+    first, stop = (index - contact.span[0] for index in contact.gate)
+    quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
+    low, high = removed.min(), removed.max()
+    spread = max(RANGE * float(quiet.std()), 0.01 * contact.peak)
+    axes.axvspan(time[first], time[stop - 1], color=GRAY, linewidth=0, label="gate of the levels")
+    axes.plot(time, recorded, color="0.55", linewidth=0.5, label="corrected force")
+    axes.plot(time, removed, color=COLORS[1], linewidth=1.0, label="background")
+    for edge in (contact.touch, contact.release):
+        axes.axvline(1e3 * (edge.value - touch), color=COLORS[0], linewidth=0.6)
+    axes.set_ylim(low - spread, high + spread)
+    axes.set_xlabel("Time since first touch, ms")
+    axes.set_ylabel("Force, N")
+    axes.legend(loc="upper right")
+
+
+def _draw_levels(axes: Axes, levels: DropLevels) -> None:
+    x = np.arange(len(levels.level))
+    axes.errorbar(
+        x, levels.level, yerr=np.nan_to_num(levels.uncertainty), color=COLORS[0], marker="o",
+        markersize=3, linestyle="none", capsize=2.5, label="drop",
+    )  # fmt: skip
+    axes.plot(x, levels.background, color="black", linestyle=":", marker="_", label="background")
+    octave_axis(axes, levels.bands)
+    axes.set_ylabel(LEVEL)
+    axes.legend()

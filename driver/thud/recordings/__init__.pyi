@@ -1,0 +1,40 @@
+from .background import remove_background as remove_background
+from .config import (
+    Config as Config,
+    Instrument as Instrument,
+    Properties as Properties,
+    ReportConfig as ReportConfig,
+    read_config as read_config,
+)
+from .contact import (
+    Contact as Contact,
+    find_contact as find_contact,
+)
+from .drops import (
+    Pulse as Pulse,
+    Section as Section,
+    cut_section as cut_section,
+    find_drops as find_drops,
+)
+from .faults import repair as repair
+from .measured_drop import (
+    Drop as Drop,
+    measure_drop as measure_drop,
+)
+from .plate import Plate as Plate
+from .read_recording import (
+    Stages as Stages,
+    first_stages as first_stages,
+    measure_stages as measure_stages,
+)
+from .recorded_levels import (
+    average_levels as average_levels,
+    measure_levels as measure_levels,
+)
+from .recorder_filter import RecorderFilter as RecorderFilter
+from .response import (
+    Chain as Chain,
+    correct as correct,
+)
+from .signal import Signal as Signal
+from .signal_files import open_signals as open_signals
