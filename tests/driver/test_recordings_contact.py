@@ -15,7 +15,9 @@ from synthetic import cut_drops, half_sine, make_drop
 from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
 from thud.recordings import contact, drops, flanks, measured_drop
+from thud.recordings.checks import aliasing
 from thud.recordings.contact import Contact, cells_between, uniform_bounds
+from thud.recordings.drops import Section
 from thud.recordings.plate import Plate
 from thud.recordings.response import Chain, correct_force
 from thud.recordings.signal import Signal
@@ -178,16 +180,17 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     top = np.sqrt(power[f > 0.4 * rate].mean()) * (0.45 * rate / (rate - 707.9)) ** 2
     own = np.sqrt(power[(f > 354.8) & (f < 707.9)].mean())
     expected = 20 * np.log10(1 + top / own)
-    told = measured_drop._check_aliasing(one, None)  # noqa: SLF001
+    section = Section("drop", one.force, rate, 0, one.gate)
+    told = aliasing.check(section, one)
     assert bool(told) == (expected > 0.1)
-    if told:
-        assert told[0].value == pytest.approx(expected, abs=0.05)
+    for note in told:
+        assert (note.value, note.effect) == pytest.approx((expected, expected), rel=1e-3)
     # Noise has content there too: three times its power is none.
     white = top**2 * ((rate - 707.9) / 0.45 / rate) ** 4 / count / rate * 2
     for factor, expected in ((0.1, bool(told)), (0.34, False)):
         draws = np.array([[factor * white, 0, 0, 0, 0]])
         noisy = replace(one, background=replace(one.background, draws=draws))
-        assert bool(measured_drop._check_aliasing(noisy, None)) == expected  # noqa: SLF001
+        assert bool(aliasing.check(section, noisy)) == expected
 
 
 # Flanks: times of 30 cells, whose noise is known.

@@ -29,9 +29,9 @@ from thud.recordings.budgets import average_mass, average_restitution, drop_esti
 from thud.recordings.config import Config
 from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, find_drops
-from thud.recordings.faults import repair
 from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recorded_levels import measure_levels
+from thud.recordings.repair import repair
 from thud.recordings.restitution import GRAVITY, DropConditions
 from thud.recordings.signal import Signal
 
@@ -532,28 +532,22 @@ def test_pulses_that_cannot_be_measured_are_refused(force: np.ndarray, words: st
         drops(force, 48e3)
 
 
-@pytest.mark.parametrize("slopes", [(1, 2), (2, 1)])
-@pytest.mark.parametrize("half", [12, 13])
-def test_flat_top_is_clipped_where_the_force_beside_it_falls(
-    slopes: tuple[int, int], half: int
+@pytest.mark.parametrize(("duration", "clipped"), [(0.3e-3, False), (1.5e-3, True)])
+@pytest.mark.parametrize("rate", [10e3, 48e3])
+def test_constant_top_is_clipped_where_it_changes_levels(
+    duration: float, rate: float, *, clipped: bool
 ) -> None:
-    # Half its length beside the top the force has fallen by 12 digits of 1 N, or by more.
-    rise, fall = slopes
-    force = np.concatenate(
-        [
-            np.zeros(9600),
-            np.arange(0.0, 1400.0, rise),
-            np.full(2 * half, 1400.0),
-            np.arange(1400.0 - fall, 0.0, -fall),
-            np.zeros(9600),
-        ]
-    )
-    (window,) = cut_drops(Signal.from_array(force, 48e3, "file.wav"))
-    if half == 12:
-        repair(window)
+    time = np.arange(-0.2, 0.3, 1 / rate)
+    whole = 1500 * np.sin(np.pi * np.clip(time / 0.02, 0, 1))
+    limit = 1500 * np.cos(np.pi * duration / 0.02 / 2)
+    (section,) = cut_drops(Signal.from_array(np.minimum(whole, limit), rate))
+    if clipped:
+        with pytest.raises(thud.InputError, match=naming("clip", f"{limit:.4g} N")):
+            repair(section)
     else:
-        with pytest.raises(thud.InputError, match=naming("clip", "1400 N")):
-            repair(window)
+        repair(section)
+        change = thud.force_exposure_levels(np.minimum(whole, limit), rate)
+        np.testing.assert_allclose(change, thud.force_exposure_levels(whole, rate), atol=0.01)
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -583,7 +577,7 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     assert noted(drop.notes, "dropouts").value == pytest.approx(0.3125)
     np.testing.assert_allclose(levels(drop)[:3], ORACLE[:3], rtol=0, atol=0.1)
     lost[5200:5300] = 0
-    with pytest.raises(thud.InputError, match=naming("dropout", "ms")):
+    with pytest.raises(thud.InputError, match=naming("held", "ms")):
         drops(lost, 48e3)
     # Fewer samples than may be held are lost where they are 0.
     for value, told in ((0.0, True), (1.0, False)):

@@ -16,7 +16,6 @@ from .drops import (
     cut_section as cut_section,
     find_drops as find_drops,
 )
-from .faults import repair as repair
 from .measured_drop import (
     Drop as Drop,
     measure_drop as measure_drop,
@@ -32,6 +31,7 @@ from .recorded_levels import (
     measure_levels as measure_levels,
 )
 from .recorder_filter import RecorderFilter as RecorderFilter
+from .repair import repair as repair
 from .response import (
     Chain as Chain,
     correct as correct,

@@ -11,7 +11,7 @@ import numpy as np
 from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR, Budget, Contribution, Estimate, Size
 from thud.level.levels import RECORDED_BAND, peak_count
-from thud.recordings.outliers import SIGNIFICANCE, find_outliers
+from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
 
 if TYPE_CHECKING:

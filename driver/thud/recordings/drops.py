@@ -120,7 +120,7 @@ class Pulse:
 class Section:
     """Samples of a signal around one drop or bounce.
 
-    Each stage takes a section and returns one: `thud.recordings.faults.repair`,
+    Each stage takes a section and returns one: `thud.recordings.repair.repair`,
     `thud.recordings.tones.remove_tones`, `thud.recordings.response.correct`.
 
     Attributes

@@ -19,11 +19,12 @@ from thud.base.note import Note
 from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import find_offset_step, remove_background, step_errors
+from thud.recordings.checks import check_contact
 from thud.recordings.contact import Contact, find_contact
-from thud.recordings.faults import check_jumps, min_background
 from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
+from thud.recordings.repair import min_background
 from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
     from thud.recordings.drops import Section
-    from thud.recordings.response import Chain
     from thud.recordings.ringing import Ringing
 
 # Number of draws of noise for its effect on the maximum.
@@ -46,19 +46,11 @@ PEAK_RATE = 50_000.0
 PEAK_MARGIN = 2e-3
 # Length of the background below which a warning is raised, s.
 SHORT_BACKGROUND = 0.005
-# Edges of the octave of 500 Hz, Hz.
-OCTAVE_500 = (354.8, 707.9)
-# Fraction of the rate above which content indicates aliasing, and error above which a warning is
-# raised, dB.
-ALIASED_FRACTION = 0.4
-MAX_ALIASING_ERROR = 0.1
 # Minimum ratio of contact time and its uncertainty.
 MIN_CONTACT_RATIO = 4.0
 # Maximum factor between the restitution by flight and the ratio of the peaks. Beyond it a pulse is
 # no bounce, because the force follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
-# Deviation of the offset by quantization, as a fraction of the peak, that raises a warning.
-MAX_OFFSET = 5e-4
 # Quantities of `QUANTITIES` that are estimated for each drop.
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
@@ -185,7 +177,7 @@ def measure_drop(section: Section, contact: Contact, conditions: DropConditions)
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     duration = _between(contact.touch, contact.release)
     methods, unknown = conditions.restitutions(impulse, duration, flights)
-    notes += (*no_bounce, *_check_aliasing(contact, section.chain), *_check_step(contact), *unknown)
+    notes += (*no_bounce, *check_contact(section, contact), *unknown)
     restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
     return Drop(
         name=section.name,
@@ -205,7 +197,7 @@ def measure_drop(section: Section, contact: Contact, conditions: DropConditions)
 
 
 def _check_contact(section: Section, contact: Contact) -> list[Note]:
-    """Return warnings on a short background and on jumps of the force.
+    """Return warnings on a short background.
 
     Raise InputError if the contact cannot be distinguished from the noise.
     """
@@ -217,7 +209,7 @@ def _check_contact(section: Section, contact: Contact) -> list[Note]:
             f"{1e3 * time.uncertainty:.2g} ms",
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
-    notes = [
+    return [
         Note(
             "short_background", value=1e3 * length, low=1e3 * SHORT_BACKGROUND, unit="ms",
             others={"side": side},
@@ -225,7 +217,6 @@ def _check_contact(section: Section, contact: Contact) -> list[Note]:
         for side, length in zip(("before", "after"), contact.background_lengths, strict=True)
         if length < SHORT_BACKGROUND
     ]  # fmt: skip
-    return notes if section.chain else [*notes, *check_jumps(contact)]
 
 
 def _check_bounce(
@@ -325,35 +316,3 @@ def _interpolated(force: NDArray[np.float64], rate: float) -> NDArray[np.float64
     return np.asarray(resample(low, factor * len(low))) if factor > 1 else low
 
 
-def _check_step(contact: Contact) -> tuple[Note, ...]:
-    """Return a warning if the background of a coarse record lies within a quantization step."""
-    quantization = contact.background.quantization
-    if quantization.offset < MAX_OFFSET * contact.peak:
-        return ()
-    others = {"step": quantization.step}
-    return (Note("coarse_steps", value=quantization.offset, unit="N", others=others),)
-
-
-def _check_aliasing(contact: Contact, chain: Chain | None) -> tuple[Note, ...]:
-    """Return a warning if content may alias into the octave of 500 Hz.
-
-    This is content above half the rate. The amplitude of a pulse with kinks is assumed to fall as
-    1/f**2 there; stated instruments reduce it further.
-    """
-    rate = contact.sample_rate
-    lower, upper = OCTAVE_500
-    # Padded to a length with several frequencies in the octave.
-    force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
-    frequency = np.fft.rfftfreq(len(force), 1 / rate)
-    power = np.abs(np.fft.rfft(force)) ** 2
-    noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
-    octave_power = power[(frequency > lower) & (frequency < upper)].mean()
-    top = max(power[frequency > ALIASED_FRACTION * rate].mean() - 3 * noise, 0.0)
-    folded = top * (0.45 * rate / (rate - upper)) ** 4
-    if chain is not None:
-        folded *= abs(chain.response(np.array([rate - upper]))[0]) ** 2
-    error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
-    if error < MAX_ALIASING_ERROR:
-        return ()
-    others = {"frequency": rate / 2}
-    return (Note("aliasing", value=error, unit="dB", effect=error, others=others),)

@@ -17,23 +17,23 @@ from thud.base.checks import refuse
 from thud.base.note import Note, about
 from thud.recordings.assumptions import with_assumptions
 from thud.recordings.background import remove_background
-from thud.recordings.choice import choose, require_chosen
-from thud.recordings.config import Config, read_config
-from thud.recordings.contact import find_contact
-from thud.recordings.drops import Section, cut_section, find_drops
-from thud.recordings.faults import repair
-from thud.recordings.measured_drop import Drop, measure_drop
-from thud.recordings.polarity import check_peak, scan
-from thud.recordings.recording import Origin, Recording
-from thud.recordings.response import correct
-from thud.recordings.ringing import with_plate
-from thud.recordings.same_drops import (
+from thud.recordings.checks.copies import (
     Record,
     Spans,
     refuse_copy,
     refuse_same_drops,
     refuse_simultaneous_channels,
 )
+from thud.recordings.choice import choose, require_chosen
+from thud.recordings.config import Config, read_config
+from thud.recordings.contact import find_contact
+from thud.recordings.drops import Section, cut_section, find_drops
+from thud.recordings.measured_drop import Drop, measure_drop
+from thud.recordings.polarity import check_peak, scan
+from thud.recordings.recording import Origin, Recording
+from thud.recordings.repair import repair
+from thud.recordings.response import correct
+from thud.recordings.ringing import with_plate
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
 

@@ -16,8 +16,8 @@ from thud.level.estimate import NOISE, RECTANGULAR, Budget, Size
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.background import step_errors
 from thud.recordings.band_noise import band_noise
+from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.filters import filter_levels
-from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

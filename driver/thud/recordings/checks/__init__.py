@@ -1,0 +1,82 @@
+"""Checks of recordings: what each protects from, and how far levels are off without it.
+
+The sizes are those of a half-sine of 1500 N and 20 ms. A further check is a file with a function
+`check` and a line in one of the tables; its words are in `thud.base.sentences`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from thud.recordings.checks import (
+    aliasing,
+    clipping,
+    coarse_steps,
+    gaps,
+    jumps,
+    missing_codes,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from thud.base.note import Note
+    from thud.recordings.contact import Contact
+    from thud.recordings.drops import Section
+
+
+class Check(NamedTuple):
+    """A check: its function, what it protects from, and the size of its effect."""
+
+    check: Callable[..., tuple[Note, ...]]
+    protects: str
+    effect: str
+
+
+# Of the recorded force of a drop or of a load cell, in this order: values that never occur make
+# gaps.
+SECTION_CHECKS = (
+    Check(
+        clipping.check,
+        "a top that recorder or amplifier cuts off",
+        "at 1450 N 1.3 dB at 250 Hz, at 1200 N 3.9 dB at 125 Hz",
+    ),
+    Check(
+        missing_codes.check,
+        "a converter without some of its values",
+        "without the bit of 32 N 0.4 dB at 250 Hz",
+    ),
+    Check(
+        gaps.check,
+        "samples that are held, filled by a line or gated",
+        "3 ms of the touch 16 dB at 500 Hz, a gate of 40 N 1 dB at 500 Hz",
+    ),
+)
+# Of a contact, after the removal of the background.
+CONTACT_CHECKS = (
+    Check(
+        jumps.check,
+        "packets that are lost, filled or exchanged",
+        "of 2 ms 12 dB at 250 and 500 Hz",
+    ),
+    Check(
+        aliasing.check,
+        "content above half the sample rate without a filter before sampling",
+        "the size in the warning, at 500 Hz",
+    ),
+    Check(
+        coarse_steps.check,
+        "an offset that is not known within a step of quantization",
+        "an offset of 0.05 % of the peak 0.01 dB at 31.5 Hz; the uncertainty includes it",
+    ),
+)
+
+
+def check_section(section: Section) -> tuple[Note, ...]:
+    """Return notes on the recorded force; raise InputError if it cannot be measured."""
+    return tuple(note for entry in SECTION_CHECKS for note in entry.check(section))
+
+
+def check_contact(section: Section, contact: Contact) -> tuple[Note, ...]:
+    """Return notes on a contact in its section."""
+    return tuple(note for entry in CONTACT_CHECKS for note in entry.check(section, contact))
