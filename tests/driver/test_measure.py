@@ -354,11 +354,13 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
             weight = variances[1] / sum(variances)
             expected = weight * by.value + (1 - weight) * other.value
             assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
-            found = drop.shared_effects.get("calibration", 0.0)
+            found = drop.shared_effects["restitution"].get("calibration", 0.0)
             assert found == pytest.approx(weight * scale, rel=1e-9)
         budget = recording.estimates["restitution"].contributions
         shares = {part.name: part.uncertainty for part in budget}
-        mean = np.mean([d.shared_effects.get("calibration", 0.0) for d in recording.drops])
+        mean = np.mean(
+            [d.shared_effects["restitution"].get("calibration", 0.0) for d in recording.drops]
+        )
         assert shares.get("calibration", 0.0) == pytest.approx(mean)
 
 

@@ -12,7 +12,7 @@ from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR, Budget, Contribution, Estimate, Size
 from thud.level.levels import RECORDED_BAND, peak_count
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
-from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
+from thud.recordings.restitution import BOUNCES, IMPULSE, MASS, RESTITUTION, DropConditions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
 
+# Contribution of restitutions that differ by more than their uncertainties.
+DISAGREEMENT = "impulse against bounces"
 # Prominence of a counted peak as a fraction of the peak force, and the minimum of this prominence
 # in standard deviations of the noise.
 PROMINENCE = 0.1
@@ -119,58 +121,35 @@ def average_restitution(
     wrong: a rectangular distribution with the difference as half width enters the budget of the
     mean, whose interval then includes both.
     """
-    known = [drop for drop in drops if drop.restitutions]
-    causes = dict.fromkeys(cause for drop in known for cause in drop.shared_effects)
-    shared = {
-        cause: _mean_size([drop.shared_effects.get(cause, 0.0) for drop in known])
-        for cause in causes
-    }
-    comparable = [drop for drop in known if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
-    difference = _difference(comparable, conditions)
-    if abs(difference.value) > difference.expanded:
-        shared["impulse against bounces"] = abs(difference.value) / RECTANGULAR
-    restitutions = [drop.restitution for drop in known]
-    return average_estimates(restitutions, shared, conditions.sizes), difference
-
-
-def _difference(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     differences = []
-    effects: dict[str, list[float]] = {}
+    effects = []
     for drop in drops:
-        impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
-        combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
-        differences.append(Estimate(impulse.value - bounces.value, combined))
-        shared = conditions.shared_effects(
-            drop.restitutions, drop.impulse, drop.contact.quantization_impulse
-        )
-        for cause, effect in shared[IMPULSE].items():
-            effects.setdefault(cause, []).append(effect - shared[BOUNCES].get(cause, 0.0))
-    sizes = {cause: _mean_size(values) for cause, values in effects.items()}
-    return average_estimates(differences, sizes, conditions.sizes)
-
-
-def _mean_size(effects: Sequence[float]) -> float:
-    return abs(float(np.mean(effects)))
+        if {IMPULSE, BOUNCES} <= set(drop.restitutions):
+            impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
+            combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
+            differences.append(Estimate(impulse.value - bounces.value, combined))
+            one, other = (drop.shared_effects.get(name, {}) for name in (IMPULSE, BOUNCES))
+            effects.append({key: one.get(key, 0.0) - other.get(key, 0.0) for key in one | other})
+    difference = average_estimates(differences, _mean_sizes(effects), conditions.sizes)
+    known = [drop for drop in drops if drop.restitutions]
+    shared = _mean_sizes([drop.shared_effects.get(RESTITUTION, {}) for drop in known])
+    if abs(difference.value) > difference.expanded:
+        shared[DISAGREEMENT] = abs(difference.value) / RECTANGULAR
+    sizes = conditions.sizes | {DISAGREEMENT: Size(divisor=RECTANGULAR)}
+    return average_estimates([drop.restitution for drop in known], shared, sizes), difference
 
 
 def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
     """Return the effective mass with its budget, kg; NaN if bounces or height are unknown."""
     known = [drop for drop in drops if math.isfinite(drop.effective_mass.value)]
-    if not known or not conditions.height:
-        return Estimate.unknown()
-    value = float(np.mean([drop.effective_mass.value for drop in known]))
-    # m = J / (v0 + g (t_f/2 + t_c)): the height changes v0 only.
-    velocity_change = float(np.mean([drop.impulse.value for drop in known])) / value
-    height_effect = value * conditions.speed / velocity_change * conditions.height_uncertainty
-    height_effect /= 2 * conditions.height
-    impulses = [(drop.impulse.value, drop.contact.quantization_impulse) for drop in known]
-    impulse, quantization_impulse = np.mean(impulses, axis=0)
-    shared = {
-        "calibration": value * conditions.calibration_uncertainty,
-        "drop height": height_effect,
-        "quantization": value * float(quantization_impulse / impulse),
-    }
+    shared = _mean_sizes([drop.shared_effects.get(MASS, {}) for drop in known])
     return average_estimates([drop.effective_mass for drop in known], shared, conditions.sizes)
+
+
+def _mean_sizes(effects: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Return the magnitude of the mean of each effect over drops, some of which may lack it."""
+    names = dict.fromkeys(name for entry in effects for name in entry)
+    return {name: abs(sum(e.get(name, 0.0) for e in effects)) / len(effects) for name in names}
 
 
 def find_deviant(drops: Sequence[Drop]) -> tuple[Note, ...]:

@@ -25,7 +25,7 @@ from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import min_background
-from thud.recordings.restitution import BOUNCES, GRAVITY, DropConditions
+from thud.recordings.restitution import GRAVITY, DropConditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,9 +71,10 @@ class Drop(Immutable):
         Units: s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg. NaN if unknown.
     restitutions : dict of str to Estimate
         Restitution by ``"impulse"`` and by ``"bounces"``, as far as they are known.
-    shared_effects : dict of str to float
-        Change of the restitution by one standard uncertainty of calibration, mass, drop height and
-        quantized background, which all drops share and the uncertainty of the restitution excludes.
+    shared_effects : dict of dict of float
+        Changes of ``"impulse"``, ``"bounces"``, ``"restitution"`` and ``"effective_mass"`` by one
+        standard uncertainty of what all drops share, such as ``"calibration"``, by its name; the
+        uncertainties above exclude them.
     bounces : tuple of float
         Times at which the measured bounces begin, s since first touch: one bounce if the drop
         height is known, else up to two.
@@ -97,7 +98,7 @@ class Drop(Immutable):
     impulse: Estimate
     effective_mass: Estimate
     restitutions: dict[str, Estimate] = field(default_factory=dict)
-    shared_effects: dict[str, float] = field(default_factory=dict)
+    shared_effects: dict[str, dict[str, float]] = field(default_factory=dict)
     bounces: tuple[float, ...] = ()
     notes: tuple[Note, ...] = ()
     offset_step: float = 0.0
@@ -176,20 +177,19 @@ def measure_drop(section: Section, contact: Contact, conditions: DropConditions)
     ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     duration = _between(contact.touch, contact.release)
-    methods, unknown = conditions.restitutions(impulse, duration, flights)
-    notes += (*no_bounce, *check_contact(section, contact), *unknown)
-    restitution, shared = conditions.mean(methods, impulse, contact.quantization_impulse)
+    rebound = conditions.rebound(impulse, duration, flights, contact.quantization_impulse)
+    notes += (*no_bounce, *check_contact(section, contact), *rebound.notes)
     return Drop(
         name=section.name,
         onset=section.start / section.sample_rate + contact.touch.value,
         contact=contact,
         contact_time=_between(contact.begin, contact.end),
-        restitution=restitution,
+        restitution=rebound.restitution,
         peak_force=peak_force,
         impulse=impulse,
-        effective_mass=conditions.effective_mass(impulse, duration, methods.get(BOUNCES)),
-        restitutions=methods,
-        shared_effects=shared,
+        effective_mass=rebound.mass,
+        restitutions=rebound.restitutions,
+        shared_effects=rebound.shared,
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
         notes=tuple(notes),
         offset_step=offset_step,
