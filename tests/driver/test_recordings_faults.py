@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,12 +15,12 @@ from scipy.ndimage import median_filter
 
 import thud
 from thud.base.errors import InputError
+from thud.recordings import checks
 from thud.recordings.config import Config
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, injecting
@@ -156,6 +157,14 @@ def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, re
     force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
     (drop,) = measured(force, 48e3).drops
     assert not {"spikes", "dropouts"} & {*codes(drop.notes)}
+
+
+def test_each_check_is_listed_with_what_it_protects_from() -> None:
+    entries = (*checks.SECTION_CHECKS, *checks.CONTACT_CHECKS, *checks.OTHER_CHECKS)
+    modules = {entry.check.__module__ for entry in entries}
+    files = {file.stem for file in Path(checks.__file__).parent.glob("[!_]*.py")}
+    assert {f"{checks.__name__}.{file}" for file in files} <= modules
+    assert all(entry.protects and entry.effect for entry in entries)
 
 
 def later(force: np.ndarray, share: float) -> np.ndarray:

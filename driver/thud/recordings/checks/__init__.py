@@ -6,15 +6,18 @@ The sizes are those of a half-sine of 1500 N and 20 ms. A further check is a fil
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.recordings import load_cells, polarity
 from thud.recordings.checks import (
     aliasing,
     clipping,
     coarse_steps,
+    copies,
     gaps,
     jumps,
     missing_codes,
+    outliers,
 )
 
 if TYPE_CHECKING:
@@ -28,7 +31,7 @@ if TYPE_CHECKING:
 class Check(NamedTuple):
     """A check: its function, what it protects from, and the size of its effect."""
 
-    check: Callable[..., tuple[Note, ...]]
+    check: Callable[..., Any]
     protects: str
     effect: str
 
@@ -68,6 +71,29 @@ CONTACT_CHECKS = (
         coarse_steps.check,
         "an offset that is not known within a step of quantization",
         "an offset of 0.05 % of the peak 0.01 dB at 31.5 Hz; the uncertainty includes it",
+    ),
+)
+# Of what is more or less than a drop: where it is read or averaged.
+OTHER_CHECKS = (
+    Check(
+        polarity.check_peak,
+        "a wrong sign, unit or calibration",
+        "kN in place of N 60 dB",
+    ),
+    Check(
+        load_cells.check_cells,
+        "load cells that carry no force or count twice",
+        "one of four cells 2.5 dB",
+    ),
+    Check(
+        copies.refuse_same_drops,
+        "the same drop twice, and load cells that are averaged",
+        "a scatter of zero, and for four cells 12 dB",
+    ),
+    Check(
+        outliers.find_outliers,
+        "drops that differ from the others by more than chance",
+        "they are marked, not left out",
     ),
 )
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import correlate
 
 from thud.base.checks import refuse
 from thud.recordings.load_cells import HINT
@@ -38,8 +38,6 @@ MAX_SHIFT = 3e-4
 MAX_SHIFT_SAMPLES = 3
 # Maximum difference of forces in the contact, in standard deviations of the noise of both records.
 MAX_DIFFERENCE = 3.0
-# Maximum relative difference of impulse over peak of two records of one drop: noise changes both.
-MAX_RATIO_CHANGE = 0.03
 # Maximum relative difference of the rates of two records of one drop, by the rounding of times.
 SAME_RATE = 1e-4
 # Simultaneous records: maximum difference of instants, s, and minimum difference of the scales, for
@@ -102,39 +100,22 @@ def refuse_simultaneous_channels(spans: Spans, others: Sequence[Spans]) -> None:
 
 def refuse_same_drops(records: Sequence[Record]) -> None:
     """Raise InputError if two records hold the same drop, or simultaneous forces."""
-    if len(records) > 1:
-        _refuse_equal_noise(records)
-    for k, record in enumerate(records):
-        for other in records[:k]:
-            if record.path != other.path and _are_simultaneous(record.drops, other.drops):
+    contacts = [[_Contact(drop) for drop in record.drops] for record in records]
+    for (record, ones), (later, others) in combinations(zip(records, contacts, strict=True), 2):
+        for one, other in product(ones, others):
+            if _is_same(one, other):
                 refuse(
-                    f"{record.name}: has the drops of {other.name} at the same instants of its "
-                    "file at a different scale; simultaneous forces are never averaged",
-                    f"one file with all channels and {HINT}; other balls or heights, which a "
-                    "trigger records at the same instant, in a measurement of their own",
-                )
-
-
-def _refuse_equal_noise(records: Sequence[Record]) -> None:
-    numbers = np.repeat(np.arange(len(records)), [len(record.drops) for record in records])
-    drops = [drop for record in records for drop in record.drops]
-    # Impulse over peak depends neither on scale nor on instant.
-    ratio = np.array([drop.impulse.value / drop.peak_force.value for drop in drops])
-    order = np.argsort(ratio)
-    stops = np.searchsorted(ratio[order], ratio[order] * (1 + MAX_RATIO_CHANGE))
-    sections = [_Contact(drop) for drop in drops]
-    for k, i in enumerate(order):
-        for j in order[k + 1 : stops[k]]:
-            is_equal = math.isclose(drops[i].sample_rate, drops[j].sample_rate, rel_tol=SAME_RATE)
-            if numbers[i] == numbers[j] or not is_equal:
-                continue
-            first, second = sorted((int(i), int(j)))
-            if _is_same(sections[first], sections[second]):
-                refuse(
-                    f"{drops[second].name}: is the same drop as {drops[first].name}: its noise "
-                    "is the same",
+                    f"{other.drop.name}: is the same drop as {one.drop.name}: its noise is the "
+                    "same",
                     "each drop once: repeatability is the scatter of different drops",
                 )
+        if record.path != later.path and _are_simultaneous(record.drops, later.drops):
+            refuse(
+                f"{later.name}: has the drops of {record.name} at the same instants of its file "
+                "at a different scale; simultaneous forces are never averaged",
+                f"one file with all channels and {HINT}; other balls or heights, which a trigger "
+                "records at the same instant, in a measurement of their own",
+            )
 
 
 class _Contact:
@@ -142,34 +123,30 @@ class _Contact:
 
     def __init__(self, drop: Drop) -> None:
         self.drop = drop
-        rate = drop.sample_rate
-        raw = drop.contact.force + drop.contact.removed
-        noise = raw[: drop.gate[0]]
-        width = max(3, round(SMOOTH * rate))
+        self.raw = drop.contact.force + drop.contact.removed
+        self.noise = self.raw[: drop.gate[0]]
         for _ in range(3):
-            noise = noise - uniform_filter1d(noise, width, mode="nearest")
-        self.raw = raw
-        self.noise = noise
-        self.deviation = float(noise.std()) if noise.size else 0.0
+            width = max(3, round(SMOOTH * drop.sample_rate))
+            self.noise = self.noise - uniform_filter1d(self.noise, width, mode="nearest")
+        self.deviation = float(self.noise.std()) if self.noise.size else 0.0
 
 
 def _is_same(one: _Contact, other: _Contact) -> bool:
-    """Whether two records of drops, of equal rate, have the same noise."""
+    """Whether two records of drops have the same noise before the gate, and the same force."""
     rate = one.drop.sample_rate
     limit = MAX_SHIFT_SAMPLES + int(MAX_SHIFT * rate)
-    length = min(len(one.noise), len(other.noise))
-    # Both end at the gates of the drops.
-    a, b = one.noise[len(one.noise) - length :], other.noise[len(other.noise) - length :]
-    product = correlate(a, b) / max(length * one.deviation * other.deviation, 1e-300)
-    middle = length - 1
-    near = product[max(middle - limit, 0) : middle + limit + 1]
-    best = int(np.argmax(near))
+    length = min(len(one.noise), len(other.noise)) - 2 * limit
     count = min(length, length / rate * BANDWIDTH)
-    if near[best] < max(MIN_CORRELATION, MIN_SCORE / np.sqrt(max(count, 1.0))):
+    if count < MIN_SCORE**2 or not math.isclose(rate, other.drop.sample_rate, rel_tol=SAME_RATE):
         return False
-    shift = best - min(middle, limit)
+    middle = one.noise[len(one.noise) - limit - length : len(one.noise) - limit]
+    near = np.correlate(other.noise[-length - 2 * limit :], middle, mode="valid")
+    near /= max(length * one.deviation * other.deviation, 1e-300)
+    best = int(np.argmax(near))
+    if near[best] < max(MIN_CORRELATION, MIN_SCORE / math.sqrt(count)):
+        return False
     noise = math.hypot(one.deviation, other.deviation)
-    return _difference(one, other, -shift) < MAX_DIFFERENCE * noise
+    return _difference(one, other, best - limit) < MAX_DIFFERENCE * noise
 
 
 def _difference(one: _Contact, other: _Contact, shift: int) -> float:
