@@ -257,8 +257,7 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
             errors.append(error)
     named = [error.note.subject.rpartition(".")[2] for error in errors if error.note]
     if len(named) == len(TRIAL_QUANTILES) and keys.issuperset(named):
-        error = errors[0].within("[fixed]")
-        raise error
+        raise errors[0].within("[fixed]")
 
 
 def with_density(case: Case, density: float) -> Case:
