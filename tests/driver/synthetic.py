@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.level.estimate import Estimate
-from thud.recordings.contact import Contact, uniform_bounds
+from thud.recordings.background import uniform_bounds
+from thud.recordings.contact import Contact
 from thud.recordings.drops import Section, cut_section, find_drops
 from thud.recordings.measured_drop import Drop
 from thud.recordings.noise import Background
@@ -155,7 +156,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         onset=before,
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force,
-            (np.zeros(1), np.zeros(1)), gate, offset, (before, after),
+            np.zeros(len(time)), gate, offset, (before, after),
             Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
         ),
         contact_time=Estimate(0.02, 0),

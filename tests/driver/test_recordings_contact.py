@@ -13,10 +13,17 @@ from scipy.ndimage import uniform_filter1d
 from synthetic import cut_drops, half_sine, make_drop
 
 from thud.impact.contact_time import contact_span
+from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
-from thud.recordings import contact, drops, flanks, measured_drop
+from thud.recordings import drops, flanks, measured_drop
+from thud.recordings.background import (
+    background_means,
+    cells_between,
+    remove_background,
+    uniform_bounds,
+)
 from thud.recordings.checks import aliasing
-from thud.recordings.contact import Contact, cells_between, uniform_bounds
+from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section
 from thud.recordings.plate import Plate
 from thud.recordings.response import Chain, correct_force
@@ -27,7 +34,11 @@ RATE = 25600.0
 
 def test_quiet_cells_grow_away_from_the_contact() -> None:
     """Of 0.5 ms up to 5 ms, 2 ms up to 25 ms, 3 ms up to 0.1 s."""
-    edges = contact._background_bounds(int(RATE), RATE) / RATE  # noqa: SLF001
+    force = np.zeros(int(2.2 * RATE))
+    (begins, ends), _ = background_means(force, int(RATE), int(1.2 * RATE), RATE, 0.0)
+    after = begins > 1.1
+    edges = np.append(begins[after], ends[-1]) - begins[after][0]
+    np.testing.assert_allclose(np.diff(edges), (ends - begins)[after])
     width, begin = np.diff(edges), edges[:-1]
     assert edges[0] == 0
     assert edges[-1] == pytest.approx(0.1, abs=1.5 / RATE)
@@ -35,8 +46,9 @@ def test_quiet_cells_grow_away_from_the_contact() -> None:
         inside = (begin > low - 1e-4) & (begin < high - 1e-4)
         np.testing.assert_allclose(width[inside], expected, atol=1.01 / RATE)
         assert width[inside].sum() == pytest.approx(high - low, abs=1.01 / RATE)
-    # What is longer than the quiet is left out.
-    assert contact._background_bounds(100, RATE)[-1] <= 100  # noqa: SLF001
+    # Cells that are longer than the background are left out.
+    (begins, _), _ = background_means(force, 100, int(1.2 * RATE), RATE, 0.0)
+    assert begins[0] > -1 / RATE
 
 
 def test_cells_have_their_samples_and_means() -> None:
@@ -50,38 +62,11 @@ def test_cells_have_their_samples_and_means() -> None:
     np.testing.assert_allclose(begins, (edges[:-1] - 0.5) / RATE - 0.01)
     np.testing.assert_allclose(ends - begins, np.diff(edges) / RATE)
     force = np.arange(2000.0) ** 2
-    quiet, mean = contact.background_means(force, 700, 1300, RATE, 0.04)
+    quiet, mean = background_means(force, 700, 1300, RATE, 0.04)
     for begin, end, value in zip(*quiet, mean, strict=True):
         first, stop = (round((time + 0.04) * RATE + 0.5) for time in (begin, end))
         assert value == pytest.approx(force[first:stop].mean())
         assert stop <= 700 or first >= 1300
-
-
-def test_flank_cells_are_fine_around_the_touch() -> None:
-    bounds = (0.0100, 0.0104)
-    fine = contact.flank_bounds(200, bounds, 0.015, 96_000.0, fine=True) / 96_000
-    coarse = contact.flank_bounds(200, bounds, 0.015, 96_000.0, fine=False) / 96_000
-    assert fine[0] == coarse[0] == 200 / 96_000
-    for edges in (fine, coarse):
-        assert 0.015 <= edges[-1] < 0.0153
-    np.testing.assert_allclose(np.diff(coarse), int(1e-4 * 96_000) / 96_000)
-    width, at = np.diff(fine), fine[:-1]
-    # 0.02 ms (a tenth of the half width), and 15 % of the distance beyond.
-    away = np.maximum(np.abs(at - 0.0102) - 2e-4, 0)
-    expected = np.maximum(2e-5, 0.15 * away)
-    np.testing.assert_array_equal(np.rint(width * 96_000), np.floor(expected * 96_000 + 1e-9))
-
-
-def test_response_of_a_correction_is_that_of_a_long_record() -> None:
-    plate = Plate(1600.0, 30.0)
-    found = contact._response(Chain((plate,)), RATE)  # noqa: SLF001
-    reach = len(found) // 2
-    unit = np.zeros(4001)
-    unit[2000] = 1
-    # Two periods of the resonance on both sides of its sample.
-    assert len(found) == 2 * int(2 * RATE / 1600) + 1
-    long = correct_force(unit, RATE, Chain((plate,)))[2000 - reach : 2000 + reach + 1]
-    np.testing.assert_allclose(found, long, atol=1e-3 * np.abs(long).max())
 
 
 def with_covariance(seed: int = 1) -> Contact:
@@ -155,9 +140,9 @@ def test_noise_of_the_quiet_is_that_outside_the_gate() -> None:
 def test_drift_and_hum_are_told_from_three_deviations_on(drift: float, hum: float) -> None:
     one = make_drop(1.0, RATE).contact
     gate = np.array(one.gate) / RATE
-    under = (np.array([gate[0], gate[1] - 1 / RATE]), np.array([-2.0, 12.0]))
-    known = SimpleNamespace(drift=(drift * 4, 4.0), hum=(60.0, hum * 0.5, 0.5))
-    notes = measured_drop._removed(replace(one, removed_means=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
+    removed = np.interp(np.arange(*one.span) / RATE, [gate[0], gate[1] - 1 / RATE], [-2.0, 12.0])
+    known = SimpleNamespace(drift=(drift * 4, 4.0), hum=(60.0, hum * 0.5, 0.5), tones=())
+    notes = replace(one, removed=removed, background=known).notes  # type: ignore[arg-type]
     # The mean of what lies under the contact.
     assert noted(notes, "offset_removed").value == pytest.approx(5.0)
     assert ("drift_removed" in codes(notes)) == (abs(drift) > 3)
@@ -197,12 +182,19 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
 TIME = np.sort(np.random.default_rng(1).uniform(-1e-3, 3e-3, 30))
 
 
+def columns_at(table: np.ndarray, tau: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return shapes of a table at times since the touch, ms, with the force as the last column."""
+    shapes = table[np.rint((tau + flanks.BEFORE) / flanks.TICK).astype(int)]
+    last = np.broadcast_to(force, tau.shape)[..., np.newaxis]
+    return np.concatenate([shapes, last], axis=-1)
+
+
 def flank() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return table, columns at three times of touch, and the covariance of the noise."""
     table = flanks._table(1e3 / RATE, None)  # noqa: SLF001
     level = np.where(TIME > 2e-4, 0.16 * 1e3 * (TIME - 2e-4), 0.0)
     touches = np.array([0.0, 2e-4, 5e-4])
-    columns = flanks._columns(table, 1e3 * (TIME - touches[:, None]), level)  # noqa: SLF001
+    columns = columns_at(table, 1e3 * (TIME - touches[:, None]), level)
     root = np.random.default_rng(5).normal(size=(30, 30)) / 30
     return level, columns, 4e-4 * np.eye(30) + 1e-3 * root @ root.T
 
@@ -211,8 +203,8 @@ def test_evidence_is_the_normal_density_of_the_flank() -> None:
     """With normal shapes of mean m and deviation S, y is normal: X m, C + X S2 X'."""
     level, columns, covariance = flank()
     inverse = np.linalg.inv(np.linalg.cholesky(covariance))
-    kinds = np.arange(len(flanks.KINDS))
-    found, factors = flanks._evidence(columns, inverse, kinds)  # noqa: SLF001
+    kinds = range(len(flanks.KINDS))
+    found, factors = flanks._evidence(columns, inverse)  # noqa: SLF001
     expected = np.empty(found.shape)
     for kind in kinds:
         for place, shapes in enumerate(columns[..., :-1]):
@@ -267,7 +259,7 @@ def test_table_holds_smoothed_shapes() -> None:
     interval = 1e3 / RATE
     table = flanks._table(interval, None)  # noqa: SLF001
     tau = np.array([-1.2, -0.03, 0.017, 0.5, 7.9])
-    found = flanks._columns(table, tau, np.zeros(5))[:, :-1]  # noqa: SLF001
+    found = columns_at(table, tau, np.zeros(5))[:, :-1]
     near, far = (flanks._shapes(tau + k * interval, interval) for k in (-1, 1))  # noqa: SLF001
     expected = (near + far) / 4 + flanks._shapes(tau, interval) / 2  # noqa: SLF001
     # Times are rounded to a microsecond, in which a jump that is spread rises by 1/39 of itself.
@@ -275,7 +267,7 @@ def test_table_holds_smoothed_shapes() -> None:
     np.testing.assert_allclose(found[:, 2:5], expected[:, 2:5], atol=2e-3)
     # A plate leaves a slow flank alone.
     plated = flanks._table(interval, Chain((Plate(1600.0, 30.0),)))  # noqa: SLF001
-    end = flanks._columns(plated, np.array([7.9]), np.zeros(1))[:, :-1]  # noqa: SLF001
+    end = columns_at(plated, np.array([7.9]), np.zeros(1))[:, :-1]
     np.testing.assert_allclose(end[0, 2], 7.9, atol=0.02)
 
 
@@ -294,43 +286,51 @@ def test_edge_is_where_the_force_of_a_line_begins_and_passes_a_percent() -> None
     shift = 1.3e-5
     level = np.maximum(0.16 * 1e3 * (time - shift), 0)
     smooth = np.convolve(level, flanks.SMOOTHING, mode="same")[1:-1]
-    one = flanks.Flank(
-        time[1:-1], 1500 * smooth, 2.0**2 * np.eye(len(smooth)), 1500.0, 1 / 25600, release=False
-    )
-    found = flanks.find_touch(one, -1e-3, 1e-3, 3)
-    assert found.weight.sum() == pytest.approx(1)
-    (touch, touch_error), (begin, begin_error) = found.edge_times()
-    assert abs(touch - shift) < 4 * touch_error
+    covariance = (2 / 1500) ** 2 * np.eye(len(smooth))
+
+    def find(low: float, high: float) -> tuple[Estimate, Estimate]:
+        interval = 1 / 25600
+        return flanks.find_touch(
+            time[1:-1], smooth, covariance, (low, high), interval, None, release=False
+        )
+
+    touch, begin = find(-1e-3, 1e-3)
+    assert abs(touch.value - shift) < 4 * touch.uncertainty
     # 1 % of the peak, averaged over 0.1 ms, at 0.01/0.16 ms.
-    assert abs(begin - shift - 0.01 / 160) < 4 * begin_error
-    assert 5e-6 < begin_error < 4e-5
-    mean, deviation = flanks._moments(found.time, found.weight.sum(axis=0))  # noqa: SLF001
-    weight = found.weight.sum(axis=0)
-    assert mean == pytest.approx(weight @ found.time)
-    width = found.time[1] - found.time[0]
-    variance = weight @ found.time**2 - mean**2 + width**2 / 12
-    assert deviation == pytest.approx(np.sqrt(variance), rel=1e-6)
+    assert abs(begin.value - shift - 0.01 / 160) < 4 * begin.uncertainty
+    assert 5e-6 < begin.uncertainty < 4e-5
     # The searches narrow to where the touch lies, from bounds of any width.
-    near = flanks.find_touch(one, shift - 4e-5, shift + 5e-5, 3)
-    near_mean, near_deviation = flanks._moments(near.time, near.weight.sum(axis=0))  # noqa: SLF001
-    assert mean == pytest.approx(near_mean, abs=0.1 * near_deviation)
-    assert deviation == pytest.approx(near_deviation, rel=0.1)
+    near, _ = find(shift - 2e-4, shift + 2.5e-4)
+    assert touch.value == pytest.approx(near.value, abs=0.1 * near.uncertainty)
+    assert touch.uncertainty == pytest.approx(near.uncertainty, rel=0.1)
 
 
 def test_only_rough_flanks_fall() -> None:
     """A force of 0.16 t - 0.035 t**2 falls by a tenth of the peak within 4 ms."""
-    kinds = np.array([0, flanks.N_SMOOTH])
-    assert not flanks.KINDS[0].rough
-    assert flanks.KINDS[kinds[1]].rough
+    smooth, rough = 0, flanks.N_SMOOTH
+    assert not flanks.KINDS[smooth].rough
+    assert flanks.KINDS[rough].rough
     # Shapes that are known to 1e-6 of their deviation.
     n = flanks.SPREADS.shape[1]
-    factors = 1e6 * np.tile(np.eye(n + 1), (2, 2, 1, 1))
+    factors = 1e6 * np.tile(np.eye(n + 1), (len(flanks.KINDS), 2, 1, 1))
     factors[:, :, -1, :-1] = 0
-    factors[:, :, -1, 4] = 1e6 * -0.07 / flanks.SPREADS[kinds, 4][:, None]
     # The two kinds touch at different times.
-    found = flanks.Posterior(np.array([0.0, 1e-3]), kinds, 0.5 * np.eye(2), factors, release=False)
-    (touch, _), _ = found.edge_times()
-    assert touch == 1e-3
+    weight = np.zeros((len(flanks.KINDS), 2))
+    weight[smooth, 0] = weight[rough, 1] = 0.5
+    for kind in (smooth, rough):
+        factors[kind, :, -1, 4] = 1e6 * -0.07 / flanks.SPREADS[kind, 4]
+    candidates = np.array([0.0, 1e-3])
+    touch, _, _, probability = flanks._draw_edges(candidates, weight, factors)  # noqa: SLF001
+    assert probability @ touch == pytest.approx(1e-3)
+
+
+def found_contact(record: np.ndarray, rate: float) -> tuple[Contact, int]:
+    """Return the contact of a record with one drop, and the first sample of its window."""
+    (section,) = cut_drops(Signal.from_array(record, rate))
+    force, removed, background = remove_background(
+        section.force, rate, section.contact, section.quantization
+    )
+    return find_contact(force, removed, background, rate, section.contact), section.start
 
 
 @pytest.mark.parametrize("rate", [8000.0, 51200.0])
@@ -349,22 +349,20 @@ def test_slow_release_ends_where_its_force_passes_a_percent(
     record = np.zeros(int(0.25 * rate))
     record[int(0.1 * rate) :][: len(pulse[::32])] += pulse[::32]
     record += np.random.default_rng(3).normal(size=len(record))
-    (window,) = cut_drops(Signal.from_array(record, rate))
-    found = contact.find_contact(window)
+    found, start = found_contact(record, rate)
     for edge, expected in ((found.begin, begin), (found.end, end)):
-        late = edge.value - expected - int(0.1 * rate) / rate + window.start / rate
+        late = edge.value - expected - int(0.1 * rate) / rate + start / rate
         assert abs(late) < min(3 * edge.uncertainty, 1e-4)
 
 
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
     force = half_sine(RATE, 0.1, int(0.22 * RATE)) + 40
     force[2700] += 300
-    (window,) = cut_drops(Signal.from_array(force, RATE))
-    found = contact.find_contact(window)
+    found, _ = found_contact(force, RATE)
     expected = uniform_filter1d(force - 40, round(RATE / 1250)).max()
     assert found.peak == pytest.approx(expected, rel=1e-3)
     assert found.gated.max() == pytest.approx((force - 40).max(), abs=0.5)
-    assert found.background_lengths == pytest.approx((0.1, 0.1), abs=1.2e-3)
+    assert found.background_lengths == pytest.approx((0.1, 0.1), abs=4.5e-3)
 
 
 @pytest.mark.parametrize("ahead", ["pulse", "step"])

@@ -24,7 +24,7 @@ from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.config import Config
-from thud.recordings.contact import cells_between, uniform_bounds
+from thud.recordings.background import cells_between, uniform_bounds
 from thud.recordings.noise import Background
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.recorded_levels import (

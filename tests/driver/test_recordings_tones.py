@@ -79,7 +79,7 @@ def test_noise_of_a_band_and_hum_are_no_tones() -> None:
 
 
 @pytest.mark.parametrize("frequency", [5600.0, 6400.0, 11600.0])
-def test_tones_near_multiples_of_the_rate_of_the_search_stay(frequency: float) -> None:
+def test_tones_beyond_the_recorded_band_stay(frequency: float) -> None:
     assert not notes(FORCE + 20 * np.sin(2 * np.pi * frequency * TIME))
 
 

@@ -8,6 +8,7 @@ docs/recordings_theory.md, section 6.
 
 from __future__ import annotations
 
+import math
 import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -22,13 +23,13 @@ import thud
 from thud.base.errors import InputError
 from thud.impact.contact_time import THRESHOLD, contact_span
 from thud.level.estimate import Estimate
-from thud.recordings import contact as contact_module
+from thud.recordings import background as background_module
 from thud.recordings.band_noise import band_functionals
-from thud.recordings.contact import Contact
-from thud.recordings.drops import Section
+from thud.recordings.contact import Contact, find_contact
 from thud.recordings.noise import MAINS, Background
+from thud.recordings.flanks import FLANK
+from thud.recordings.quantization import Quantization
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
-from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -195,15 +196,15 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     peak = float(clean.max())
     variances[3 + MAINS.index(draw.mains)] = (draw.hum * peak) ** 2 / 2
     middle = (first + last) / 2 / rate
-    saved = contact_module.BACKGROUND_CELLS
-    contact_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
+    saved = background_module.BACKGROUND_CELLS
+    background_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
-        quiet, mean = contact_module.background_means(clean, first, last, rate, middle)
+        quiet, mean = background_module.background_means(clean, first, last, rate, middle)
     finally:
-        contact_module.BACKGROUND_CELLS = saved
+        background_module.BACKGROUND_CELLS = saved
     background = Background(quiet, mean, variances[None], peak)
-    edges = contact_module.uniform_bounds(first, last, rate)
-    _, covariance = background.predict(contact_module.cells_between(edges, rate, middle))
+    edges = background_module.uniform_bounds(first, last, rate)
+    _, covariance = background.predict(background_module.cells_between(edges, rate, middle))
     contact = Contact(
         Estimate(onset, 0),
         Estimate(onset + contact_time, 0),
@@ -212,7 +213,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
         peak,
         (first, last),
         clean[first:last],
-        (np.zeros(1), np.zeros(1)),
+        np.zeros(last - first),
         (first, last),
         covariance,
         (1.0, 1.0),
@@ -235,18 +236,20 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     """
     rate, contact = draw.rate, oracle.contact
     touch, release = contact.touch.value, contact.release.value
-    section = Section("record", record, rate, 0, contact.span)
-    saved = contact_module.BACKGROUND_CELLS
-    contact_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
+    saved = background_module.BACKGROUND_CELLS
+    background_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
-        found = contact_module.find_edges(section, contact.background, passes=2)
+        force, removed, background = background_module.remove_background(
+            record, rate, contact.span, Quantization(), contact.background
+        )
     finally:
-        contact_module.BACKGROUND_CELLS = saved
-    spread = float(np.hypot(*(edge.edge_times()[1][1] for edge in (found.touch, found.release))))
+        background_module.BACKGROUND_CELLS = saved
+    found = find_contact(force, removed, background, rate, contact.span)
+    spread = math.hypot(found.begin.uncertainty, found.end.uncertainty)
     if draw.shape != "half sine":
         return spread, np.nan
-    count = max(4, int(contact_module.FLANK * min(rate, 2e4)))
-    edges = np.linspace(0, contact_module.FLANK, count + 1)
+    count = max(4, int(FLANK * min(rate, 2e4)))
+    edges = np.linspace(0, FLANK, count + 1)
     tau = (edges[1:] + edges[:-1]) / 2
     slope = np.pi * contact.peak / (release - touch)
     shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.level.levels import Bands
+    from thud.recordings.contact import Contact
     from thud.recordings.measured_drop import Drop
 
 # Energy of a functional, as a fraction of the largest, below which it is negligible.
@@ -22,8 +24,8 @@ NEGLIGIBLE = 1e-14
 # noise, and standard deviations by which it exceeds it.
 MIN_GATES = 3
 CHANCE = 4.0
-# Maximum number of drops whose covariances are in memory at the same time.
-MAX_DROPS = 64
+# Gates share the functionals of the next multiple of this number of samples.
+GATE_LENGTH = 256
 
 
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
@@ -43,28 +45,56 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
     return np.asarray(size[significant, None] * rows[significant])
 
 
+@lru_cache(maxsize=64)
+def _functionals(length: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
+    return band_functionals(length, rate, lower, upper)
+
+
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
     """Return energies of the noise within the gates in bands, N2 s, [n_drop, n_band, 3].
 
     The last axis holds the expected energy of the noise, and the standard deviations of the force's
-    energy after its subtraction: by noise, and by quantization with a quiet background. Drops with
-    equal rates share the functionals of the longest gate; drops with equal gate lengths also share
-    the products of functionals.
+    energy after its subtraction: by noise, and by quantization with a quiet background.
     """
-    groups: dict[float, dict[int, list[int]]] = {}
-    for i, drop in enumerate(drops):
-        count = drop.gate[1] - drop.gate[0]
-        groups.setdefault(drop.sample_rate, {}).setdefault(count, []).append(i)
     edges = list(zip(bands.lower, bands.upper, strict=True))
     energies = np.empty((len(drops), len(edges), 3))
-    for rate, gates in groups.items():
-        functionals = [band_functionals(max(gates), rate, *edge) for edge in edges]
-        for count, indices in gates.items():
-            for k in range(0, len(indices), MAX_DROPS):
-                block = indices[k : k + MAX_DROPS]
-                rows = [functional[:, :count] for functional in functionals]
-                energies[block] = _energies([drops[i] for i in block], rows, edges)
+    for i, drop in enumerate(drops):
+        quiet, errors = drop.contact.quiet_gates, drop.contact.quantization_errors
+        for k, edge in enumerate(edges):
+            energies[i, k] = _energies(drop.contact, quiet, errors, *edge)
     return energies
+
+
+def _energies(
+    contact: Contact,
+    quiet: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    lower: float,
+    upper: float,
+) -> tuple[float, float, float]:
+    """Return the energy of the noise in a band, N2 s, and the deviations of that of the force.
+
+    `quiet` are sections of the background, `errors` those of the force by quantization, N.
+    """
+    force, rate, background = contact.gated, contact.sample_rate, contact.background
+    length = GATE_LENGTH * math.ceil(len(force) / GATE_LENGTH)
+    rows = _functionals(length, rate, lower, upper)[:, : len(force)]
+    values, covariance = rows @ force, contact.covariance_of(rows)
+    # What the contact has beyond the background may be the force: it is not subtracted.
+    further = contact.white_variance - background.variances[0] * rate / 2
+    further *= float((rows**2).sum())
+    excess = _excess(quiet, covariance, rows)
+    noise = excess * (float(np.trace(covariance)) - further)
+    covariance *= excess
+    squares = float((covariance**2).sum())
+    # The noise in `values` makes the first term too large by twice the second, on average.
+    variance = max(4 * float(values @ covariance @ values) - 2 * squares, 2 * squares)
+    density, spread = background.density((lower + upper) / 2)
+    variance += (noise * spread / density) ** 2 + further**2
+    # An error e changes the energy by 2 (R f)' R e + |R e|**2.
+    changes = errors @ rows.T
+    quantized = ((changes + 2 * values) * changes).sum(axis=1)
+    return noise, math.sqrt(variance), float(quantized.std()) if len(quantized) else 0.0
 
 
 def _excess(
@@ -80,46 +110,3 @@ def _excess(
     deviation = math.sqrt(2 * float((covariance**2).sum()) / len(gates))
     energy = float(((gates @ rows.T) ** 2).sum()) / len(gates)
     return energy / expected if energy > expected + CHANCE * deviation else 1.0
-
-
-def _energies(
-    drops: Sequence[Drop],
-    functionals: Sequence[NDArray[np.float64]],
-    edges: Sequence[tuple[float, float]],
-) -> NDArray[np.float64]:
-    """Return the energies of drops with gates of one length, [n_drop, n_band, 3]."""
-    contacts = [drop.contact for drop in drops]
-    forces = np.array([drop.force[slice(*drop.gate)] for drop in drops])
-    slow_covariance = np.array([contact.covariance for contact in contacts])
-    white_variance = np.array([contact.white_variance for contact in contacts])
-    further_variance = white_variance - [
-        contact.background.variances[0] * contact.sample_rate / 2 for contact in contacts
-    ]
-    quiet = [contact.quiet_gates for contact in contacts]
-    errors = [contact.quantization_errors for contact in contacts]
-    energies = np.empty((len(drops), len(edges), 3))
-    for band, (rows, edge) in enumerate(zip(functionals, edges, strict=True)):
-        values, summed = forces @ rows.T, contacts[0].summed(rows)
-        covariance = white_variance[:, None, None] * (rows @ rows.T)
-        covariance += summed @ slow_covariance @ summed.T
-        # What the contact has beyond the background may be the force: it is not subtracted.
-        further = further_variance * (rows**2).sum()
-        noise = np.trace(covariance, axis1=1, axis2=2) - further
-        excess = np.array([_excess(*pair, rows) for pair in zip(quiet, covariance, strict=True)])
-        covariance *= excess[:, None, None]
-        noise *= excess
-        squares = (covariance**2).sum(axis=(1, 2))
-        # The noise in `values` makes the first term too large by twice the second, on average.
-        variance = 4 * np.einsum("di,dij,dj->d", values, covariance, values) - 2 * squares
-        middle = sum(edge) / 2
-        density, spread = np.array([contact.background.density(middle) for contact in contacts]).T
-        variance = np.maximum(variance, 2 * squares) + (noise * spread / density) ** 2
-        variance += further**2
-        # An error e changes the energy by 2 (R f)' R e + |R e|**2.
-        changes = [error @ rows.T for error in errors]
-        quantized = [
-            float(((change + 2 * value) * change).sum(axis=1).std()) if len(change) else 0.0
-            for change, value in zip(changes, values, strict=True)
-        ]
-        energies[:, band] = np.column_stack([noise, np.sqrt(variance), quantized])
-    return energies

@@ -208,17 +208,13 @@ class Contact(Immutable):
         offset = self.background.quantization.offset * (self.end.value - self.begin.value)
         return max(float(impulses.std()), offset) if impulses.size else 0.0
 
-    def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return functionals of the samples of the gate, [k, n], summed in cells: [k, n_cell]."""
-        bounds = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
-        return np.add.reduceat(functionals, bounds[:-1].astype(int), axis=1)
-
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance, [k, k], of the errors of weighted sums of the force in the gate.
 
         The rows of `functionals`, [k, n], are the weights of the samples.
         """
-        summed = self.summed(functionals)
+        bounds = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
+        summed = np.add.reduceat(functionals, bounds[:-1].astype(int), axis=1)
         result: NDArray[np.float64] = self.white_variance * functionals @ functionals.T
         return result + summed @ self.covariance @ summed.T
 
