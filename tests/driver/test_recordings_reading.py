@@ -10,9 +10,7 @@ import struct
 import time
 import tomllib
 import tracemalloc
-import warnings
 import zlib
-from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
 from functools import cache
 from itertools import product
@@ -39,7 +37,6 @@ from thud.base.errors import InputError
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
-from thud.recordings.channel import guarded
 from thud.recordings.config import read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
@@ -1370,15 +1367,3 @@ def test_text_of_a_calibration_is_as_in_the_configuration(
     lab.write_text(f'calibration = "{calibration}"\n', encoding="utf-8")
     _, force = read_all(tmp_path / name, calibration=read_config(lab).calibration)
     np.testing.assert_allclose(force, exact, atol=1e-3)
-
-
-def test_threads_that_read_leave_the_filters_of_warnings_as_they_are(tmp_path: Path) -> None:
-    before = list(warnings.filters)
-
-    def read(number: int) -> None:
-        with guarded(tmp_path, "HDF5"):
-            time.sleep(0.001 * (number % 7))
-
-    with ThreadPoolExecutor(8) as threads:
-        list(threads.map(read, range(64)))
-    assert list(warnings.filters) == before
