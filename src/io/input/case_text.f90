@@ -112,7 +112,7 @@ contains
       !> The keys that the case uses: [n_field].
       type(field_type), intent(in) :: fields(:)
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: where
+      character(len=:), allocatable :: allowed, where
       integer :: i
 
       do i = 1, size(assignments)
@@ -123,8 +123,9 @@ contains
             where = 'without &floor'
             if (case%has_floor) where = 'with &floor: name = '//quoted(case%floor)
          end if
+         call list_distinct(fields%group, allowed)
          error = input_error('&'//trim(assignments(i)%group)//' in line '//to_text(assignments(i)%line)//' does nothing ' &
-            //where//'; allowed: '//join_quoted(distinct(fields%group)))
+            //where//'; allowed: '//allowed)
          return
       end do
    end subroutine check_use
@@ -152,8 +153,8 @@ contains
          if (key == '') label = '&'//shortened(trim(group))//' in line '//to_text(assignments(i)%line)
          if (size(keys) == 0) then
             call get_suggestion(trim(group), fields%group, suggestion)
-            error = input_error(label//' is not a known group'//suggestion//'; allowed: ' &
-               //join_quoted(distinct(fields%group)))
+            call list_distinct(fields%group, allowed)
+            error = input_error(label//' is not a known group'//suggestion//'; allowed: '//allowed)
          else if (earlier > 0) then
             error = input_error(label//' is given a second time, after line '//to_text(assignments(earlier)%line) &
                //'; allowed: once')
@@ -161,7 +162,7 @@ contains
             continue
          else if (field == 0) then
             call get_suggestion(trim(key), keys, suggestion)
-            allowed = join_quoted(distinct(keys))
+            call list_distinct(keys, allowed)
             if (len(allowed) > longest_list) allowed = 'the keys that thud --keys lists'
             error = input_error(label//' is not a known key'//suggestion//'; allowed: '//allowed)
          else if (assignments(i)%value == '') then
@@ -174,15 +175,18 @@ contains
       end associate
    end subroutine assign
 
-   !> Texts without repetition, in their order.
-   pure function distinct(texts) result(once)
+   !> Lists texts in quotes without repetition, in their order.
+   pure subroutine list_distinct(texts, list)
       !> The texts: [n].
       character(len=*), intent(in) :: texts(:)
+      character(len=:), allocatable, intent(out) :: list
       character(len=len(texts)), allocatable :: once(:)
       integer :: i
 
+      ! In a variable: of the result of a function with allocatable shape, gfortran takes wrong lengths.
       once = pack(texts, [(.not. any(texts(:i - 1) == texts(i)), i=1, size(texts))])
-   end function distinct
+      list = join_quoted(once)
+   end subroutine list_distinct
 
    !> The input as the text of a namelist file; reading it gives the same case. Values of the standard ball for keys
    !> with an effect that the case does not state are comments.
