@@ -104,7 +104,7 @@ contains
          normal(i, i) = normal(i, i) + ridge
       end do
       minimum = margin*sum(abs([(get_response(pole, residue, direct, frequency(i)), i=1, size(frequency))]))/size(frequency)
-      allocate (constrained(0))
+      allocate (constrained(0), x(n))
       do i = 1, 2*n_round
          direct = max(direct, minimum)
          call find_violations(pole, residue, direct, omega, failed)
