@@ -1,7 +1,7 @@
 """Checks of recordings: what each protects from, and how far levels are off without it.
 
-The sizes are those of a half-sine of 1500 N and 20 ms. A further check is a file with a function
-`check` and a line in one of the tables; its words are in `thud.base.sentences`.
+The sizes are those of a half-sine of 1500 N and 20 ms. A further check is a function in a file,
+and a line in one of the tables; its words are in `thud.base.sentences`.
 """
 
 from __future__ import annotations
@@ -9,16 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.recordings import load_cells, polarity
-from thud.recordings.checks import (
-    aliasing,
-    clipping,
-    coarse_steps,
-    copies,
-    gaps,
-    jumps,
-    missing_codes,
-    outliers,
-)
+from thud.recordings.checks import aliasing, clipping, continuity, copies, outliers, quantization
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,12 +36,12 @@ SECTION_CHECKS = (
         "at 1450 N 1.3 dB at 250 Hz, at 1200 N 3.9 dB at 125 Hz",
     ),
     Check(
-        missing_codes.check,
+        quantization.check_codes,
         "a converter without some of its values",
         "without the bit of 32 N 0.4 dB at 250 Hz",
     ),
     Check(
-        gaps.check,
+        continuity.check_gaps,
         "samples that are held, filled by a line or gated",
         "3 ms of the touch 16 dB at 500 Hz, a gate of 40 N 1 dB at 500 Hz",
     ),
@@ -58,7 +49,7 @@ SECTION_CHECKS = (
 # Of a contact, after the removal of the background.
 CONTACT_CHECKS = (
     Check(
-        jumps.check,
+        continuity.check_jumps,
         "packets that are lost, filled or exchanged",
         "of 2 ms 12 dB at 250 and 500 Hz",
     ),
@@ -68,18 +59,14 @@ CONTACT_CHECKS = (
         "the size in the warning, at 500 Hz",
     ),
     Check(
-        coarse_steps.check,
+        quantization.check_offset,
         "an offset that is not known within a step of quantization",
-        "an offset of 0.05 % of the peak 0.01 dB at 31.5 Hz; the uncertainty includes it",
+        "an offset of 0.05 % of the peak 0.06 dB at 500 Hz; the uncertainty includes it",
     ),
 )
 # Of what is more or less than a drop: where it is read or averaged.
 OTHER_CHECKS = (
-    Check(
-        polarity.check_peak,
-        "a wrong sign, unit or calibration",
-        "kN in place of N 60 dB",
-    ),
+    Check(polarity.check_peak, "a wrong sign, unit or calibration", "kN in place of N 60 dB"),
     Check(
         load_cells.check_cells,
         "load cells that carry no force or count twice",

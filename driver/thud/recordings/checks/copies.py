@@ -100,6 +100,8 @@ def refuse_simultaneous_channels(spans: Spans, others: Sequence[Spans]) -> None:
 
 def refuse_same_drops(records: Sequence[Record]) -> None:
     """Raise InputError if two records hold the same drop, or simultaneous forces."""
+    if len(records) == 1:
+        return
     contacts = [[_Contact(drop) for drop in record.drops] for record in records]
     for (record, ones), (later, others) in combinations(zip(records, contacts, strict=True), 2):
         for one, other in product(ones, others):
