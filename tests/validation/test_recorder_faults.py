@@ -11,20 +11,20 @@ from threadpoolctl import threadpool_limits
 sys.path.insert(0, str(Path(__file__).parent))
 from recorder_faults import CONDITIONS, measure
 
-# Words of the true cause in the warning or refusal, by condition.
+# Codes of the warnings, or words of the refusal, that name the true cause, by condition.
 CAUSES = {
-    "packets": "jumps",
-    "3 ms held": "held|constant",
-    "zero outside": "constant",
-    "gate": "constant",
+    "packets": "jump",
+    "3 ms held": "is held|constant_background",
+    "zero outside": "constant_background",
+    "gate": "constant_background",
     "needles": "spikes",
     "missing codes": "never occur",
-    "multiplexed": "half the rate",
-    "2 kHz": "noise of the background ends",
-    "mean": "noise of the background ends",
-    "low-pass": "noise of the background ends",
+    "multiplexed": "aliasing",
+    "2 kHz": "noise_ends",
+    "mean": "noise_ends",
+    "low-pass": "noise_ends",
     "line": "filled by a line",
-    "amplifier": "rounds the force off|impossible|differ by",
+    "amplifier": "drop_like_bounce|restitution_impossible|restitutions_differ",
 }
 SEEDS = range(3)
 
