@@ -26,7 +26,7 @@ from thud.recordings.checks import aliasing
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section
 from thud.recordings.plate import Plate
-from thud.recordings.response import Chain, correct_force
+from thud.recordings.response import Chain
 from thud.recordings.signal import Signal
 
 RATE = 25600.0

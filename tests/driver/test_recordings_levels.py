@@ -20,11 +20,11 @@ import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.recordings.assumptions import instrument_contributions
+from thud.recordings.background import cells_between, uniform_bounds
 from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_estimates, find_deviant
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.config import Config
-from thud.recordings.background import cells_between, uniform_bounds
 from thud.recordings.noise import Background
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.recorded_levels import (

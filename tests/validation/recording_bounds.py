@@ -26,8 +26,8 @@ from thud.level.estimate import Estimate
 from thud.recordings import background as background_module
 from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, find_contact
-from thud.recordings.noise import MAINS, Background
 from thud.recordings.flanks import FLANK
+from thud.recordings.noise import MAINS, Background
 from thud.recordings.quantization import Quantization
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
 

@@ -257,7 +257,8 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
             errors.append(error)
     named = [error.note.subject.rpartition(".")[2] for error in errors if error.note]
     if len(named) == len(TRIAL_QUANTILES) and keys.issuperset(named):
-        raise errors[0].within("[fixed]")
+        place = "[fixed]"
+        raise errors[0].within(place) from errors[0]
 
 
 def with_density(case: Case, density: float) -> Case:
