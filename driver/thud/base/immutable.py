@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -100,6 +100,8 @@ def _equal(value: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
         return np.array_equal(value, other, equal_nan=has_nan)
     if type(value) is not type(other):
         return False
+    if is_dataclass(value):
+        value, other = _fields(value), _fields(other)
     if isinstance(value, dict):
         return value.keys() == other.keys() and all(_equal(value[key], other[key]) for key in value)
     if isinstance(value, tuple):
