@@ -80,23 +80,21 @@ def find_encoding(path: Path, is_known: Callable[[str], bool]) -> str:
         return "utf-16"
     lines = [line for line in content.split(b"\n") if not line.isascii()]
     header = b"\n".join(lines[:-1] if len(content) == _MAX_HEADER_SIZE else lines)
-    counts = {name: _count_known(header, name, is_known) for name in ("utf-8", *ENCODINGS)}
-    if counts["utf-8"] is not None:
-        return "utf-8-sig"
-    best = max(ENCODINGS, key=lambda name: counts[name] or 0)
-    if counts[best]:
-        return best
-    others = {c for c in header.decode("latin-1") if not c.isascii()}
-    return "latin-1" if others <= _GERMAN else "utf-8-sig"
-
-
-def _count_known(header: bytes, encoding: str, is_known: Callable[[str], bool]) -> int | None:
-    """Return the number of known words that are not ASCII; None in another encoding."""
     try:
-        text = header.decode(encoding)
+        header.decode("utf-8")
     except UnicodeDecodeError:
-        return None
-    cells = (cell.strip(" \r\n\"'#") for cell in _WORD_SEPARATOR.split(text.replace("\n", "\t")))
+        best = max(ENCODINGS, key=lambda name: _count_known(header, name, is_known))
+        others = {c for c in header.decode("latin-1") if not c.isascii()}
+        if _count_known(header, best, is_known):
+            return best
+        return "latin-1" if others <= _GERMAN else "utf-8-sig"
+    return "utf-8-sig"
+
+
+def _count_known(header: bytes, encoding: str, is_known: Callable[[str], bool]) -> int:
+    """Return the number of known words that are not ASCII."""
+    words = _WORD_SEPARATOR.split(header.decode(encoding, "replace").replace("\n", "\t"))
+    cells = (word.strip(" \r\n\"'#") for word in words)
     return sum(not cell.isascii() and is_known(cell) for cell in cells)
 
 

@@ -174,7 +174,7 @@ def _in_newtons(
 
     Its sign is that of the file, or with a stated polarity that of a compression.
     """
-    name = shown_path(file.name) + f", {channel.title}" * several
+    name = shown_path(file.name) + (f", {channel.title}" if several else "")
     if channel.n_sample < MIN_SAMPLES:
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     rate, notes = _rate(channel, config.sample_rate, name)
