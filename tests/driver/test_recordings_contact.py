@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from scipy.ndimage import uniform_filter1d
 from synthetic import cut_drops, half_sine, make_drop
 
 from thud.impact.contact_time import contact_span
-from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.recordings import drops, flanks, measured_drop
 from thud.recordings.background import (
@@ -28,6 +28,9 @@ from thud.recordings.drops import Section
 from thud.recordings.plate import Plate
 from thud.recordings.response import Chain
 from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from thud.level.estimate import Estimate
 
 RATE = 25600.0
 
@@ -327,10 +330,7 @@ def test_only_rough_flanks_fall() -> None:
 def found_contact(record: np.ndarray, rate: float) -> tuple[Contact, int]:
     """Return the contact of a record with one drop, and the first sample of its window."""
     (section,) = cut_drops(Signal.from_array(record, rate))
-    force, removed, background = remove_background(
-        section.force, rate, section.contact, section.quantization
-    )
-    return find_contact(force, removed, background, rate, section.contact), section.start
+    return find_contact(section, *remove_background(section)), section.start
 
 
 @pytest.mark.parametrize("rate", [8000.0, 51200.0])

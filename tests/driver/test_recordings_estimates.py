@@ -25,6 +25,7 @@ import thud
 from thud.impact.contact_time import contact_span
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
+from thud.recordings.background import remove_background
 from thud.recordings.budgets import average_mass, average_restitution, drop_estimates
 from thud.recordings.config import Config
 from thud.recordings.contact import find_contact
@@ -59,7 +60,7 @@ def drops(force: np.ndarray, rate: float, **known: float) -> list[Drop]:
 
 def measured(section: Section, conditions: DropConditions) -> Drop:
     repaired = repair(section)
-    return measure_drop(repaired, find_contact(repaired), conditions)
+    return measure_drop(repaired, find_contact(repaired, *remove_background(repaired)), conditions)
 
 
 def levels(drop: Drop) -> np.ndarray:
@@ -615,7 +616,7 @@ def test_quiet_has_no_impact(force: np.ndarray) -> None:
 def test_contact_is_refused_from_a_quarter_of_uncertainty_on(ratio: float) -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=24e3, noise_db=50)
     (section,) = cut_drops(Signal.from_array(force, 24e3))
-    found = find_contact(section)
+    found = find_contact(section, *remove_background(section))
     time = found.end.value - found.begin.value
     # Of begin and end alike.
     ends = {

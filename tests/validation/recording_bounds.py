@@ -26,10 +26,11 @@ from thud.level.estimate import Estimate
 from thud.recordings import background as background_module
 from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, find_contact
+from thud.recordings.drops import Section
 from thud.recordings.flanks import FLANK
 from thud.recordings.noise import MAINS, Background
-from thud.recordings.quantization import Quantization
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -236,15 +237,14 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     """
     rate, contact = draw.rate, oracle.contact
     touch, release = contact.touch.value, contact.release.value
+    section = Section("record", record, rate, 0, contact.span)
     saved = background_module.BACKGROUND_CELLS
     background_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
     try:
-        force, removed, background = background_module.remove_background(
-            record, rate, contact.span, Quantization(), contact.background
-        )
+        force, background = background_module.remove_background(section, contact.background)
     finally:
         background_module.BACKGROUND_CELLS = saved
-    found = find_contact(force, removed, background, rate, contact.span)
+    found = find_contact(section, force, background)
     spread = math.hypot(found.begin.uncertainty, found.end.uncertainty)
     if draw.shape != "half sine":
         return spread, np.nan

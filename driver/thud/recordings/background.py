@@ -23,8 +23,8 @@ from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.recordings.drops import Section
     from thud.recordings.noise import Cells
-    from thud.recordings.quantization import Quantization
 
 # The background is averaged over cells. Pairs: width of a cell, and distance from the contact up to
 # which this width is used, s.
@@ -67,33 +67,17 @@ INSTANTS = np.linspace(0, 1, 33)
 
 
 def remove_background(
-    force: NDArray[np.float64],
-    rate: float,
-    contact: tuple[int, int],
-    quantization: Quantization,
-    noise: Background | None = None,
-) -> tuple[NDArray[np.float64], NDArray[np.float64], Background]:
-    """Return a force without its background, the removed background, N, and its fit.
+    section: Section, noise: Background | None = None
+) -> tuple[NDArray[np.float64], Background]:
+    """Return the force of a section without its background, N, shape (n,), and the background.
 
     Tones are removed by least squares. Offset, drift, hum and slow noise during the contact are
-    their generalized least-squares prediction from the background on both sides.
-
-    Parameters
-    ----------
-    force : ndarray, shape (n,)
-        Force of one pulse with background before and after it, N.
-    rate
-        Samples per second, Hz.
-    contact
-        First and stop index of the contact, accurate to about 1 ms.
-    quantization
-        Errors of the force by quantization.
-    noise
-        Fit of the noise to another section of the signal; fitted to this one if None.
+    their generalized least-squares prediction from the background on both sides. `noise` is the fit
+    of the noise to another section; if None, it is fitted to this one.
     """
-    first, stop = contact
+    force, rate, (first, stop) = section.force, section.sample_rate, section.contact
     count, middle = len(force), (first + stop) / 2 / rate
-    tones, notes = find_tones(force, rate, contact)
+    tones, notes = find_tones(force, rate, section.contact)
     quiet = force - tones
     # At most half of a short background is cut off.
     before_stop = int(max(first - MARGIN * rate, first / 2))
@@ -110,6 +94,7 @@ def remove_background(
     before_stop = int(np.clip(reach[0], first / 2, before_stop))
     after_start = int(np.clip(reach[1], after_start, (stop + count) / 2))
     cells, mean = background_means(quiet, before_stop, after_start, rate, middle)
+    quantization = section.quantization
     if noise is None:
         draws = fit_background(cells, mean, peak).draws.copy()
         draws[:, 0] = np.maximum(draws[:, 0], quantization.density)
@@ -130,7 +115,7 @@ def remove_background(
         (predicted[0] + predicted[1]) / 2,
         background.predict_mean(predicted),
     )
-    return quiet - slow, tones + offset + slow, background
+    return quiet - slow, background
 
 
 def cells_between(bounds: NDArray[np.intp], rate: float, middle: float) -> Cells:
@@ -250,7 +235,8 @@ def find_offset_step(background: Background, impulse: float) -> float:
         return 0.0
     fit = fit_background(cells, mean, peak, column=after)
     covariance = np.tensordot(fit.variances, unit_covariances(cells), 1)
-    factor = np.linalg.cholesky(covariance + fixed_covariance(cells, peak))
+    covariance += fixed_covariance(cells, peak)
+    factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
     column, white = solve_lower(factor, np.column_stack([after, mean])).T
     step = float(column @ white / (column @ column))
     if abs(step) < max(MIN_RATIO / math.sqrt(column @ column), MIN_STEP * peak):

@@ -14,23 +14,25 @@ from scipy.special import comb
 from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.impact.contact_time import THRESHOLD
-from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.recordings.background import cell_means, cells_between, uniform_bounds
 from thud.recordings.flanks import FLANK, SMOOTHING, find_touch
-from thud.recordings.noise import MAINS, N_HARMONIC, Background
+from thud.recordings.noise import MAINS, N_HARMONIC
 from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.recordings.response import Chain
+    from thud.level.estimate import Estimate
+    from thud.recordings.drops import Section
+    from thud.recordings.noise import Background
 
 # Maximum time from the start of the pulse that the search for drops returns to the touch, s.
 MAX_DELAY = 1e-3
 # Width of the cells of a flank, s.
 FLANK_CELL = 4e-5
+# Number of frequencies at which the noise after a correction is evaluated.
 N_FREQUENCY = 200
 # The gate of the levels extends this many samples beyond the contact, and (GATE_RATE / rate)**2
 # more at low rates, at which the anti-aliasing filter is close to the octave of 500 Hz.
@@ -219,31 +221,11 @@ class Contact(Immutable):
         return result + summed @ self.covariance @ summed.T
 
 
-def find_contact(
-    force: NDArray[np.float64],
-    removed: NDArray[np.float64],
-    background: Background,
-    rate: float,
-    contact: tuple[int, int],
-    chain: Chain | None = None,
-) -> Contact:
-    """Return the contact of a pulse.
-
-    Parameters
-    ----------
-    force, removed : ndarray, shape (n,)
-        Force without background, and the removed background, N.
-    background
-        Fit of the background.
-    rate
-        Samples per second, Hz.
-    contact
-        First and stop index of the contact, accurate to about 1 ms.
-    chain
-        Instruments whose responses were corrected.
-    """
-    touch, begin = _find_edge(force, background, rate, contact[0], chain, side=1)
-    release, end = _find_edge(force, background, rate, contact[1], chain, side=-1)
+def find_contact(section: Section, force: NDArray[np.float64], background: Background) -> Contact:
+    """Return the contact of a section; `force` is that without its background, N, shape (n,)."""
+    rate, chain = section.sample_rate, section.chain
+    touch, begin = _find_edge(section, force, background, side=1)
+    release, end = _find_edge(section, force, background, side=-1)
     # Samples into which filters spread the flanks belong to the gate.
     margin = GATE_SAMPLES + int((GATE_RATE / rate) ** 2)
     margin += int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
@@ -268,7 +250,7 @@ def find_contact(
         background.peak,
         span,
         force[slice(*span)],
-        removed[slice(*span)],
+        (section.force - force)[slice(*span)],
         gate,
         background.predict(cells)[1],
         (background.ends[0], len(force) / rate - background.ends[1]),
@@ -278,17 +260,14 @@ def find_contact(
 
 
 def _find_edge(
-    force: NDArray[np.float64],
-    background: Background,
-    rate: float,
-    index: int,
-    chain: Chain | None,
-    side: int,
+    section: Section, force: NDArray[np.float64], background: Background, side: int
 ) -> tuple[Estimate, Estimate]:
     """Return first touch and begin of a contact (side 1), or its release and end (side -1), s.
 
-    The index is that of the edge to about 1 ms. For the release, times are reversed.
+    For the release, times are reversed.
     """
+    rate, chain = section.sample_rate, section.chain
+    index = section.contact[0 if side > 0 else 1]
     end = background.ends[0 if side > 0 else 1]
     search = side * end, side * index / rate + MARGIN
     stop = index + side * (MAX_DELAY + FLANK) * rate

@@ -120,8 +120,8 @@ class Pulse:
 class Section:
     """Samples of a signal around one drop or bounce.
 
-    Each stage takes a section and returns one: `thud.recordings.repair.repair`,
-    `thud.recordings.tones.remove_tones`, `thud.recordings.response.correct`.
+    `thud.recordings.repair.repair` and `thud.recordings.response.correct` take a section and return
+    one.
 
     Attributes
     ----------

@@ -168,16 +168,17 @@ def find_touch(  # noqa: PLR0913, PLR0917 - all of them describe one flank
             break
         low, high = max(low, mean - half_width), min(high, mean + half_width)
     touch, delay, kind, probability = _draw_edges(candidates, weight, factors)
-    results = []
-    for value, variance, error in (
-        (touch, spacing, TOUCH_ERRORS[release]),
-        # A candidate time is that of the threshold only at a jump.
-        (touch + 1e-3 * delay, spacing * float(probability @ (delay == 0)), ERRORS[kind]),
-    ):
+
+    def estimate(value: NDArray[np.float64], variance: NDArray[np.float64]) -> Estimate:
         mean = float(probability @ value)
-        variance += float(probability @ ((value - mean) ** 2 + error**2))
-        results.append(Estimate(mean, float(np.sqrt(variance))))
-    return results[0], results[1]
+        variance = probability @ ((value - mean) ** 2 + variance)
+        return Estimate(mean, float(np.sqrt(variance)))
+
+    # A candidate time is that of the threshold only at a jump.
+    return (
+        estimate(touch, np.full(len(touch), spacing + TOUCH_ERRORS[release] ** 2)),
+        estimate(touch + 1e-3 * delay, spacing * (delay == 0) + ERRORS[kind] ** 2),
+    )
 
 
 def _draw_edges(
@@ -193,7 +194,7 @@ def _draw_edges(
     quantiles = (np.arange(N_DRAW) + 0.5) / N_DRAW
     normal = _normal_draws(factors.shape[-1] - 1)
     touches, forces, probabilities = [], [], []
-    kinds = np.flatnonzero(weight.sum(axis=1) > MIN_PROBABILITY)
+    kinds: NDArray[np.intp] = np.flatnonzero(weight.sum(axis=1) > MIN_PROBABILITY)
     for kind, row, lower in zip(kinds, weight[kinds], factors[kinds], strict=True):
         index = np.minimum(np.searchsorted(row.cumsum(), quantiles * row.sum()), len(row) - 1)
         used, pair = np.unique(index, return_inverse=True)
@@ -209,8 +210,8 @@ def _draw_edges(
     if not probability.any():
         probability = fallback
     delay = _crossing(np.concatenate(forces), THRESHOLD)
-    kind = np.repeat(kinds, N_DRAW)
-    return np.concatenate(touches), delay, kind, probability / probability.sum()
+    probability /= probability.sum()
+    return np.concatenate(touches), delay, np.repeat(kinds, N_DRAW), probability
 
 
 def _evidence(

@@ -250,12 +250,8 @@ def _landings(section: Section, drop: Contact, count: int) -> list[tuple[Estimat
         minimum = min_background(bounce.sample_rate)
         if first < minimum or len(bounce.force) - stop < minimum:
             break
-        rate = bounce.sample_rate
-        quiet, removed, background = remove_background(
-            bounce.force, rate, bounce.contact, bounce.quantization, drop.background
-        )
-        landing = find_contact(quiet, removed, background, rate, bounce.contact, bounce.chain)
-        delay = (bounce.start - section.start) / rate
+        landing = find_contact(bounce, *remove_background(bounce, drop.background))
+        delay = (bounce.start - section.start) / section.sample_rate
         begin, end = (
             Estimate(delay + edge.value, edge.uncertainty)
             for edge in (landing.touch, landing.release)
@@ -314,5 +310,3 @@ def _interpolated(force: NDArray[np.float64], rate: float) -> NDArray[np.float64
     low = low_pass(force, rate)
     factor = math.ceil(PEAK_RATE / rate)
     return np.asarray(resample(low, factor * len(low))) if factor > 1 else low
-
-

@@ -83,10 +83,9 @@ def measure_stages(section: Section, config: Config, calibration: float | None =
     """
     repaired = repair(section)
     corrected = correct(repaired, config.chain)
-    force, rate, span = corrected.force, corrected.sample_rate, corrected.contact
     try:
-        quiet, removed, background = remove_background(force, rate, span, corrected.quantization)
-        contact = find_contact(quiet, removed, background, rate, span, config.chain)
+        force, background = remove_background(corrected)
+        contact = find_contact(corrected, force, background)
     except np.linalg.LinAlgError as error:
         allowed = "a background of noise, drift and hum"
         refuse(f"{section.name}: the background is not noise", allowed, error)
