@@ -113,7 +113,8 @@ contains
          end if
          if (halvings > max_halvings) then
             error = numerical_error('is too large: no state of rest was found beyond ' &
-               //significant(pressed%deflection, 3)//' m; allowed: less, or more polar_elements', 'compression', 'max_deflection')
+               //significant(pressed%deflection, 3)//' m; allowed: less, or more polar_elements', 'compression', &
+               'max_deflection')
             return
          end if
       end do
