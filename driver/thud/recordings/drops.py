@@ -23,11 +23,9 @@ if TYPE_CHECKING:
     from thud.recordings.response import Chain
     from thud.recordings.signal import Signal
 
-# Pulses are searched in means over cells, each CELL seconds long, in pieces of PIECE cells. Pieces
-# overlap by OVERLAP cells, more than a pulse with its background.
+# Pulses are searched in means over cells, each CELL seconds long; BLOCK cells are read at a time.
 CELL = 1e-3
-PIECE = 30_000
-OVERLAP = 2_000
+BLOCK = 4_096
 # Number of cells in a segment; the baseline is interpolated between the medians of the segments.
 SEGMENT = 1_000
 # A pulse must rise above RISE standard deviations of the noise or RISE_FRACTION of the maximum,
@@ -201,8 +199,8 @@ def find_drops(
 ) -> Search:
     """Return the drops in a signal that begin between two times, s.
 
-    The signal is read in blocks. Raise InputError if there is no impact, the section is empty, or
-    the rate is too low.
+    The signal is read in blocks, of which the means over cells are kept. Raise InputError if there
+    is no impact, the section is empty, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
     section = min(int(begin * rate), signal.n_sample)
@@ -215,17 +213,8 @@ def find_drops(
         )
     if not rate >= MIN_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
-    pulses: list[_Candidate] = []
-    width = max(1, round(rate * CELL))
-    for first, cells in _pieces(signal, first_sample, stop_sample, progress=progress):
-        # Pulses that the end of a piece may cut are left to the next piece; the last accepts all.
-        accept_until = first + (len(cells) - OVERLAP // 2) * width
-        if first + len(cells) * width >= stop_sample:
-            accept_until = first + (len(cells) + OVERLAP) * width
-        last = pulses[-1].stop if pulses else 0
-        pulses += [
-            p for p in _pulses(cells, first, rate) if last <= p.start < p.stop <= accept_until
-        ]
+    cells = _cell_means(signal, first_sample, stop_sample, progress=progress)
+    pulses = _pulses(cells, first_sample, rate)
     highest = max((p.peak for p in pulses), default=0.0)
     pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
     drops, ignored = _assign_bounces(pulses, section, rate)
@@ -268,35 +257,20 @@ def cut_section(signal: Signal, pulse: Pulse) -> Section:
     )
 
 
-def _pieces(
+def _cell_means(
     signal: Signal, first_sample: int, stop_sample: int, *, progress: bool
-) -> Iterator[tuple[int, NDArray[np.float64]]]:
-    """Yield the index of the first sample and the cell means of each piece of a signal."""
+) -> NDArray[np.float64]:
+    """Return the means of a signal over cells, N; the last cell may be shorter."""
     width = max(1, round(signal.sample_rate * CELL))
-    cells = np.empty(0)
-    first = first_sample
-    bar = tqdm(
-        total=stop_sample - first_sample, unit="sample", unit_scale=True, desc=signal.name,
-        disable=not progress, leave=False,
-    )  # fmt: skip
-    block = 4_096 * width
-    n_collected = 0
-    means: list[NDArray[np.float64]] = []
-    for start in range(first_sample, stop_sample, block):
-        stop = min(start + block, stop_sample)
-        force = signal.read(start, stop)
-        n_in_cells = len(force) // width * width
-        means.append(force[:n_in_cells].reshape(-1, width).mean(1))
-        if n_in_cells < len(force):
-            means.append(force[n_in_cells:].mean(keepdims=True))
-        n_collected += math.ceil(len(force) / width)
-        bar.update(stop - start)
-        if n_collected + len(cells) >= PIECE or stop == stop_sample:
-            cells = np.concatenate([cells, *means])
-            yield first, cells
-            first += max(len(cells) - OVERLAP, 0) * width
-            cells, means, n_collected = cells[-OVERLAP:], [], 0
-    bar.close()
+    starts = range(first_sample, stop_sample, BLOCK * width)
+    means = []
+    for start in tqdm(starts, unit="block", desc=signal.name, disable=not progress, leave=False):
+        force = signal.read(start, min(start + BLOCK * width, stop_sample))
+        whole = len(force) // width * width
+        means.append(force[:whole].reshape(-1, width).mean(axis=1))
+        if whole < len(force):
+            means.append(force[whole:].mean(keepdims=True))
+    return np.concatenate(means)
 
 
 def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -351,13 +325,20 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Candid
             level[high + DISTANCE :][:LENGTH],
         )
         backgrounds = [np.quantile(side, 0.4) if side.size else 0.0 for side in (left, right)]
-        fraction = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
-        corrected = level - (backgrounds[0] + fraction * (backgrounds[1] - backgrounds[0]))
-        peak = float(corrected[top])
-        start = max(_find_edge(corrected, low, -1, FOOT * peak) - MARGIN, earliest)
-        stop = _find_edge(corrected, high, 1, FOOT * peak) + 1 + MARGIN
+        begin = max(low - SEGMENT, 0)
+        fraction = (np.arange(begin, min(high + SEGMENT, len(level))) - low) / max(high - low, 1)
+        line = np.interp(fraction, (0, 1), backgrounds)
+        corrected = level[begin : begin + len(line)] - line
+        peak = float(corrected[top - begin])
+        edges = (
+            begin + _find_edge(corrected, side - begin, step, FOOT * peak)
+            for side, step in ((low, -1), (high, 1))
+        )
+        start, stop = (edge + step for edge, step in zip(edges, (-MARGIN, 1 + MARGIN), strict=True))
+        start = max(start, earliest)
+        group_start = max(group[0], earliest, begin) - begin
         second_peak = _second_peak(
-            corrected[max(group[0], earliest) : group[-1] + 1], (first + top * width) / rate
+            corrected[group_start : group[-1] + 1 - begin], (first + top * width) / rate
         )
         span = first + start * width, first + stop * width
         # A second impact next to this one is shorter than half of STEP.
