@@ -153,9 +153,11 @@ def to_calibration(value: object, key: str) -> Calibration | str | float:
 
 
 def to_calibrations(value: object, key: str) -> Any:  # noqa: ANN401 - one, or a tuple of them
-    """Return a calibration, or one for each channel."""
+    """Return a calibration, also that of a list of one, or one for each channel."""
     if not isinstance(value, list | tuple):
         return to_calibration(value, key)
+    if len(value) == 1:
+        return to_calibration(value[0], key)
     return Listed(to_calibration, numbered=True)(value, key)
 
 

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Some file systems of networks have no locks.
-LOCKING = "best-effort"
+# Files are read without a lock, which some file systems of networks do not have.
+LOCKING = False
 # Maximum size of a header value, bytes.
 MAX_VALUE = 4096
 # Name under which MATLAB stores the contents of cells.
