@@ -645,10 +645,10 @@ LENGTH = WAV.index(b"data") + 4
     [
         ("a.h5", claiming_hdf5(), "sample rate"),
         ("a.mat", unpacking_matlab(), "MiB"),
-        ("a.wav", WAV[:LENGTH] + b"\xfe" * 4 + WAV[LENGTH + 4 :], "cut off"),
+        ("a.wav", WAV[:LENGTH] + b"\xfe" * 4 + WAV[LENGTH + 4 :], "integers"),
         ("a.wav", WAV[:1000], "cut off"),
         ("a.flac", b"fLaC" + b"\xff" * 1000, "FLAC"),
-        ("a.tdms", b"TDSm" + b"\xff" * 1000, "TDMS"),
+        ("a.tdms", b"TDSm" + b"\xff" * 1000, "a complete file"),
         ("a.csv", b"1," * 10**6, "characters"),
     ],
 )

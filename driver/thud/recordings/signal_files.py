@@ -103,7 +103,7 @@ def _choose(channels: list[Channel], config: Config, name: str) -> list[Channel]
     if config.channels is None:
         return choose_channels(channels, config.channel, name)
     if config.channel is not None:
-        refuse(f"{name}: both channel and channels are stated", "one of them")
+        refuse(f"{name}: both channel and channels are stated", "one of them", subject="channel")
     if isinstance(config.channels, tuple):
         cells = [choose_channels(channels, channel, name)[0] for channel in config.channels]
         if len({cell.number for cell in cells}) < len(cells):
@@ -158,6 +158,7 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
         refuse(
             f"{name}: channel = {shown(channel)} matches {len(matching)} channels",
             f"one of {channel_choices(channels)}",
+            subject="channel",
         )
     return matching
 
