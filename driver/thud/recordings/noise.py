@@ -38,8 +38,10 @@ QUANTIZATION = 1e-6
 # deviations. With sqrt(5) they would have its covariance; 95 % intervals of levels contain 95 to 97
 # % of the errors with 2, and 95 to 100 % with sqrt(5).
 DISTANCE = 2.0
-# Search for the maximum of the posterior: maximum number of iterations, tolerance of the logarithm.
+# Search for the maximum of the posterior: maximum number of iterations, maximum change of the
+# logarithm of a variance, tolerance of the logarithm of the posterior.
 MAX_ITERATIONS = 50
+MAX_STEP = 3.0
 TOLERANCE = 0.02
 
 
@@ -254,18 +256,20 @@ def fit_background(
     best = np.log(variance * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
 
     value, score, curvature = _log_posterior(best, unit, fixed, mean, large)
-    fraction = 1.0
+    damping = 0.0
     for _ in range(MAX_ITERATIONS):
-        step = fraction * np.clip(np.linalg.solve(curvature, score), -3, 2)
+        damped = curvature + damping * np.diag(np.diagonal(curvature))
+        step = np.linalg.solve(damped, score)
+        # One length for all: a step of which single components are cut off may lead downwards.
+        step *= min(1.0, MAX_STEP / float(np.abs(step).max()))
         trial = _log_posterior(best + step, unit, fixed, mean, large)
-        if trial[0] < value:
-            fraction /= 3
-            if np.abs(step).max() < TOLERANCE:
-                break
-            continue
-        gain, best, fraction = trial[0] - value, best + step, 1.0
-        value, score, curvature = trial
-        if gain < TOLERANCE:
+        gain = trial[0] - value
+        if gain > 0:
+            best, damping = best + step, damping / 10
+            value, score, curvature = trial
+        else:
+            damping = max(10 * damping, 0.1)
+        if abs(gain) < TOLERANCE:
             break
     # With curvature = L L', the rows of inverse(L) are the square root of its inverse.
     lower = np.linalg.cholesky(curvature)
