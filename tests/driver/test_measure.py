@@ -430,10 +430,8 @@ def test_plate_is_that_of_the_configuration(tmp_path: Path) -> None:
     )
     found = example("drop_1.wav", tmp_path, plate)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
-    told = [warning for warning in found.warnings if "force plate" in warning]
-    assert len(told) == 2
-    assert "0.2 Hz" in told[0]
-    assert "4000 N" in told[1]
+    assert noted(found.notes, "plate_low").others["frequency"] == 0.2
+    assert noted(found.notes, "plate_range").value == 4000
 
 
 def test_calibration_record_gives_lines_of_a_configuration(

@@ -169,7 +169,7 @@ def test_page_that_fails_leaves_the_earlier_results(
 def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     files = [FOLDER / f"drop_{i}.csv" for i in (1, 2, 3)]
     recording = thud.read_recording(files, height=1.0, mass=2.5)
-    long = Note("plate_requirement", others={"reason": "long " * 20000})
+    long = Note("plate_unknown", others={"what": "long " * 20000, "keys": ""})
     drops = tuple(replace(drop, notes=(long,)) for drop in recording.drops)
     instruments = ("plate", Instrument("amplifier", certificate="K-1"))
     config = replace(recording.config, laboratory="Ωmega", instruments=instruments)

@@ -11,6 +11,7 @@ import time
 import tomllib
 import tracemalloc
 import zlib
+from dataclasses import fields
 from datetime import datetime, timedelta
 from functools import cache
 from itertools import product
@@ -37,11 +38,12 @@ from thud.base.errors import InputError
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
-from thud.recordings.config import read_config
+from thud.recordings.config import Config, Instrument, Properties, ReportConfig, read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
 from thud.recordings.plate import Plate
 from thud.recordings.polarity import Extremes, check_peak, scan
+from thud.recordings.recorder_filter import RecorderFilter
 from thud.recordings.signal import Signal
 from thud.recordings.times import uniform_grid
 
@@ -1154,6 +1156,17 @@ def test_configuration_is_read(tmp_path: Path) -> None:
     assert found.plate == Plate(950.0, 30.0, 0.01, linearity=((100.0, 101.0), (1000.0, 990.0)))
     assert found.limits == {"octave_500": (10.0, 15.0)}
     assert (found.channel, found.unit, found.polarity) == (1, "V", "negative")
+
+
+@pytest.mark.parametrize(
+    "kind", [Config, Plate, RecorderFilter, ReportConfig, Properties, Instrument]
+)
+def test_every_key_of_a_configuration_is_documented(kind: type) -> None:
+    pages = "".join(
+        (REPOSITORY / f"docs/{name}.md").read_text() for name in ("recordings_reading", "report")
+    )
+    keys = [entry.name for entry in fields(kind)]
+    assert [key for key in keys if f"`{key}`" not in pages and f"[{key}]" not in pages] == []
 
 
 @pytest.mark.parametrize(

@@ -128,9 +128,12 @@ def crowded(one: Recording) -> Recording:
             drop,
             name=f"a_long_name_of_a_file_{i}" + "z" * 200,
             notes=tuple(
-                Note(code, value=i, others={"reason": chr(97 + k) + " a long one" * 20, "time": i})
+                Note(code, value=i, others={name: chr(97 + k) + " a long one" * 20, **rest})
                 for k in range(20)
-                for code in ("drop_left_out", "plate_requirement")
+                for code, name, rest in (
+                    ("drop_left_out", "reason", {"time": i}),
+                    ("plate_unknown", "what", {"keys": ""}),
+                )
             ),
         )
         for i, drop in enumerate(base.drops)
@@ -413,7 +416,7 @@ def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
     line = "".join(filter(str.isprintable, HOSTILE))
     texts = dict.fromkeys(("laboratory", "ball", "serial"), line)
     recording = many(one, 2, **texts, instruments=(line, line))
-    hostile = (Note("plate_requirement", others={"reason": HOSTILE}),)
+    hostile = (Note("plate_unknown", others={"what": HOSTILE, "keys": ""}),)
     drops = tuple(replace(d, name=HOSTILE + d.name, notes=hostile) for d in recording.drops)
     origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in recording.origins)
     write_report(replace(recording, drops=drops, origins=origins), tmp_path)

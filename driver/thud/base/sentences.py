@@ -159,7 +159,20 @@ WARNINGS = {
     "plate_not_flat": (
         "force plate: it is flat up to {value:g} {unit}; the standard asks for {low:g} {unit}"
     ),
-    "plate_requirement": "force plate: {reason}",
+    "plate_low": (
+        "at {frequency:g} Hz the plate reads {value:.2g} {unit} too little (time constant "
+        "{time_constant:g} s; 2 % need {needed:.1f} s)"
+    ),
+    "plate_high": (
+        "up to {frequency:g} Hz the plate with its resonance of {f0:.5g} Hz is up to {value:.2g} "
+        "{unit} off (after the correction, whose resonance is known to {shift:.2g} %)"
+    ),
+    "plate_range": "the plate reads up to {value:.4g} {unit}; the standard asks for {required:g} N",
+    "plate_linear": (
+        "from {first:.4g} to {last:.4g} N the plate is linear within {value:.2g} {unit} (worst at "
+        "{worst:.4g} N)"
+    ),
+    "plate_unknown": "the {what} of the plate is not known ([plate] {keys})",
     "plate_estimated": (
         "the resonance of the force plate is not stated: its estimated effect, up to "
         "{value:.2g} {unit} at {band:g} Hz, is in the uncertainty"

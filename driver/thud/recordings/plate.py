@@ -16,6 +16,8 @@ from thud.level.levels import get_bands
 from thud.recordings.config_values import Number, Table, key, to_linearity
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -111,14 +113,14 @@ class Plate(Table):
 
 @dataclass(frozen=True)
 class PlateCheck:
-    """A requirement on the force plate, whether it is met (None if unknown), and the reason.
+    """A requirement on the force plate, whether it is met (None if unknown), and a note on it.
 
     Requirements: ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"``, ``"linear"``.
     """
 
     requirement: str
     met: bool | None
-    reason: str
+    note: Note
 
 
 def check_plate(plate: Plate) -> tuple[PlateCheck, ...]:
@@ -126,71 +128,68 @@ def check_plate(plate: Plate) -> tuple[PlateCheck, ...]:
 
     The resonance of the plate is corrected.
     """
-    return _check_low(plate), _check_high(plate), _check_range(plate), _check_linearity(plate)
-
-
-def _check_low(plate: Plate) -> PlateCheck:
-    """Check the lowest frequency of a first-order high-pass."""
-    low, time_constant = FLAT[0], plate.time_constant
-    if time_constant is None:
-        unknown = f"the response at {low:g} Hz is not known (time constant)"
-        return PlateCheck("flat above", None, unknown)
-    loss = 1 - 1 / math.hypot(1, 1 / (2 * math.pi * low * time_constant))
-    needed = 1 / (2 * math.pi * low * math.sqrt((1 - TOLERANCE) ** -2 - 1))
-    return PlateCheck(
-        "flat above",
-        loss <= TOLERANCE,
-        f"at {low:g} Hz the plate reads {100 * loss:.2g} % too little (time constant "
-        f"{time_constant:g} s; {100 * TOLERANCE:g} % need {needed:.1f} s)",
+    return tuple(
+        PlateCheck(requirement, *check(plate))
+        for requirement, check in (
+            ("flat above", _check_low),
+            ("flat below", _check_high),
+            ("range", _check_range),
+            ("linear", _check_linearity),
+        )
     )
 
 
-def _check_high(plate: Plate) -> PlateCheck:
+def _note(code: str, value: float, others: Mapping[str, float | str], unit: str = "%") -> Note:
+    return Note(code, "force plate", float(value), unit=unit, others=others)
+
+
+def _unknown(what: str, keys: str) -> tuple[None, Note]:
+    return None, _note("plate_unknown", math.nan, {"what": what, "keys": keys})
+
+
+def _check_low(plate: Plate) -> tuple[bool | None, Note]:
+    """Check the lowest frequency of a first-order high-pass."""
+    low, time_constant = FLAT[0], plate.time_constant
+    if time_constant is None:
+        return _unknown(f"response at {low:g} Hz", "time_constant")
+    loss = 1 - 1 / math.hypot(1, 1 / (2 * math.pi * low * time_constant))
+    needed = 1 / (2 * math.pi * low * math.sqrt((1 - TOLERANCE) ** -2 - 1))
+    others = {"frequency": low, "time_constant": time_constant, "needed": needed}
+    return loss <= TOLERANCE, _note("plate_low", 100 * loss, others)
+
+
+def _check_high(plate: Plate) -> tuple[bool | None, Note]:
     """Check the highest frequency by the deviation that remains after the correction."""
     high = FLAT[1]
     if not plate.f0_uncertainty:
-        missing = "resonance" if math.isnan(plate.f0) else "uncertainty of the resonance"
-        unknown = f"the response up to {high:g} Hz is not known ({missing})"
-        return PlateCheck("flat below", None, unknown)
+        return _unknown(f"response up to {high:g} Hz", "f0, f0_uncertainty")
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     # Expanded uncertainty of the resonance, in both directions.
     shift = NORMAL_FACTOR * plate.f0_uncertainty
     ratios = [np.abs(plate.response(frequency / (1 + sign * shift))) / response for sign in (-1, 1)]
     deviation = max(float(np.abs(ratio - 1).max()) for ratio in ratios)
-    return PlateCheck(
-        "flat below",
-        deviation <= TOLERANCE,
-        f"up to {high:g} Hz the plate with its resonance of {frequency_text(plate.f0)} is up to "
-        f"{100 * deviation:.2g} % off (after the correction, whose resonance is known to "
-        f"{100 * shift:.2g} %)",
-    )
+    others = {"frequency": high, "f0": plate.f0, "shift": 100 * shift}
+    return deviation <= TOLERANCE, _note("plate_high", 100 * deviation, others)
 
 
-def _check_range(plate: Plate) -> PlateCheck:
+def _check_range(plate: Plate) -> tuple[bool | None, Note]:
     if plate.full_scale is None:
-        return PlateCheck("range", None, f"whether the plate reads up to {RANGE:g} N is not known")
-    return PlateCheck(
-        "range",
-        plate.full_scale >= RANGE,
-        f"the plate reads up to {plate.full_scale:.4g} N; the standard asks for {RANGE:g} N",
-    )
+        return _unknown("measuring range", "full_scale")
+    note = _note("plate_range", plate.full_scale, {"required": RANGE}, "N")
+    return plate.full_scale >= RANGE, note
 
 
-def _check_linearity(plate: Plate) -> PlateCheck:
+def _check_linearity(plate: Plate) -> tuple[bool | None, Note]:
     """Check the linearity by the relative deviation from the best line through zero."""
     if not plate.linearity:
-        return PlateCheck("linear", None, "the linearity is not known (pairs of forces)")
+        return _unknown("linearity", "linearity")
     applied, indicated = np.array(plate.linearity).T
     # Relative deviations give small forces as much weight as large ones.
     slope = float(np.mean(indicated / applied))
-    relative = indicated / (slope * applied) - 1
-    worst = int(np.argmax(np.abs(relative)))
-    restriction = "" if applied.max() >= RANGE else f"; above {applied.max():.4g} N it is not known"
-    met = bool(abs(relative[worst]) <= TOLERANCE)
-    return PlateCheck(
-        "linear",
-        None if met and restriction else met,
-        f"from {applied.min():.4g} to {applied.max():.4g} N the plate is linear within "
-        f"{100 * abs(relative[worst]):.2g} % (worst at {applied[worst]:.4g} N){restriction}",
-    )
+    deviations = np.abs(indicated / (slope * applied) - 1)
+    worst = int(np.argmax(deviations))
+    forces = {"first": applied.min(), "last": applied.max(), "worst": applied[worst]}
+    note = _note("plate_linear", 100 * deviations[worst], forces)
+    met = bool(deviations[worst] <= TOLERANCE)
+    return None if met and applied.max() < RANGE else met, note

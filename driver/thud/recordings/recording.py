@@ -202,11 +202,7 @@ class Recording(ImpactOrRecording):
         notes += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             notes.append(Note("effective_mass", effect=0.0))
-        notes += (
-            Note("plate_requirement", others={"reason": check.reason})
-            for check in config.plate_checks
-            if check.met is False
-        )
+        notes += (check.note for check in config.plate_checks if check.met is False)
         notes += config.check_dates(origin.date for origin in self.origins)
         notes += check_assumptions(self.drops, config)
         if self.not_stated:

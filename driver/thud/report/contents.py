@@ -91,7 +91,10 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
             method: values.tolist() for method, values in recording.agreement().items()
         },
         "drops": [_drop(drop) for drop in recording.drops],
-        "plate": [vars(check) for check in config.plate_checks],
+        "plate": [
+            {"requirement": check.requirement, "met": check.met, "reason": str(check.note)}
+            for check in config.plate_checks
+        ],
         "processing": processing(recording),
         "warnings": warnings(recording),
         "notes": [_note(note) for note in recording.own_notes],
