@@ -343,9 +343,12 @@ def test_noise_is_doubted_as_often_as_the_tests_say(
             found = force_misfit._change_warning(values, ~inside, inside)  # noqa: SLF001
         else:
             freedom = 25 if place == "size of quiet" else None
-            known = SimpleNamespace(known_noise=True, noise_freedom=freedom)
+            misfit = SimpleNamespace(known_noise=True, noise_freedom=freedom, size=40, absorbed=0)
             scale = np.sqrt(rng.chisquare(25) / 25) if freedom else 1.0
-            found = search._size_warning(known, values / scale, 40.0)  # type: ignore[arg-type] # noqa: SLF001
+            fit = SimpleNamespace(
+                targets=[SimpleNamespace(misfit=misfit)], names=(), residuals=values / scale
+            )
+            found = not np.isnan(search.size_of_residuals(fit))  # type: ignore[arg-type]
         told += bool(found)
     low, high = stats.binom.ppf([1e-4, 1 - 1e-4], tries, 0.1)
     assert low <= told <= high

@@ -18,12 +18,11 @@ LEVELS: dict[str, str] = {
 DIMENSIONS = LEVELS | {"room_third": "rated_third"}
 
 
-def _level(name: str) -> Quantity:
-    """Return the declaration of the levels of a force."""
-    force, bands = name.split("_")
+def _level(force: str, bands: str) -> Quantity:
+    """Return the declaration of the levels of a force in bands."""
     meaning = f"force exposure level of the {force} force, re 1 N and 1 s"
     title = f"{force} level" if bands == "octave" else f"{force} {bands} level"
-    return Quantity(name, title, "L_{FE}", "dB", "dB", 1.0, 2, meaning)
+    return Quantity(f"{force}_{bands}", title, "L_{FE}", "dB", "dB", 1.0, 2, meaning)
 
 
 def _number(name: str, meaning: str) -> Quantity:
@@ -34,7 +33,7 @@ def _number(name: str, meaning: str) -> Quantity:
 # All results of samples, including those of surrogates and of their training, in their order.
 RESULTS = {
     **{name: QUANTITIES[name] for name in SAMPLE_QUANTITIES},
-    **{name: _level(name) for name in LEVELS},
+    **{name: _level(name.partition("_")[0], bands) for name, bands in LEVELS.items()},
     "margin": QUANTITIES["margin"],
     "conforms": _number("conforms", "all criteria of the standard are met"),
     "status": _number("status", "0: computed; otherwise the exit code of the error"),
