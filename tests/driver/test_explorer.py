@@ -352,8 +352,9 @@ def test_drawn_force_of_a_recording_is_low_passed(client: TestClient) -> None:
     time, value = (np.array(answer["force"][key]) for key in ("time", "value"))
     expected = np.interp(1e-3 * time + start, np.arange(len(pulse)) / rate, pulse)
     inside = (time > 2) & (time < 18)
-    # The ripple has an amplitude of 150 N.
-    assert abs(value - expected)[inside].max() < 10
+    # The ripple has an amplitude of 150 N. In the standard uncertainty of first touch, 0.06 ms, the
+    # force rises by 14 N.
+    assert abs(value - expected)[inside].max() < 40
 
 
 def test_values_of_a_recording_have_the_digits_of_their_uncertainty(client: TestClient) -> None:
