@@ -55,7 +55,8 @@ class Rating(Displayed):
         """Return rating and class."""
         level = f"L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f})"
         korean = self.korean_class
-        class_ = "" if korean is None else f", class {korean or 'none'} (KS F 2863-2)"
+        name = f"class {korean}" if korean else "no class"
+        class_ = "" if korean is None else f", {name} (KS F 2863-2)"
         return f"<Rating, {self.bands}s: {level}{class_}>"
 
     def rows(self) -> list[tuple[str, ...]]:
