@@ -53,7 +53,7 @@ def middle(cells: Cells) -> np.ndarray:
 
 
 def test_noise_between_two_frequencies_is_the_integral_of_its_spectrum() -> None:
-    noise = Noise(1.0, "before", white=0.3, pink=7.0, brown=50.0)
+    noise = Noise(1.0, white=0.3, pink=7.0, brown=50.0)
     assert noise.spectrum(4.0) == pytest.approx(0.3 + 7 / 4 + 50 / 16)
     power, _ = quad(noise.spectrum, 3, 700, limit=200)
     assert noise.deviation_between(3, 700) == pytest.approx(np.sqrt(power))

@@ -105,14 +105,18 @@ class Estimate(Immutable):
 
     @classmethod
     def from_budget(
-        cls, value: float, *contributions: Contribution, upper_bound: bool = False
+        cls,
+        value: float,
+        *contributions: Contribution,
+        upper_bound: bool = False,
+        not_stated: tuple[str, ...] = (),
     ) -> Self:
         """Combine contributions (JCGM 100, 5.1.2; degrees of freedom by G.4.1)."""
         terms = [term for term in contributions if term.counted and term.uncertainty]
         combined = math.sqrt(sum(term.uncertainty**2 for term in terms))
         inverse = sum((term.uncertainty / combined) ** 4 / term.freedom for term in terms)
         freedom = 1 / inverse if inverse else math.inf
-        return cls(value, combined, "", freedom, contributions, upper_bound)
+        return cls(value, combined, "", freedom, contributions, upper_bound, not_stated)
 
     @classmethod
     def computed(cls, value: float, error: float) -> Self:
@@ -234,8 +238,10 @@ class Budget(Immutable):
         """
         levels = np.atleast_1d(values)
         return tuple(
-            replace(
-                Estimate.from_budget(float(value), *self._column(band), upper_bound=bool(is_bound)),
+            Estimate.from_budget(
+                float(value),
+                *self._column(band),
+                upper_bound=bool(is_bound),
                 not_stated=tuple(not_stated),
             )
             for band, (value, is_bound) in enumerate(

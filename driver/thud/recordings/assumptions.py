@@ -203,7 +203,7 @@ def _share_gain(config: Config) -> Gain | None:
     A force that was corrected for the whole share is multiplied by it.
     """
     plate = config.resonance
-    if plate is None or config.plate is None or config.plate.share is not None:
+    if plate is None or plate.share is not None:
         return None
     smaller = replace(plate, share=MIN_SHARE)
     return lambda f: np.abs(plate.response(f) / smaller.response(f))

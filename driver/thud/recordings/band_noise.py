@@ -28,6 +28,7 @@ CHANCE = 4.0
 GATE_LENGTH = 256
 
 
+@lru_cache(maxsize=64)
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
     """Return functionals of samples whose squares add up to the energy in a band, [n, count].
 
@@ -43,11 +44,6 @@ def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDA
     _, size, rows = np.linalg.svd(waves, full_matrices=False)
     significant = size**2 > NEGLIGIBLE * size[0] ** 2
     return np.asarray(size[significant, None] * rows[significant])
-
-
-@lru_cache(maxsize=64)
-def _functionals(length: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
-    return band_functionals(length, rate, lower, upper)
 
 
 def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
@@ -78,7 +74,7 @@ def _energies(
     """
     force, rate, background = contact.gated, contact.sample_rate, contact.background
     length = GATE_LENGTH * math.ceil(len(force) / GATE_LENGTH)
-    rows = _functionals(length, rate, lower, upper)[:, : len(force)]
+    rows = band_functionals(length, rate, lower, upper)[:, : len(force)]
     values, covariance = rows @ force, contact.covariance_of(rows)
     # What the contact has beyond the background may be the force: it is not subtracted.
     further = contact.white_variance - background.variances[0] * rate / 2

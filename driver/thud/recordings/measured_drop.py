@@ -138,7 +138,7 @@ class Drop(Immutable):
         force = np.concatenate([self.force[:first], self.force[stop:]])
         deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
         white, pink, brown = map(float, self.contact.background.variances[:3])
-        return Noise(deviation, "before and after", white, pink, brown)
+        return Noise(deviation, white, pink, brown)
 
     def levels(self, bands: BandSet = "octave", method: str = "exact") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).

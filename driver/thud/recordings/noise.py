@@ -51,12 +51,10 @@ class Noise:
 
     `deviation` is the standard deviation of one sample, N. `white`, `pink` and `brown` are the
     one-sided densities at 1 Hz, N2/Hz, of spectra that are constant, proportional to 1/f and to
-    1/f**2. `source` states the background from which they were estimated: that
-    ``"before and after"`` the contact.
+    1/f**2, estimated from the background before and after the contact.
     """
 
     deviation: float
-    source: str
     white: float
     pink: float = 0.0
     brown: float = 0.0

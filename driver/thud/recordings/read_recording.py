@@ -155,9 +155,8 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
             searched.append(spans)
             chosen, left_out = choose(search.drops, count + 1, signal.sample_rate, config)
             count += len(search.drops)
-            uncertainty = signal.calibration_uncertainty
-            if config.calibration_uncertainty is not None:
-                uncertainty = config.calibration_uncertainty
+            stated = config.calibration_uncertainty
+            uncertainty = signal.calibration_uncertainty if stated is None else stated
             uncertainties.append(uncertainty)
             bar = tqdm(chosen, unit="drop", desc=signal.name, disable=not progress, leave=False)
             drops = tuple(

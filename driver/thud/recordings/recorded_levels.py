@@ -160,19 +160,20 @@ def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.floa
     contributions = {
         NOISE: ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         METHOD: np.abs(measured - exact) / RECTANGULAR,
-        OFFSET_STEP: _step_uncertainty(drop, bands),
+        OFFSET_STEP: _step_uncertainty(drop, bands, exact),
     }
     if offset.any():
         contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
     return DropLevels(drop.name, bands, method, level, measured, background, flag, contributions)
 
 
-def _step_uncertainty(drop: Drop, bands: BandSet) -> NDArray[np.float64]:
+def _step_uncertainty(
+    drop: Drop, bands: BandSet, exact: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the standard uncertainty due to a step of the offset during the contact, dB."""
     if not drop.offset_step:
-        return np.zeros(len(get_bands(bands).nominal))
-    force = drop.force[slice(*drop.gate)]
-    exact = _levels(force, drop.sample_rate, bands, "exact")
+        return np.zeros(len(exact))
+    force = drop.contact.gated
     changed = [
         _levels(force + error, drop.sample_rate, bands, "exact")
         for error in step_errors(drop.offset_step, len(force))
