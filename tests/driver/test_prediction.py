@@ -444,7 +444,7 @@ def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
     ):
         shown = f"{band} Hz {level - (low + high) / 2:.1f} dB"
         assert (shown in text) == (not low <= level <= high)
-    assert note.code == "source_off_nominal"
+    assert note.code == "source_not_conforming"
     viscous = thud.read_case(REPOSITORY / "inputs/rubber_ball_fe_viscous.nml")
     conforming = thud.predict_level(thud.solve(viscous), thud.Plate(), thud.Room())
     assert conforming.source_notes == ()

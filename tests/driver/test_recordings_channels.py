@@ -202,7 +202,8 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=naming("F1", "all samples are 0")):
         thud.read_recording(path, config=Config(channels="sum"))
     path = write_table(tmp_path / "inverted.csv", [-first, *others], NAMES)
-    assert warned(opened(path, channels="sum")) == [("cell_sign", "inverted.csv, F1")]
+    note = noted(opened(path, channels="sum")[0].notes, "cell_sign")
+    assert note.others["cell"] == "inverted.csv, F1"
     lost = first.copy()
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
     path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)

@@ -62,5 +62,3 @@ class InputError(ThudError, ValueError):
 
 class NumericalError(ThudError, ArithmeticError):
     """The computation failed."""
-
-    exit_code = 2

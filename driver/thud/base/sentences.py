@@ -65,9 +65,9 @@ WARNINGS = {
     "load cell may be wrong",
     # Faults of the force.
     "dropouts": (
-        "{count:g} dropouts of {value:.3g} {unit} in all were filled by linear interpolation"
+        "dropouts ({count:g}) of {value:.3g} {unit} in all were filled by linear interpolation"
     ),
-    "spikes": "{count:g} spikes of {value:.3g} {unit} in all were filled by linear interpolation",
+    "spikes": "spikes ({count:g}) of {value:.3g} {unit} in all were filled by linear interpolation",
     "constant_background": (
         "the background is constant for {value:.3g} {unit} while the force in the contact is "
         "noisy: small forces are missing, as behind a gate, or samples are lost; offset, levels "
@@ -205,7 +205,7 @@ WARNINGS = {
         "the model {model} has no force on a mobile floor: that on a rigid floor is used, whose "
         "peak the floor would change by at most {high:g} {unit}"
     ),
-    "source_off_nominal": (
+    "source_not_conforming": (
         "the source does not conform ({octaves} from the nominal levels): the level in the room is "
         "not that of a standard source"
     ),

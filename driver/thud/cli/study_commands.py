@@ -83,8 +83,7 @@ def run_study(options: argparse.Namespace) -> int:
                 run_options["executor"] = stack.enter_context(dask_executor(address))
             result = kind.compute(study, directory, **run_options)
     except ThudError as error:
-        message = f"{options.study}: {error}"
-        raise type(error)(message) from error
+        raise error.within(options.study) from error
     if not options.quiet:
         print_results(result.table())
     print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))

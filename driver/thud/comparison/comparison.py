@@ -215,8 +215,7 @@ def compare(
             try:
                 solved[name] = compute(item)
             except ThudError as error:
-                message = f"{name}: {error}"
-                raise type(error)(message) from error
+                raise error.within(name) from error
             run_times[name] = time.perf_counter() - start
         else:
             solved[name] = item

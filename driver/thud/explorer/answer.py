@@ -124,7 +124,9 @@ def answer_case(case: Case) -> Answer:
         prediction = predict_level(impact)
         answer["room"] = _room(prediction) | {"source": answer["headline"]}
         answer["headline"] = room_headline(prediction)
-        notes += prediction.notes
+        # Both name a source that does not conform.
+        known = {note.code for note in notes}
+        notes += [note for note in prediction.notes if note.code not in known]
     answer["warnings"] = list(dict.fromkeys(map(in_words, notes)))
     return answer
 

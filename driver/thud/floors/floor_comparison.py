@@ -127,8 +127,7 @@ def compare_floors(
         try:
             result[name] = predict_level(compute(case))
         except ThudError as error:
-            message = f"{name}: {error}"
-            raise type(error)(message) from error
+            raise error.within(name) from error
     return FloorComparison(result)
 
 

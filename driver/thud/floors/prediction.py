@@ -272,7 +272,7 @@ def _source_notes(source: ImpactResult) -> tuple[Note, ...]:
     ]
     if not outside:
         return ()
-    return (Note("source_off_nominal", "room", others={"octaves": ", ".join(outside)}),)
+    return (Note("source_not_conforming", "room", others={"octaves": ", ".join(outside)}),)
 
 
 def _on_floor(source: ImpactResult, case: Case) -> tuple[FloorImpact | None, RoomLevel | None]:

@@ -218,7 +218,7 @@ class Config(Table):
         )
         result = [
             *(
-                Note("calibration_overdue", item.name, others={"due": item.due})
+                Note("calibration_overdue", item.name or "an instrument", others={"due": item.due})
                 for item in self.instruments
                 if isinstance(item, Instrument) and item.due and item.due < last
             ),

@@ -90,7 +90,8 @@ def check_signs(cells: Sequence[Signal], peak: float) -> tuple[Note, ...]:
         extremes = scan(cell.read, cell.n_sample, cell.name)
         up, down = extremes.peak(1.0), extremes.peak(-1.0)
         if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
-            notes.append(Note("cell_sign", cell.name, -down, unit="N", others={"total": peak}))
+            others: dict[str, float | str] = {"cell": cell.name, "total": peak}
+            notes.append(Note("cell_sign", value=-down, unit="N", others=others))
     return tuple(notes)
 
 

@@ -92,7 +92,7 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
         if len(chosen) == 1 or config.channels is not None:
             raise
         message = f"{error}; if several channels are forces: {HINT}"
-        raise InputError(message) from error
+        raise InputError(message, error.note) from error
     if any(calibrations) or (config.channel is None and config.channels is None):
         return signals
     return [_with_missing(signals[0], chosen, channels)]

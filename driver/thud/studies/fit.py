@@ -172,7 +172,7 @@ def _pairs(
             if len(targets) == 1:
                 raise
             message = f"{label}: {str(error).removeprefix('target: ')}"
-            raise InputError(message) from error
+            raise InputError(message, error.note) from error
     return result
 
 

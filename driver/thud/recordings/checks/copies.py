@@ -80,8 +80,8 @@ class Spans:
     @classmethod
     def of(cls, signal: Signal, drops: Sequence[Pulse]) -> Spans:
         """Return the spans of the drops that were found in a signal."""
-        begin, end = np.array([drop.contact for drop in drops]).T / signal.sample_rate
-        return cls(signal.name, signal.path, begin, end)
+        contacts = np.array([drop.contact for drop in drops]).reshape(-1, 2)
+        return cls(signal.name, signal.path, *contacts.T / signal.sample_rate)
 
 
 def refuse_simultaneous_channels(spans: Spans, others: Sequence[Spans]) -> None:

@@ -50,4 +50,4 @@ def check_offset(section: Section, contact: Contact) -> tuple[Note, ...]:
     if quantization.offset < MAX_OFFSET * contact.peak:
         return ()
     others = {"step": quantization.step}
-    return (Note("coarse_steps", value=quantization.offset, unit="N", others=others),)
+    return (Note("coarse_steps", value=quantization.offset, unit="N", effect=0.0, others=others),)
