@@ -1,7 +1,7 @@
 !> A case, the input of one run: its keys, the keys that it uses, and their checks.
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
-   use thud_band, only: band_choices, band_type
+   use thud_band, only: band_choices
    use thud_compression, only: check_compression, compression_options_type, get_compression_fields
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
@@ -10,7 +10,6 @@ module thud_case
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, in_group, plain_field
-   use thud_plate, only: plate_type
    use thud_rectangular_floor, only: rectangular_floor_type
    use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, &
       new_models, standard_moduli

@@ -3,7 +3,7 @@
 !> Samples of the shell model are computed in batches (`thud_ensemble`), all others one by one; threads share
 !> the work. The results of a sample do not depend on the number of threads, the other samples or its index.
 module thud_sweep
-   use thud_band, only: band_type, get_level_bands, octave_count
+   use thud_band, only: band_type, get_level_bands
    use thud_band_projection, only: get_window_length
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_case, only: case_type, check_case, get_active_fields, get_floor_number, keep_impact_only, set_floor_air

@@ -26,7 +26,6 @@ def test_threads_share_no_lengths_of_texts() -> None:
     }
     assert deferred == {
         "command_line.f90",
-        "file.f90",
         "room_table.f90",
         "schema.f90",
         "screen.f90",

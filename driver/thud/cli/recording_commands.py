@@ -41,7 +41,7 @@ def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings.read_recording import first_stages, read_recording
     from thud.report import recording_files
-    from thud.report.notes import processing, warnings
+    from thud.report.notes import sentences
 
     figures = not options.no_figures
     files = results_of(
@@ -65,7 +65,7 @@ def measure(options: argparse.Namespace) -> int:
         if len(rows) > MAX_PRINTED + 1:
             print_path(f"and {len(rows) - MAX_PRINTED - 1} more drops", folder / "report.json")
         print_results(f"\n{format_rows(recording_files.table(recording))}\n")
-        for step in processing(recording):
+        for step in sentences(recording, is_warning=False):
             print_results(f"  {step}")
         print_results(f"  {recording_files.verdict_text(recording)}")
         excluded = recording_files.uncertainty_text(recording)
@@ -73,7 +73,7 @@ def measure(options: argparse.Namespace) -> int:
             print_results(f"  {excluded}")
         if figures:
             print_results(recording_files.missing_text(recording))
-    print_notes(warnings(recording))
+    print_notes(sentences(recording, is_warning=True))
     if not options.quiet:
         print_path("Results", folder)
     return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0

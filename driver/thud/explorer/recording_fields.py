@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse, shown
@@ -124,16 +124,6 @@ PRESS_FIELDS = (
         choices={unit: unit for unit in ("N", "kN", "daN", "kgf", "lbf")},
     ),
 )  # fmt: skip
-
-
-def recording_form() -> list[dict[str, Any]]:
-    """Return the fields for the page."""
-    return [asdict(item) for item in FIELDS]
-
-
-def press_form() -> list[dict[str, Any]]:
-    """Return the fields of the curve of a press for the page."""
-    return [asdict(item) for item in PRESS_FIELDS]
 
 
 def recording_table(stated: Mapping[str, str]) -> Table:

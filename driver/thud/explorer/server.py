@@ -7,6 +7,7 @@ import secrets
 import shutil
 import socket
 from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -37,7 +38,7 @@ from thud.explorer.messages import describe_error
 from thud.explorer.models import floor_facts, model_facts
 from thud.explorer.page_file import new_page
 from thud.explorer.presets import presets
-from thud.explorer.recording_fields import press_form, recording_form, recording_table
+from thud.explorer.recording_fields import FIELDS, PRESS_FIELDS, recording_table
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping, Sequence
@@ -142,8 +143,8 @@ def new_application(
     )
     application.state.about = {
         "constructions": construction_form(),
-        "recording": recording_form(),
-        "press": press_form(),
+        "recording": list(map(asdict, FIELDS)),
+        "press": list(map(asdict, PRESS_FIELDS)),
         "models": model_facts(),
         "floors": floor_facts(),
         "presets": presets(),

@@ -15,13 +15,13 @@ from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.config import Instrument
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.times import read_date
-from thud.report.notes import processing, warnings
+from thud.report.notes import sentences
 from thud.report.rows import SCATTER
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from thud.base._schema import BandSet, LimitsSource
+    from thud.base._schema import BandSet
     from thud.base.note import Note
     from thud.level.assessment import Criterion
     from thud.level.estimate import Estimate
@@ -53,12 +53,12 @@ FIELDS = {
 }
 
 
-def report_data(recording: Recording, source: LimitsSource | None = None) -> dict[str, Any]:
+def report_data(recording: Recording) -> dict[str, Any]:
     """Return the report of a recording as a JSON object; unknown values are None.
 
     Values are in SI units; uncertainties are standard uncertainties unless named expanded.
     """
-    config, verdict = recording.config, recording.assess(source)
+    config, verdict = recording.config, recording.assess()
     data: dict[str, Any] = {
         "format": FORMAT,
         "thud": version(),
@@ -85,7 +85,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "calibration_uncertainty": recording.calibration_uncertainty,
         "verdict": verdict.conforms,
         "confidence": CONFIDENCE,
-        "criteria": criteria_data(recording, source),
+        "criteria": criteria_data(recording),
         "levels": {bands: _levels(recording, bands) for bands in BANDWIDTHS},
         "method_differences": {
             method: values.tolist() for method, values in recording.agreement().items()
@@ -95,8 +95,8 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
             {"requirement": check.requirement, "met": check.met, "reason": str(check.note)}
             for check in config.plate_checks
         ],
-        "processing": processing(recording),
-        "warnings": warnings(recording),
+        "processing": sentences(recording, is_warning=False),
+        "warnings": sentences(recording, is_warning=True),
         "notes": [_note(note) for note in recording.own_notes],
         "without_outliers": _without_outliers(recording),
         "files": [
@@ -116,39 +116,23 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
     return finite
 
 
-def criteria_data(recording: Recording, source: LimitsSource | None = None) -> list[dict[str, Any]]:
+def criteria_data(recording: Recording) -> list[dict[str, Any]]:
     """Return the criteria of a recording with their budgets, as in ``report.json``.
 
     None: an uncertainty that is not stated, and the margin of an upper bound or a count. The
     uncertainty of a criterion lacks the contributions that are ``"excluded"``; ``"allowance"`` is
     the largest standard uncertainty by them with which ``"verdict_if_stated"`` holds.
     """
-    verdict = recording.assess(source)
-    finite: list[dict[str, Any]] = _finite(_criteria(recording, verdict.source, verdict.criteria))
-    return finite
-
-
-def _dates(texts: Iterable[str]) -> str:
-    """Return the day of a measurement, or its first and last day; empty if not stated."""
-    stated = [text for text in dict.fromkeys(texts) if text.strip()]
-    dates = [read_date(text) for text in stated]
-    days = sorted({date.date().isoformat() for date in dates if date})
-    if not days or None in dates:
-        days = stated
-    return " to ".join(dict.fromkeys([days[0], days[-1]])) if days else ""
-
-
-def _criteria(
-    recording: Recording, source: LimitsSource, criteria: tuple[Criterion, ...]
-) -> list[dict[str, Any]]:
+    verdict = recording.assess()
     average = recording.average()
     count = len(average.level)
-    standard = get_criteria(source)
-    spreads = {f"{i}": float(average.spread[i]) for i in range(count)}
-    for name in ("contact_time", "restitution"):
-        spreads[name] = _spread(getattr(drop, name).value for drop in recording.drops)
+    standard = get_criteria(verdict.source)
+    spreads = {
+        name: _spread(getattr(drop, name).value for drop in recording.drops)
+        for name in ("contact_time", "restitution")
+    }
     rows = []
-    for i, (criterion, default) in enumerate(zip(criteria, standard, strict=True)):
+    for i, (criterion, default) in enumerate(zip(verdict.criteria, standard, strict=True)):
         is_level, estimate = i < count, criterion.estimate
         has_budget = bool(estimate.contributions)
         limits = criterion.lower, criterion.upper
@@ -173,7 +157,7 @@ def _criteria(
                 "margin": None if estimate.upper_bound or is_count else criterion.margin,
                 "probability": criterion.probability,
                 "verdict": criterion.conforms,
-                "spread": spreads.get(f"{i}" if is_level else criterion.name),
+                "spread": float(average.spread[i]) if is_level else spreads.get(criterion.name),
                 "background": float(average.background[i]) if is_level else None,
                 "flag": str(average.flag[i]) if is_level else "",
                 "contributions": [
@@ -182,7 +166,17 @@ def _criteria(
                 ],
             }
         )
-    return rows
+    return [_finite(row) for row in rows]
+
+
+def _dates(texts: Iterable[str]) -> str:
+    """Return the day of a measurement, or its first and last day; empty if not stated."""
+    stated = [text for text in dict.fromkeys(texts) if text.strip()]
+    dates = [read_date(text) for text in stated]
+    days = sorted({date.date().isoformat() for date in dates if date})
+    if not days or None in dates:
+        days = stated
+    return " to ".join(dict.fromkeys([days[0], days[-1]])) if days else ""
 
 
 def _excluded(criterion: Criterion) -> list[str]:

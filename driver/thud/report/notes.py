@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from thud.base.note import sentence
 
@@ -10,40 +10,20 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from thud.base.note import Note
-    from thud.recordings.recording import Recording
+    from thud.recordings.measured_drop import Drop
+    from thud.recordings.recording import Origin, Recording
 
 
-class Noted(Protocol):
-    """A file or a drop: its name, and notes on it."""
-
-    @property
-    def name(self) -> str:
-        """Name of the file or the drop."""
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        """Notes on it."""
-
-
-def processing(recording: Recording) -> list[str]:
-    """Return what was done with files and drops, a sentence for each kind."""
-    return _of_parts(recording, is_warning=False)
-
-
-def warnings(recording: Recording) -> list[str]:
-    """Return possible faults of a recording, its files and drops, a sentence for each kind."""
-    own = [note.message for note in recording.own_notes]
-    return [*own, *_of_parts(recording, is_warning=True)]
-
-
-def _of_parts(recording: Recording, *, is_warning: bool) -> list[str]:
+def sentences(recording: Recording, *, is_warning: bool) -> list[str]:
+    """Return possible faults of a recording, or what was done, a sentence for each kind of note."""
     return [
+        *(note.message for note in recording.own_notes if note.is_warning == is_warning),
         *group_notes(recording.origins, "files", is_warning=is_warning),
         *group_notes(recording.drops, "drops", is_warning=is_warning),
     ]
 
 
-def group_notes(parts: Sequence[Noted], kind: str, *, is_warning: bool) -> list[str]:
+def group_notes(parts: Sequence[Origin | Drop], kind: str, *, is_warning: bool) -> list[str]:
     """Return a sentence for the notes that differ in numbers only, with the range of each number.
 
     `parts` are all drops or files, and `kind` is ``"drops"`` or ``"files"``. The sentence states

@@ -14,7 +14,7 @@ module thud_pressed_ball
    use thud_lapack, only: dgbsv
    use thud_material, only: material_type
    use thud_mesh, only: mesh_type
-   use thud_text, only: significant, to_text
+   use thud_text, only: significant
    implicit none (type, external)
    private
 
