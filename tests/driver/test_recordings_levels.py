@@ -137,8 +137,9 @@ def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -
     drop = make_drop(3.0, rate)
     edges = thud.get_bands(bands)
     found = band_noise([drop], edges)[0, :, 0]
-    expected = drop.noise.white * (edges.upper - edges.lower) * np.diff(drop.gate) / rate
-    offset = drop.contact.covariance[0, 0] / (drop.noise.white * rate / 2) * np.diff(drop.gate)
+    white = drop.contact.background.variances[0]
+    expected = white * (edges.upper - edges.lower) * np.diff(drop.gate) / rate
+    offset = drop.contact.covariance[0, 0] / (white * rate / 2) * np.diff(drop.gate)
     # The offset adds at most its part of the energy of the noise.
     assert (found >= expected * (1 - 1e-9)).all()
     assert (found <= expected * (1 + offset)).all()

@@ -17,7 +17,6 @@ from thud.recordings import noise as module
 from thud.recordings.band_noise import band_functionals, band_noise
 from thud.recordings.noise import (
     Background,
-    Noise,
     covariances_without_white,
     fit_background,
     unit_covariances,
@@ -53,7 +52,8 @@ def middle(cells: Cells) -> np.ndarray:
 
 
 def test_noise_between_two_frequencies_is_the_integral_of_its_spectrum() -> None:
-    noise = Noise(1.0, white=0.3, pink=7.0, brown=50.0)
+    cells = np.array([0.0]), np.array([1.0])
+    noise = Background(cells, np.zeros(1), np.array([[0.3, 7.0, 50.0, 0.0, 0.0]]), 1.0)
     assert noise.spectrum(4.0) == pytest.approx(0.3 + 7 / 4 + 50 / 16)
     power, _ = quad(noise.spectrum, 3, 700, limit=200)
     assert noise.deviation_between(3, 700) == pytest.approx(np.sqrt(power))

@@ -181,6 +181,7 @@ def _count_peaks(drop: Drop) -> float:
     force = drop.force[slice(*drop.gate)]
     count = peak_count(force, drop.sample_rate)
     # Noise that is slower than the contact adds no peaks.
-    noise = drop.noise.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
+    background = drop.contact.background
+    noise = background.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
     clear = PROMINENCE * drop.peak_force.value >= MIN_PROMINENCE * noise
     return float(count) if count == 1 or (clear and not drop.ringing) else math.nan

@@ -174,8 +174,7 @@ class Contact(Immutable):
         frequency = np.fft.rfftfreq(gates.shape[1], 1 / self.sample_rate)[1:]
         window = np.hanning(gates.shape[1] + 2)[1:-1]
         power = (np.abs(np.fft.rfft(window * gates, axis=1)[:, 1:]) ** 2).mean(axis=0)
-        white, pink, brown = self.background.variances[:3]
-        ratio = power / (white + pink / frequency + brown / frequency**2)
+        ratio = power / self.background.spectrum(frequency)
         reference = np.median(ratio[(frequency > NOISE_BAND[0]) & (frequency < NOISE_BAND[1])])
         return float(ratio.sum() / reference * frequency[0]) if reference > 0 else math.inf
 

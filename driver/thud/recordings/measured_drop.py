@@ -22,7 +22,6 @@ from thud.recordings.background import find_offset_step, remove_background, step
 from thud.recordings.checks import check_contact
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.flanks import SAMPLE_ERROR
-from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import min_background
 from thud.recordings.restitution import GRAVITY, DropConditions
@@ -132,13 +131,11 @@ class Drop(Immutable):
         return self.contact.gate[0] - first, self.contact.gate[1] - first
 
     @cached_property
-    def noise(self) -> Noise:
-        """Noise estimated from the background."""
+    def noise(self) -> float:
+        """Standard deviation of the noise of a sample, N."""
         first, stop = self.gate
         force = np.concatenate([self.force[:first], self.force[stop:]])
-        deviation = 1.4826 * float(np.median(np.abs(force - np.median(force))))
-        white, pink, brown = map(float, self.contact.background.variances[:3])
-        return Noise(deviation, white, pink, brown)
+        return 1.4826 * float(np.median(np.abs(force - np.median(force))))
 
     def levels(self, bands: BandSet = "octave", method: str = "exact") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).

@@ -45,35 +45,6 @@ MAX_STEP = 3.0
 TOLERANCE = 0.02
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Noise of a recording: white, pink and brown.
-
-    `deviation` is the standard deviation of one sample, N. `white`, `pink` and `brown` are the
-    one-sided densities at 1 Hz, N2/Hz, of spectra that are constant, proportional to 1/f and to
-    1/f**2, estimated from the background before and after the contact.
-    """
-
-    deviation: float
-    white: float
-    pink: float = 0.0
-    brown: float = 0.0
-
-    def spectrum(self, frequency: ArrayLike) -> NDArray[np.float64]:
-        """Return the one-sided spectral density, N2/Hz, at frequencies above 0 Hz."""
-        f = np.asarray(frequency, dtype=np.float64)
-        return np.asarray(self.white + self.pink / f + self.brown / f**2)
-
-    def deviation_between(self, lower: float, upper: float) -> float:
-        """Return the standard deviation of the noise between two frequencies, N."""
-        variances = (
-            self.white * (upper - lower),
-            self.pink * np.log(upper / lower),
-            self.brown * (1 / lower - 1 / upper),
-        )
-        return float(np.sqrt(sum(variances)))
-
-
 def covariances_without_white(cells: Cells, other: Cells) -> NDArray[np.float64]:
     """Return unit covariances of the means over two sets of cells: [4, n_cell, n_other].
 
@@ -137,6 +108,17 @@ class Background(Immutable):
         """Return the density of the noise at a frequency, N2/Hz, and its standard deviation."""
         draws = self.draws[:, :3] @ (1 / frequency ** np.arange(3))
         return float(draws.mean()), float(draws.std())
+
+    def spectrum(self, frequency: ArrayLike) -> NDArray[np.float64]:
+        """Return the one-sided density of the noise, N2/Hz, at frequencies above 0 Hz."""
+        f = np.asarray(frequency, dtype=np.float64)
+        white, pink, brown = self.variances[:3]
+        return np.asarray(white + pink / f + brown / f**2)
+
+    def deviation_between(self, lower: float, upper: float) -> float:
+        """Return the standard deviation of the noise between two frequencies, N."""
+        widths = (upper - lower, np.log(upper / lower), 1 / lower - 1 / upper)
+        return float(np.sqrt(self.variances[:3] @ widths))
 
     @cached_property
     def _factors(self) -> list[NDArray[np.float64]]:

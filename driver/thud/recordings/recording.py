@@ -353,7 +353,7 @@ class Recording(ImpactOrRecording):
             date=origin.date,
             notes=(
                 *(str(note) for note in measured.notes if not note.is_warning),
-                str(Note("noise_remains", value=measured.noise.deviation, unit="N")),
+                str(Note("noise_remains", value=measured.noise, unit="N")),
             ),
         )
 

@@ -181,8 +181,7 @@ def _matched(
     rate = contact.sample_rate
     frequency, energy = matched_energy(force, rate, DECAYS)
     frequency, energy = frequency[1:], energy[:, 1:]
-    white, pink, brown = contact.background.variances[:3]
-    density = white + pink / frequency + brown / frequency**2
+    density = contact.background.spectrum(frequency)
     if chain is not None:
         density *= chain.noise_gain(frequency)
     return frequency, energy / (density * rate / 2)

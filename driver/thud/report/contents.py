@@ -242,7 +242,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "restitution_method": " and ".join(drop.restitutions),
         "restitutions": {method: _estimate(value) for method, value in drop.restitutions.items()},
         "bounces": list(drop.bounces),
-        "noise": drop.noise.deviation,
+        "noise": drop.noise,
         "notes": [_note(note) for note in drop.notes],
     }
 
