@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from dataclasses import dataclass, replace
@@ -18,8 +19,6 @@ from thud.base.note import Note, about
 from thud.recordings.assumptions import with_assumptions
 from thud.recordings.background import remove_background
 from thud.recordings.checks.copies import (
-    Record,
-    Spans,
     refuse_copy,
     refuse_same_drops,
     refuse_simultaneous_channels,
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from thud.recordings.force_units import Calibration
 
@@ -137,22 +137,21 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     """
     config = config if isinstance(config, Config) else read_config(config) if config else Config()
     config = config.updated(height=height, mass=mass, calibration=calibration)
-    records: list[Record] = []
-    searched: list[Spans] = []
     origins: list[Origin] = []
+    measured: list[tuple[Drop, ...]] = []
+    searched: dict[str, dict[str, NDArray[np.float64]]] = {}
     uncertainties: list[float | None] = []
     count = 0
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
         for signal in _open(paths, config):
-            refuse_copy(signal, records)
+            refuse_copy(signal, origins)
             search = find_drops(
                 signal, config.begin or 0.0, config.end or math.inf, progress=progress
             )
             # Small pulses may be what a channel picks up of another one.
-            spans = Spans.of(signal, [drop for drop in search.drops if not drop.left_out])
-            refuse_simultaneous_channels(spans, searched)
-            searched.append(spans)
+            own = [drop for drop in search.drops if not drop.left_out]
+            refuse_simultaneous_channels(signal, own, searched)
             chosen, left_out = choose(search.drops, count + 1, signal.sample_rate, config)
             count += len(search.drops)
             stated = config.calibration_uncertainty
@@ -163,14 +162,14 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
                 measure_stages(cut_section(signal, pulse), config, uncertainty).drop
                 for pulse in bar
             )
-            records.append(Record(signal.name, signal.path, signal.checksum, drops))
+            measured.append(drops)
             notes = (*_section(signal, config), *search.ignored, *left_out)
             origins.append(Origin.of(signal, len(drops), notes))
-    if not records:
+    if not origins:
         refuse("there are no recordings", "one file or more")
-    drops = tuple(drop for record in records for drop in record.drops)
+    drops = tuple(itertools.chain.from_iterable(measured))
     require_chosen(count, len(drops), config)
-    refuse_same_drops(records)
+    refuse_same_drops(origins, measured)
     known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     largest = max(known) if len(known) == len(uncertainties) else None
     name = Path(origins[0].path or origins[0].name).stem

@@ -7,7 +7,6 @@ their sum is 12 dB too low.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import combinations, product
 from typing import TYPE_CHECKING
 
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
 
     from thud.recordings.drops import Pulse
     from thud.recordings.measured_drop import Drop
+    from thud.recordings.recording import Origin
     from thud.recordings.signal import Signal
 
 # Noise is compared above about 1 / SMOOTH, without hum: a moving mean is subtracted three times.
@@ -46,17 +46,7 @@ MAX_DELAY = 2e-4
 MIN_SCALE_CHANGE = (0.1, 0.03)
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
-    """Measured drops of one signal."""
-
-    name: str
-    path: str
-    checksum: str
-    drops: tuple[Drop, ...]
-
-
-def refuse_copy(signal: Signal, others: Sequence[Record]) -> None:
+def refuse_copy(signal: Signal, others: Sequence[Origin]) -> None:
     """Raise InputError if a file, or an array, was measured before."""
     for other in others:
         is_same_channel = signal.name == other.name or signal.path != other.path
@@ -68,42 +58,36 @@ def refuse_copy(signal: Signal, others: Sequence[Record]) -> None:
             )
 
 
-@dataclass(frozen=True)
-class Spans:
-    """Begins and ends of the contacts in one channel of a file, s, shape (n_drop,)."""
+def refuse_simultaneous_channels(
+    signal: Signal, drops: Sequence[Pulse], searched: dict[str, dict[str, NDArray[np.float64]]]
+) -> None:
+    """Add the drops of a signal to those that were searched, by path and name of their signal.
 
-    name: str
-    path: str
-    begin: NDArray[np.float64]
-    end: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, signal: Signal, drops: Sequence[Pulse]) -> Spans:
-        """Return the spans of the drops that were found in a signal."""
-        contacts = np.array([drop.contact for drop in drops]).reshape(-1, 2)
-        return cls(signal.name, signal.path, *contacts.T / signal.sample_rate)
-
-
-def refuse_simultaneous_channels(spans: Spans, others: Sequence[Spans]) -> None:
-    """Raise InputError if another channel of a file has a drop at the same instant."""
-    for other in others:
-        if other.path != spans.path or not other.path:
-            continue
-        if ((spans.begin[:, None] < other.end) & (spans.end[:, None] > other.begin)).any():
+    `searched` holds begins and ends of contacts, s, shape (n_drop, 2). Raise InputError if another
+    channel of the file has a drop at the same instant.
+    """
+    contacts = np.array([drop.contact for drop in drops]).reshape(-1, 2) / signal.sample_rate
+    channels = searched.setdefault(signal.path, {})
+    for name, others in channels.items() if signal.path else ():
+        if ((contacts[:, None, 0] < others[:, 1]) & (contacts[:, None, 1] > others[:, 0])).any():
             refuse(
-                f"{spans.name}: has drops at the same instants as {other.name}; simultaneous "
-                "forces are never averaged",
+                f"{signal.name}: has drops at the same instants as {name}; simultaneous forces are "
+                "never averaged",
                 HINT,
                 subject="channels",
             )
+    channels[signal.name] = contacts
 
 
-def refuse_same_drops(records: Sequence[Record]) -> None:
-    """Raise InputError if two records hold the same drop, or simultaneous forces."""
-    if len(records) == 1:
+def refuse_same_drops(origins: Sequence[Origin], drops: Sequence[Sequence[Drop]]) -> None:
+    """Raise InputError if two signals hold the same drop, or simultaneous forces.
+
+    `drops` are those of each signal.
+    """
+    if len(origins) == 1:
         return
-    contacts = [[_Contact(drop) for drop in record.drops] for record in records]
-    for (record, ones), (later, others) in combinations(zip(records, contacts, strict=True), 2):
+    contacts = [[_Contact(drop) for drop in own] for own in drops]
+    for (origin, ones), (later, others) in combinations(zip(origins, contacts, strict=True), 2):
         for one, other in product(ones, others):
             if _is_same(one, other):
                 refuse(
@@ -111,9 +95,10 @@ def refuse_same_drops(records: Sequence[Record]) -> None:
                     "same",
                     "each drop once: repeatability is the scatter of different drops",
                 )
-        if record.path != later.path and _are_simultaneous(record.drops, later.drops):
+        same = [[contact.drop for contact in own] for own in (ones, others)]
+        if origin.path != later.path and _are_simultaneous(*same):
             refuse(
-                f"{later.name}: has the drops of {record.name} at the same instants of its file "
+                f"{later.name}: has the drops of {origin.name} at the same instants of its file "
                 "at a different scale; simultaneous forces are never averaged",
                 f"one file with all channels and {HINT}; other balls or heights, which a trigger "
                 "records at the same instant, in a measurement of their own",
