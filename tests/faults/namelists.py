@@ -163,7 +163,9 @@ def _no_numbers(name: str, found: object) -> str:
         return next(filter(None, inner), "")
     if isinstance(found, bytes):
         return f"{name}: {found!r}" if NO_NUMBER.search(found) else ""
-    return "" if np.isfinite(found).all() else name  # type: ignore[call-overload]
+    # A warning that is about no range has none.
+    is_range = re.search(r"warnings\.(value|low|high)$", name)
+    return "" if is_range or np.isfinite(found).all() else name  # type: ignore[call-overload]
 
 
 def _levels(impact: thud.Impact) -> str:

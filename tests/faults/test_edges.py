@@ -31,4 +31,4 @@ def test_broken_laws_are_found(values: dict[str, float], words: str) -> None:
 def test_missing_warning_is_found() -> None:
     impact = thud.solve(thud.Ball(poisson_ratio=0.3))
     assert get_fault(impact) == ""
-    assert get_fault(replace(impact, warnings=())) == "no warning on poisson_ratio"
+    assert get_fault(replace(impact, notes=())) == "no warning on poisson_ratio"

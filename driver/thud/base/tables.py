@@ -6,6 +6,7 @@ import csv
 import io
 import re
 import textwrap
+from functools import lru_cache
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 # Columns of a terminal.
 WIDTH = 80
 _GAP = 2
-# Columns up to this width are not broken to fit more of them in a table.
-_MAX_KEPT = 26
 # Labels and words up to this width stay whole.
 _MAX_WORD = WIDTH // 2 - _GAP
 # Cells are broken after spaces and underscores, but "1.2 ± 0.1", "5 %" and "3 to 4" stay whole.
@@ -65,21 +64,15 @@ def unmarked(text: str) -> str:
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
     """Return rows of text as lines with aligned columns, up to `WIDTH` wide.
 
-    If there are too many columns, further tables follow, each with the first column. Cells of a
-    table that is wider are broken, those of the widest columns first.
+    Cells of wider tables are broken, those of the first column last. If there are too many columns,
+    they are distributed over several tables, each with the first column.
 
     >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
     octave  level
     31.5    39
     """
     label, *columns = zip(*rows, strict=True)
-    tables = [[label]]
-    for column in columns:
-        widths = [min(max(map(len, c)), _MAX_KEPT) for c in (*tables[-1], column)]
-        if len(tables[-1]) > 1 and _total(widths) > WIDTH:
-            tables.append([label])
-        tables[-1].append(column)
-    return "\n\n".join(map(_format_columns, tables))
+    return "\n\n".join(_format_columns([label, *part]) for part in _distribute(label, columns))
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
@@ -111,6 +104,29 @@ def _wrap_line(line: str) -> str:
     )
 
 
+def _distribute(label: Column, columns: Sequence[Column]) -> list[list[Column]]:
+    """Return the columns of as few tables as can be made narrow enough, of similar widths."""
+    natural = [max(map(len, column)) for column in columns]
+    least, *minima = _min_widths([label, *columns])
+
+    def distribute(max_width: int) -> list[list[Column]]:
+        parts: list[list[Column]] = [[]]
+        widths, narrow = [0], [least]
+        for column, width, minimum in zip(columns, natural, minima, strict=True):
+            is_wide = _total([*widths, width]) > max_width or _total([*narrow, minimum]) > WIDTH
+            if parts[-1] and is_wide:
+                parts.append([])
+                widths, narrow = [0], [least]
+            parts[-1].append(column)
+            widths.append(width)
+            narrow.append(minimum)
+        return parts
+
+    unlimited = _total([0, *natural])
+    fewest = len(distribute(unlimited))
+    return next(p for w in range(unlimited + 1) if len(p := distribute(w)) == fewest)
+
+
 def _format_columns(columns: Sequence[Column]) -> str:
     """Return columns of text as lines; the widest columns are made narrower until they fit."""
     minima = _min_widths(columns)
@@ -120,8 +136,14 @@ def _format_columns(columns: Sequence[Column]) -> str:
     if _total([label, *minima[1:]]) <= WIDTH:
         minima[0] = label
     while _total(widths) > WIDTH and widths != minima:
-        wide = [i for i, width in enumerate(widths) if width > minima[i]]
-        widths[max(wide, key=widths.__getitem__)] -= 1
+        # The column that adds the fewest lines; of several, the widest.
+        narrower = [
+            (_height(columns, trial), -width, trial)
+            for i, (width, least) in enumerate(zip(widths, minima, strict=True))
+            if width > least
+            for trial in [[*widths[:i], width - 1, *widths[i + 1 :]]]
+        ]
+        widths = min(narrower)[-1]
     broken = [[_break(cell, w) for cell in c] for c, w in zip(columns, widths, strict=True)]
     widths = [max((len(line) for cell in c for line in cell), default=0) for c in broken]
     lines = []
@@ -151,6 +173,13 @@ def _total(widths: Sequence[int]) -> int:
     return sum(widths) + _GAP * (len(widths) - 1)
 
 
+def _height(columns: Iterable[Column], widths: Sequence[int]) -> int:
+    """Return the number of lines of a table."""
+    heights = [[len(_break(c, w)) for c in col] for col, w in zip(columns, widths, strict=True)]
+    return sum(map(max, zip(*heights, strict=True)))
+
+
+@lru_cache(4096)
 def _break(cell: str, width: int) -> list[str]:
     """Return the lines of a cell; words that are wider are cut."""
     lines = [""]

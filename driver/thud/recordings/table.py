@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 COMMENTS = "#%!*'/;"
+# Marks at the end of a line that separate nothing.
+TRAILING = "\t; "
 # Maximum number of lines in a header, and of numbers in a table.
 MAX_HEADER = 1000
 MAX_NUMBERS = 2**24
@@ -175,7 +177,7 @@ class _Layout:
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line of numbers."""
-        text = strip_comment(line)
+        text = strip_comment(line).rstrip(TRAILING.replace(self.separator or " ", ""))
         return split_line(text, self.separator) if text else []
 
     def rows(self) -> Iterator[tuple[int, str]]:
@@ -286,7 +288,10 @@ def _find_numbers(layout: _Layout) -> list[str]:
     is_workbook = layout.separator is not None
     for line in itertools.islice(layout.lines(), MAX_HEADER):
         if not is_workbook:
-            layout.separator = find_separator(strip_comment(line))
+            text = strip_comment(line)
+            bare = text.rstrip(TRAILING)
+            # Behind the only number of a line, a mark shows that its comma separates nothing.
+            layout.separator = find_separator(text if is_number(bare) else bare)
         cells = layout.cells(line)
         filled = {i: cell for i, cell in enumerate(cells) if cell}
         values = {i: _value(cell) for i, cell in filled.items()}
@@ -521,7 +526,7 @@ def _convert(lines: list[str], columns: list[int], layout: _Layout) -> NDArray[n
         return None
     if decimal == ",":
         lines = joined.replace(",", ".").split("\n")
-    lines = [line.rstrip(" " + (separator or "")) for line in lines]
+    lines = [line.rstrip(TRAILING + (separator or "")) for line in lines]
     try:
         values = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except (ValueError, OverflowError):

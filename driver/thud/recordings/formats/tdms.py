@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -33,8 +34,15 @@ SCALES = {
 }  # fmt: skip
 
 
+def _library() -> Any:  # noqa: ANN401 - a module
+    """Return npTDMS, which logs damage that is refused, or read over, to the screen."""
+    module = library("nptdms", "TDMS")
+    module.log.log_manager.set_level(logging.CRITICAL)
+    return module
+
+
 def _read(path: Path, group: str, name: str, start: int, stop: int) -> NDArray[np.float64]:
-    tdms = library("nptdms", "TDMS").TdmsFile
+    tdms = _library().TdmsFile
     with guarded(path, "TDMS"), path.open("rb") as file:
         return np.asarray(tdms.open(file)[group][name][start:stop], dtype=np.float64)
 
@@ -42,7 +50,7 @@ def _read(path: Path, group: str, name: str, start: int, stop: int) -> NDArray[n
 def read_channels(path: Path) -> list[Channel]:
     """Return the numeric channels of a TDMS file."""
     with path.open("rb") as file:
-        tdms = library("nptdms", "TDMS").TdmsFile.open(file)
+        tdms = _library().TdmsFile.open(file)
         entries = [(group, channel) for group in tdms.groups() for channel in group.channels()]
         channels = [
             _channel(path, number, (channel, group, tdms))
