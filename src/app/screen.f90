@@ -85,12 +85,13 @@ contains
       character(len=1), intent(in) :: mark
       !> Control sequence, without effect if there are no colors.
       character(len=*), intent(in) :: sequence
-      integer :: at
+      integer :: at, last
 
+      last = merge(len(sequence), 0, has_colors(standard_output))
       do
          at = index(text, mark)
          if (at == 0) exit
-         text = text(:at - 1)//trim(merge(sequence, repeat(' ', len(sequence)), has_colors(standard_output)))//text(at + 1:)
+         text = text(:at - 1)//sequence(:last)//text(at + 1:)
       end do
    end subroutine replace_marks
 

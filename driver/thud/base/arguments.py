@@ -6,7 +6,7 @@ import inspect
 import os
 import re
 from collections.abc import Iterable, Mapping
-from functools import wraps
+from functools import cache, wraps
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar, get_origin
 
@@ -41,12 +41,16 @@ def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
     annotations = {name: str(entry.annotation) for name, entry in parameters.items()}
     label = f"{function.__name__}()"
 
-    def plain(name: str, value: Any) -> Any:  # noqa: ANN401 - of a user
+    @cache
+    def expect(name: str) -> tuple[list[str], tuple[type, ...]]:
         annotation = annotations.get(name, "")
         while "[" in annotation:
             annotation = re.sub(r"\[[^\[\]]*\]", "", annotation)
         expected = annotation.split(" | ")
-        types = _known_types(expected, function.__globals__)
+        return expected, _known_types(expected, function.__globals__)
+
+    def plain(name: str, value: Any) -> Any:  # noqa: ANN401 - of a user
+        expected, types = expect(name)
         if isinstance(value, np.generic | np.ndarray) and types and not value.shape:
             value = value.item()
         is_number = not isinstance(value, bool) or bool in types

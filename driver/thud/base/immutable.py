@@ -48,9 +48,7 @@ class Immutable:
         owner: object = array
         while isinstance(owner, np.ndarray):
             if owner.flags.writeable:
-                array = array.copy()
-                array.setflags(write=False)
-                break
+                return freeze(array.copy())
             owner = owner.base
         return array
 

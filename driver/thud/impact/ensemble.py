@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from thud.base.key import Key
 
 MAX_THREADS = 1024
+# Results that are truth values.
+_FLAGS = {"conforms", *(f"{force}_conforms" for force in FORCES)}
 # Duration of one call of the library, s, and samples of a thread in the first call; interrupts are
 # handled between calls.
 _CALL_TIME = 1.0
@@ -196,8 +198,7 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
     )  # fmt: skip
     reasons = text(answer.pop("reasons")).split("\n")[:-1]
     results = {
-        name: values.T != 0 if name.endswith("conforms") else values.T
-        for name, values in answer.items()
+        name: values.T != 0 if name in _FLAGS else values.T for name, values in answer.items()
     }
     results["status"] = results["status"].astype(np.int32)
     results["reason"] = np.full(len(numbers), "", dtype=object)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from thud.plot.style import COLORS, GRAY, LEVEL, WIDTH, new_figure, octave_axis,
 from thud.recordings.recorded_levels import measure_levels
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from thud.recordings.read_recording import Stages
     from thud.recordings.recorded_levels import DropLevels
 
+T = TypeVar("T")
 # Height of a panel, inch.
 HEIGHT = 2.05
 # Time around the contact that is drawn, s.
@@ -42,17 +45,19 @@ def draw_stages(stages: Stages) -> Figure:
 @own_style()
 def draw_section(section: Section) -> Figure:
     """Draw the force of a drop and of its bounces, and their contacts."""
-    figure = new_figure(HEIGHT)
-    _draw_section(figure.subplots(), section)
-    return figure
+    return _draw_alone(_draw_section, section)
 
 
 @own_style()
 def draw_contact(contact: Contact) -> Figure:
     """Draw the force next to a contact, the removed background, and the gate of the levels."""
-    figure = new_figure(HEIGHT)
-    _draw_contact(figure.subplots(), contact)
-    return figure
+    return _draw_alone(_draw_contact, contact)
+
+
+@own_style()
+def draw_levels(levels: DropLevels) -> Figure:
+    """Draw the levels of a drop with their standard uncertainty, and the background."""
+    return _draw_alone(_draw_levels, levels)
 
 
 @own_style()
@@ -65,11 +70,10 @@ def draw_drop(drop: Drop) -> Figure:
     return figure
 
 
-@own_style()
-def draw_levels(levels: DropLevels) -> Figure:
-    """Draw the levels of a drop with their standard uncertainty, and the background."""
+def _draw_alone(draw: Callable[[Axes, T], None], stage: T) -> Figure:
+    """Return a figure of one panel with a stage."""
     figure = new_figure(HEIGHT)
-    _draw_levels(figure.subplots(), levels)
+    draw(figure.subplots(), stage)
     return figure
 
 

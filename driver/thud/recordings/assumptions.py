@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
+    from thud.level.estimate import Budget
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
 
@@ -86,11 +87,14 @@ def instrument_contributions(
     return {name: values for name, values in contributions.items() if values.any()}, sizes
 
 
-def check_assumptions(drops: Sequence[Drop], config: Config) -> list[Note]:
-    """Return a warning for each assumption on the instruments that matters."""
+def check_assumptions(drops: Sequence[Drop], config: Config, octaves: Budget) -> list[Note]:
+    """Return a warning for each assumption on the instruments that matters.
+
+    `octaves` is the budget of the octave levels of the drops.
+    """
     plate, limit = config.resonance, _flat_limit(config)
     seen = [drop.plate_recorded for drop in drops]
-    contributions, _ = instrument_contributions(drops, config, None)
+    contributions = dict(zip(octaves.names, octaves.uncertainty, strict=True))
     rings = any(drop.ringing for drop in drops)
     assumed = {
         "plate_estimated": (ASSUMED_PLATE, plate is None and rings),

@@ -178,8 +178,7 @@ def _stated(value: float | None, uncertainty: float | None) -> Estimate:
 
 def _count_peaks(drop: Drop) -> float:
     """Return the number of peaks of the force; NaN if some may be noise or a ringing plate."""
-    force = drop.force[slice(*drop.gate)]
-    count = peak_count(force, drop.sample_rate)
+    count = peak_count(drop.contact.gated, drop.sample_rate)
     # Noise that is slower than the contact adds no peaks.
     background = drop.contact.background
     noise = background.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)

@@ -16,6 +16,7 @@ from thud.base.note import Note
 from thud.impact.contact_time import THRESHOLD
 from thud.level.levels import low_pass
 from thud.recordings.background import cell_means, cells_between, uniform_bounds
+from thud.recordings.differences import robust_deviation
 from thud.recordings.flanks import FLANK, SMOOTHING, find_touch
 from thud.recordings.noise import MAINS, N_HARMONIC
 from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
@@ -144,9 +145,9 @@ class Contact(Immutable):
         background = float(self.background.variances[0]) * self.sample_rate / 2
         if self.sample_rate < MIN_NOISE_RATE or len(self.gated) < MIN_NOISE_SAMPLES:
             return background
-        differences = np.abs(np.diff(self.gated, NOISE_ORDER))
-        medians = [np.median(third) for third in np.array_split(differences, 3)]
-        variance = (1.4826 * float(max(medians))) ** 2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
+        thirds = np.array_split(np.diff(self.gated, NOISE_ORDER), 3)
+        deviation = max(map(robust_deviation, thirds))
+        variance = deviation**2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
         return variance if variance > MIN_INCREASE * background else background
 
     @property

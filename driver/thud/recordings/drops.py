@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from thud.base.checks import refuse
 from thud.base.note import Note
+from thud.recordings.differences import robust_deviation
 from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
@@ -300,7 +301,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Candid
     width = max(1, round(rate * CELL))
     level = uniform_filter1d(_without_spikes(cells), 3, mode="nearest") - _baseline(cells)
     below = -level[level < 0]
-    deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
+    deviation = robust_deviation(below) if below.size else 0.0
     highest = float(level.max(initial=0.0))
     threshold = min(RISE * deviation, RISE_FRACTION * highest)
     if highest <= max(MIN_DEVIATIONS * deviation, 1e-9):

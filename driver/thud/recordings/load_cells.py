@@ -13,6 +13,7 @@ from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.recordings.config_values import SUM
 from thud.recordings.polarity import MIN_PEAK_RATIO, scan
+from thud.recordings.signal import common_uncertainty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,8 +59,6 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
             )
         common = [replace(note, subject=name) for note in cell.notes]
         notes += [note for note in common if note not in notes]
-    uncertainties = [cell.calibration_uncertainty for cell in cells]
-    known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
     return replace(
         first,
         name=name,
@@ -67,7 +66,7 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
         full_scale=None,
         calibration="; ".join(dict.fromkeys(cell.calibration for cell in cells)),
         # The reference of all calibrations is usually the same.
-        calibration_uncertainty=max(known) if len(known) == len(cells) else None,
+        calibration_uncertainty=common_uncertainty([c.calibration_uncertainty for c in cells]),
         notes=(*notes, Note("cells_added", name, len(cells))),
         cells=tuple(cells),
     )

@@ -6,7 +6,7 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -16,11 +16,12 @@ from scipy.signal import resample
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable
 from thud.base.note import Note
-from thud.level.estimate import Estimate
+from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import find_offset_step, remove_background, step_errors
 from thud.recordings.checks import check_contact
 from thud.recordings.contact import Contact, find_contact
+from thud.recordings.differences import robust_deviation
 from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import min_background
@@ -135,7 +136,7 @@ class Drop(Immutable):
         """Standard deviation of the noise of a sample, N."""
         first, stop = self.gate
         force = np.concatenate([self.force[:first], self.force[stop:]])
-        return 1.4826 * float(np.median(np.abs(force - np.median(force))))
+        return robust_deviation(force - np.median(force))
 
     def levels(self, bands: BandSet = "octave", method: str = "exact") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
@@ -165,8 +166,8 @@ def measure_drop(section: Section, contact: Contact, conditions: DropConditions)
         notes.append(Note("offset_step", value=offset_step, unit="N", effect=0.0))
         errors = step_errors(offset_step, len(contact.gated))
         error_impulses = errors.sum(axis=1) / contact.sample_rate
-        impulse = _with_half_width(impulse, float(np.abs(error_impulses).max()))
-        peak_force = _with_half_width(peak_force, float(np.abs(errors).max()))
+        impulse = impulse.widened(float(np.abs(error_impulses).max()) / RECTANGULAR)
+        peak_force = peak_force.widened(float(np.abs(errors).max()) / RECTANGULAR)
     # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(section, contact, 1 if conditions.height else 2)
     no_bounce = _check_bounce(section, contact, landings, conditions)
@@ -262,12 +263,6 @@ def _impulse(contact: Contact) -> Estimate:
     ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
     variance = contact.covariance_of(ones)[0, 0]
     return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
-
-
-def _with_half_width(estimate: Estimate, half_width: float) -> Estimate:
-    """Return an estimate whose uncertainty includes a rectangular distribution."""
-    uncertainty = math.hypot(estimate.uncertainty, half_width / math.sqrt(3))
-    return replace(estimate, uncertainty=uncertainty)
 
 
 def _peak(contact: Contact) -> Estimate:

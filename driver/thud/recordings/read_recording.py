@@ -33,7 +33,7 @@ from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
 from thud.recordings.ringing import with_plate
-from thud.recordings.signal import Signal
+from thud.recordings.signal import Signal, common_uncertainty
 from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
@@ -170,10 +170,8 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     drops = tuple(itertools.chain.from_iterable(measured))
     require_chosen(count, len(drops), config)
     refuse_same_drops(origins, measured)
-    known = [uncertainty for uncertainty in uncertainties if uncertainty is not None]
-    largest = max(known) if len(known) == len(uncertainties) else None
     name = Path(origins[0].path or origins[0].name).stem
-    return Recording(name, drops, tuple(origins), config, largest)
+    return Recording(name, drops, tuple(origins), config, common_uncertainty(uncertainties))
 
 
 def first_stages(paths: Source | Iterable[Source], config: Config) -> Stages:  # noqa: RET503

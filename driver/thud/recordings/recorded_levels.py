@@ -150,7 +150,7 @@ def measure_levels(
 
 def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64]) -> DropLevels:
     """Return the levels of a drop from the energies of its noise, [n_band, 3]."""
-    force, rate = drop.force[slice(*drop.gate)], drop.sample_rate
+    force, rate = drop.contact.gated, drop.sample_rate
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
     expected, deviation, offset = noise.T
@@ -183,7 +183,7 @@ def _step_uncertainty(
 
 def compare_methods(drop: Drop, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
     """Return the levels of a drop by each method, dB, shape (n_band,), background included."""
-    force = drop.force[slice(*drop.gate)]
+    force = drop.contact.gated
     return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
 
 

@@ -204,7 +204,7 @@ class Recording(ImpactOrRecording):
             notes.append(Note("effective_mass", effect=0.0))
         notes += (check.note for check in config.plate_checks if check.met is False)
         notes += config.check_dates(origin.date for origin in self.origins)
-        notes += check_assumptions(self.drops, config)
+        notes += check_assumptions(self.drops, config, self.average().budget)
         if self.not_stated:
             names = {"names": ", ".join(self.not_stated)}
             notes.append(Note("uncertainty_not_stated", effect=0.0, others=names))

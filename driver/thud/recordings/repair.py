@@ -12,7 +12,14 @@ from scipy.ndimage import median_filter
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.recordings.checks import check_section
-from thud.recordings.differences import FROM_CUBIC, largest_beside, runs
+from thud.recordings.differences import (
+    FROM_CUBIC,
+    MEDIAN,
+    MIN_STEPS,
+    largest_beside,
+    robust_deviation,
+    runs,
+)
 from thud.recordings.load_cells import check_cells
 from thud.recordings.quantization import find_quantization
 
@@ -27,8 +34,6 @@ MIN_SAMPLES = 4
 # Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
 # flank rises as much between two samples at 20 kHz.
 MIN_JUMP = 0.04
-# Minimum jump in quantization steps.
-MIN_STEPS = 3.5
 # Minimum number of equal samples of a dropout.
 MIN_FROZEN = 3
 # Maximum total length of dropouts and spikes that are repaired, s.
@@ -37,7 +42,6 @@ MAX_REPAIRED = 1e-3
 # median of MEDIAN samples: at a kink of the force only the cubic deviates, at a smooth maximum only
 # the median. It deviates by more than the jump, as of a step, from the line through the samples
 # before it to the line through those after it (LINES).
-MEDIAN = 5
 LINES = np.array([2.0, -3.0, 0.0, 0.0, 0.0, 3.0, -2.0])
 # The deviations exceed MIN_SPIKE_RATIO times the largest one from the cubic at samples that a spike
 # does not change, CLEAN samples away; MIN_SPIKE_DEVIATIONS robust standard deviations of all of
@@ -184,7 +188,7 @@ def _find_spikes(section: Section, force: NDArray[np.float64], peak: float) -> N
     from_cubic = np.abs(np.convolve(padded, FROM_CUBIC, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
-    usual = 1.4826 * float(np.median(from_cubic))
+    usual = robust_deviation(from_cubic)
     least = max(
         MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * section.quantization.step
     )

@@ -14,7 +14,7 @@ from thud.base.checks import refuse, require_array, require_number, require_real
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -110,6 +110,12 @@ class Signal(Immutable):
             index = start + int(np.flatnonzero(~np.isfinite(force))[0])
             refuse(f"{self.name}: sample {index + 1} is not finite", "real numbers")
         return force
+
+
+def common_uncertainty(values: Sequence[float | None]) -> float | None:
+    """Return the largest of relative uncertainties of signals, None if one is not known."""
+    known = [value for value in values if value is not None]
+    return max(known) if len(known) == len(values) else None
 
 
 def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.differences import FROM_CUBIC, noise_deviation, runs
+from thud.recordings.differences import FROM_CUBIC, MEDIAN, MIN_NOISE, noise_deviation, runs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,10 +28,6 @@ MAX_RATIO = 1.15
 MIN_FLAT = 4.0
 MAX_FLAT = 0.02
 MIN_TOP = 5e-4
-# Minimum noise as a fraction of the peak: smaller steps of quantization are not known.
-MIN_NOISE = 4e-5
-# A spike of two samples is removed before.
-MEDIAN = 5
 # Fraction of full scale from which a sample is clipped.
 CLIPPED_FRACTION = 0.999
 

@@ -8,7 +8,14 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.differences import FROM_CUBIC, largest_beside, noise_deviation, runs
+from thud.recordings.differences import (
+    FROM_CUBIC,
+    MIN_NOISE,
+    MIN_STEPS,
+    largest_beside,
+    noise_deviation,
+    runs,
+)
 
 if TYPE_CHECKING:
     from thud.recordings.contact import Contact
@@ -18,8 +25,6 @@ if TYPE_CHECKING:
 # 10 000 does so by chance.
 MIN_GAP = 1e-3
 MAX_QUIET = 1e-4
-# Minimum noise as a fraction of the peak: without noise nothing shows a gap.
-MIN_NOISE = 4e-5
 # Fraction of the background outside the contact from which constant samples are a gate, not a loss.
 MAX_CONSTANT = 0.5
 # Value and slope are compared between the lines through the samples of this time, s, or four at
@@ -32,9 +37,8 @@ MIN_RATIO = 3.0
 # The same for the quieter side alone, of values: packets that change places jump three times, and
 # hide each other on the sides between them. The slope may change on one side only.
 MIN_SIDE_RATIO = 6.0
-# Minimum jump as a fraction of the peak, and in quantization steps.
+# Minimum jump as a fraction of the peak.
 MIN_JUMP = 0.005
-MIN_STEPS = 3.5
 
 
 def check_gaps(section: Section) -> tuple[Note, ...]:
