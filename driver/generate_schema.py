@@ -294,6 +294,8 @@ def python_module(schema: Entry) -> str:
         f"VERDICTS = ({', '.join(map(quoted, schema['verdicts']))})\n",
         "\n# Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.\n",
         f"CLASS_LIMITS = {tuple(schema['class_limits'])!r}\n",
+        "\n# Probability from which a requirement on a rating is met.\n",
+        f"MET_FROM = {schema['met_from']!r}\n",
         table("Single-number ratings of a level in a room, with symbols, bands and standards.",
               "RATINGS: dict[RoomRating, str]",
               [f"{quoted(name)}: {quoted(title)}" for name, title in schema["ratings"].items()]),

@@ -1180,6 +1180,9 @@ VERDICTS = ("conforms", "does not conform", "undecided")
 # Maximum A-weighted levels of the classes 1, 2, ... of KS F 2863-2, dB.
 CLASS_LIMITS = (37.0, 41.0, 45.0, 49.0)
 
+# Probability from which a requirement on a rating is met.
+MET_FROM = 0.84
+
 # Single-number ratings of a level in a room, with symbols, bands and standards.
 RATINGS: dict[RoomRating, str] = {
     "octaves": "L_iA,Fmax of octaves (KS F ISO 717-2)",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import VERDICTS, FiniteElement
+from thud.base._schema import MET_FROM, VERDICTS, FiniteElement
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import scaled
@@ -69,7 +69,7 @@ STIFFNESS_STEP = 0.1
 FLOOR_STEPS = 15
 FLOOR_NOTE = (
     "Each layer alone; the level need not fall with each step, as modes of the room move. A "
-    "requirement is met if its probability is at least 84 %."
+    f"requirement is met if its probability is at least {100 * MET_FROM:.0f} %."
 )
 # Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
 # over the width of its range.

@@ -45,7 +45,7 @@ module thud_room_uncertainty
    real(wp), parameter :: model_error = 2.0_wp
 
    !> Probabilities from which a requirement is met, and up to which it is missed: one standard uncertainty.
-   real(wp), parameter :: met_from = 0.84_wp, missed_up_to = 0.16_wp
+   real(wp), parameter, public :: met_from = 0.84_wp, missed_up_to = 0.16_wp
 
 contains
 

@@ -10,6 +10,7 @@ module thud_schema
    use thud_kinds, only: wp
    use thud_quantities, only: history_quantity_count, quantities, sample_quantity_count
    use thud_rating, only: class_limits, get_rated_bands, rating_names, rating_titles
+   use thud_room_uncertainty, only: met_from
    use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, source_names, verdict_names
    use thud_text, only: join, newline, to_text
@@ -60,7 +61,8 @@ contains
          end do
          text = text//']'//trim(merge(',', ' ', i < size(source_names)))
       end do
-      text = text//'},'//newline//'"class_limits": ['//join(class_limits)//'],'//newline//'"ratings": {'
+      text = text//'},'//newline//'"class_limits": ['//join(class_limits)//'],'//newline//'"met_from": ' &
+         //to_text(met_from)//','//newline//'"ratings": {'
       do i = 1, size(rating_names)
          text = text//newline//text_value(rating_names(i))//': '//text_value(rating_titles(i)) &
             //trim(merge(',', ' ', i < size(rating_names)))
