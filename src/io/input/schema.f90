@@ -10,8 +10,8 @@ module thud_schema
    use thud_kinds, only: wp
    use thud_quantities, only: history_quantity_count, quantities, sample_quantity_count
    use thud_rating, only: class_limits, get_rated_bands, rating_names, rating_titles
-   use thud_room_uncertainty, only: met_from
    use thud_registry, only: floor_names, model_names
+   use thud_room_uncertainty, only: met_from
    use thud_source_limits, only: criterion_count, criterion_type, get_criteria, source_names, verdict_names
    use thud_text, only: join, newline, to_text
    implicit none (type, external)
