@@ -18,6 +18,7 @@ from thud import plot
 from thud.base import _schema, bridge
 from thud.base.errors import ReportWarning
 from thud.base.note import Note
+from thud.base.sentences import PROCESSING, WARNINGS
 from thud.case.case import Case
 from thud.cli import main
 from thud.floors.prediction import _force_change
@@ -355,6 +356,13 @@ def test_force_that_is_not_that_on_the_floor_raises_a_warning(shell: thud.Impact
         assert [(note.code, note.value) for note in one.notes] == [(code, change) for code in codes]
     notes = Note("a", others={"name": "&a", "text": "b"}), Note("blocked_force", value=1.0)
     assert replace(enough, floor_notes=notes).notes == notes
+
+
+def test_fact_of_the_library_is_told_in_its_words_whatever_the_code() -> None:
+    for code in ("a", *WARNINGS, *PROCESSING):
+        assert str(Note(code, "room", others={"name": "&room", "text": "is large"})) == (
+            "&room is large"
+        )
 
 
 def test_single_numbers_are_those_of_the_levels(shell: thud.Impact) -> None:

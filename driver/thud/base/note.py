@@ -87,9 +87,10 @@ def sentence(notes: Sequence[Note]) -> str:
         for name in ("subject", "value", "low", "high", "unit")
     }
     values |= {name: _Range([note.others[name] for note in notes]) for name in notes[0].others}
-    code = notes[0].code
     cell = "{cell}: " if "cell" in values else ""
-    return (cell + (WARNINGS.get(code) or PROCESSING.get(code) or LIBRARY)).format(**values)
+    # Facts of the library bring their text; their codes may be those of the driver too.
+    text = LIBRARY if "text" in values else (PROCESSING | WARNINGS)[notes[0].code]
+    return (cell + text).format(**values)
 
 
 def _listed(numbers: Sequence[int]) -> str:
