@@ -14,7 +14,7 @@ from scipy import stats
 import thud
 from thud.case.keys import with_values
 from thud.studies.fitting import misfit, search
-from thud.studies.fitting.inference import identifiability, infer, pair_messages, worst_directions
+from thud.studies.fitting.inference import identifiability, infer, pair_notes, worst_directions
 from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
 if TYPE_CHECKING:
@@ -211,13 +211,16 @@ def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
     sizes = np.array(
         [[1, 0.9987, 0.95, 0.2], [0, 1, -0.99996, 0.899], [0, 0, 1, 0.901], [0, 0, 0, 1]]
     )
-    found = pair_messages("abcd", np.where(sizes, sizes, sizes.T), 0.9)
+    found = pair_notes("abcd", np.where(sizes, sizes, sizes.T), 0.9)
     # The strongest first; above 0.998 no model tells them apart.
-    assert found == [
-        "b and c cannot be separated: correlation −0.99996",
-        "a and b cannot be separated: correlation 0.999",
-        "a and c can hardly be separated: correlation 0.95",
-        "c and d can hardly be separated: correlation 0.90",
+    assert [
+        (note.code, note.others["first"], note.others["second"], note.others["shown"])
+        for note in found
+    ] == [
+        ("inseparable", "b", "c", "−0.99996"),
+        ("inseparable", "a", "b", "0.999"),
+        ("hardly_separable", "a", "c", "0.95"),
+        ("hardly_separable", "c", "d", "0.90"),
     ]
 
 
@@ -225,7 +228,8 @@ def test_directions_are_compared_where_there_are_two() -> None:
     assert identifiability(["a"], np.eye(1), np.eye(1), 1) == []
     # Of standard errors of 6 and 2 %, the first along the first parameter.
     (told,) = identifiability(["a", "b"], np.diag([0.06, 0.02]) ** 2, np.eye(2), 2)
-    assert re.search(r"weakest parameter combination: a, standard error 6 %, 3 times that", told)
+    assert (told.others["changes"], told.value) == ("a", pytest.approx(6.0))
+    assert told.others["ratio"] == pytest.approx(3.0)
 
 
 def test_parameters_without_any_effect_are_all_lost() -> None:
@@ -443,7 +447,9 @@ def test_limits_hold_and_are_reported(
     fit = quiet_fit(target, limited, case=SHELL)
     # Also of the differences that are the derivatives.
     assert low * (1 - 1e-12) <= min(asked) < max(asked) <= high * (1 + 1e-12)
-    assert re.search(naming("youngs_modulus", f"{limit} MPa"), fit.warnings[0])
+    told = fit.warnings[0]
+    assert (told.code, told.others["name"]) == ("at_limit", "youngs_modulus")
+    assert told.value == pytest.approx(1e6 * limit)
     assert low <= fit.values["youngs_modulus"] <= high
 
 

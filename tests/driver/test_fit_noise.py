@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import naming, quiet_fit
+from conftest import codes, naming, quiet_fit
 from scipy import stats
 from scipy.linalg import toeplitz
 
@@ -300,11 +301,13 @@ def test_white_residuals_fail_each_test_as_often_as_it_says(
 ) -> None:
     monkeypatch.setattr(inference, "UNLIKELY", 0.1)
     rng, time = np.random.default_rng(7), np.arange(101) * 4e-4
-    told = [" ".join(residual_warnings(rng.normal(size=101), time)) for _ in range(500)]
+    told = Counter(
+        note.code for _ in range(500) for note in residual_warnings(rng.normal(size=101), time)
+    )
     # The bound of Bonferroni is not reached by 1 - 0.1/2, and runs are whole numbers.
     low, high = stats.binom.ppf([1e-4, 1 - 1e-4], 500, [0.085, 0.115])
-    for words in ("colored", "largest", "change their sign"):
-        assert low <= sum(words in one for one in told) <= high
+    for code in ("residuals_colored", "residual_large", "residuals_dependent"):
+        assert low <= told[code] <= high
 
 
 def test_runs_are_those_of_wald_and_wolfowitz() -> None:
@@ -321,7 +324,7 @@ def test_runs_are_those_of_wald_and_wolfowitz() -> None:
         told = inference.runs_warning(signs)
         assert bool(told) == (2 * stats.norm.sf(abs(runs - mean) / deviation) <= UNLIKELY)
         if told:
-            assert f" {runs - 1} times where {mean - 1:.0f} " in told
+            assert (told[0].value, told[0].others["expected"]) == (runs - 1, mean - 1)
 
 
 @pytest.mark.parametrize("place", ["contact", "change", "size", "size of quiet"])
@@ -462,7 +465,8 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
     ],
 )
 def test_noise_of_another_kind_warns(disturbance: str, words: str) -> None:
-    assert re.search(words, " ".join(quiet_fit(record(disturbance), TRUTH, CASE).warnings))
+    told = quiet_fit(record(disturbance), TRUTH, CASE).warnings
+    assert re.search(words, " ".join(map(str, told)))
 
 
 def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
@@ -485,13 +489,16 @@ def test_white_residuals_pass_and_others_do_not() -> None:
     white = random.normal(size=251)
     slow = np.convolve(white, [1.0, 1.0], "same") / np.sqrt(2)
     spiked = np.where(np.arange(251) == 100, 6.0, white)
-    assert "lowest" in residual_warnings(slow, time)[0]
-    assert any("sign" in one for one in residual_warnings(slow, time))
-    assert re.search(naming("residual", "40 ms", 6), residual_warnings(spiked, time)[0])
-    assert any("same sign" in one for one in residual_warnings(np.abs(white), time))
+    first, second = residual_warnings(slow, time)
+    assert (first.code, first.others["side"]) == ("residuals_colored", "low")
+    assert second.code == "residuals_dependent"
+    (told_spike,) = residual_warnings(spiked, time)
+    assert (told_spike.code, told_spike.others["position"]) == ("residual_large", 40.0)
+    assert told_spike.value == 6.0
+    assert "residuals_one_sign" in codes(residual_warnings(np.abs(white), time))
     assert not residual_warnings(slow[:10], time[:10])
     # A constant is no frequency: it is told by its runs alone.
-    assert not any("colored" in one for one in residual_warnings(white + 3, time))
+    assert "residuals_colored" not in codes(residual_warnings(white + 3, time))
 
 
 @pytest.mark.parametrize(

@@ -203,13 +203,13 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
         thud.read_recording(path, config=Config(channels="sum"))
     path = write_table(tmp_path / "inverted.csv", [-first, *others], NAMES)
     note = noted(opened(path, channels="sum")[0].notes, "cell_sign")
-    assert note.others["cell"] == "inverted.csv, F1"
+    assert note.others["part"] == "inverted.csv, F1"
     lost = first.copy()
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
     path = write_table(tmp_path / "dropout.csv", [lost, *others], NAMES)
     found = thud.read_recording(path, config=Config(channels="sum"))
     lost = noted(found.notes, "dropouts")
-    assert (lost.others["cell"], lost.value) == ("dropout.csv, F1", pytest.approx(0.5))
+    assert (lost.others["part"], lost.value) == ("dropout.csv, F1", pytest.approx(0.5))
     expected = thud.read_recording(write_table(path, cells(), NAMES), config=Config(channels="sum"))
     np.testing.assert_allclose(found.levels(), expected.levels(), atol=0.02)
 
@@ -227,12 +227,12 @@ def loads(**changed: NDArray[np.float64]) -> list[NDArray[np.float64]]:
 def cell_notes(path: Path) -> list[Note]:
     """Return the notes on a load cell of the first drop."""
     found = thud.read_recording(path, config=Config(channels="sum"))
-    return [note for note in found.drops[0].notes if "cell" in note.others]
+    return [note for note in found.drops[0].notes if "part" in note.others]
 
 
 def test_dead_load_cell_raises_a_warning(tmp_path: Path) -> None:
     path = write_table(tmp_path / "dead.csv", loads(F3=record(9, share=0.0)), NAMES)
-    assert noted(cell_notes(path), "cell_without_force").others["cell"] == "dead.csv, F3"
+    assert noted(cell_notes(path), "cell_without_force").others["part"] == "dead.csv, F3"
 
 
 def test_channels_of_unequal_length_are_refused() -> None:

@@ -43,7 +43,7 @@ class ThudError(Exception):
 
 
 class FitWarning(UserWarning):
-    """A result of a fit is unreliable in some respect."""
+    """A result of a fit is unreliable in some respect; its argument is a `Note`."""
 
 
 class PlausibilityWarning(UserWarning):

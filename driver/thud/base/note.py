@@ -30,7 +30,8 @@ class Note:
         Effect on the octave of 500 Hz that its uncertainty does not include, dB; zero if there is
         none, infinite if it is unknown.
     others : mapping
-        Further values of the sentence, by name. A ``"cell"`` is the load cell that it is about.
+        Further values of the sentence, by name. A ``"part"`` is the part of the subject,
+        such as a load cell, that it is about.
     """
 
     code: str
@@ -87,10 +88,10 @@ def sentence(notes: Sequence[Note]) -> str:
         for name in ("subject", "value", "low", "high", "unit")
     }
     values |= {name: _Range([note.others[name] for note in notes]) for name in notes[0].others}
-    cell = "{cell}: " if "cell" in values else ""
+    part = "{part}: " if "part" in values else ""
     # Facts of the library bring their text; their codes may be those of the driver too.
     text = LIBRARY if "text" in values else (PROCESSING | WARNINGS)[notes[0].code]
-    return (cell + text).format(**values)
+    return (part + text).format(**values)
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -243,6 +243,73 @@ WARNINGS = {
         "the sound deviates from the prediction by {value:.1f} {unit} in an octave or in the "
         "A-weighted level"
     ),
+    # Fits.
+    "not_converged": "the search has not converged; allow more steps, or start elsewhere",
+    "no_effect": "{names} has no effect on the compared quantities: it cannot be fitted",
+    "not_identifiable": (
+        "{names} are not identifiable: {changes} together do not change the compared "
+        "quantities{product}"
+    ),
+    "hardly_known": (
+        "{names} is hardly identifiable: its {confidence:.0%} interval is +-{value:.0f} {unit} of "
+        "its value"
+    ),
+    "hardly_identifiable": (
+        "{names} are hardly identifiable: along {changes} the {confidence:.0%} interval is "
+        "+-{value:.0f} {unit}{product}"
+    ),
+    "inseparable": "{first} and {second} cannot be separated: correlation {shown}",
+    "hardly_separable": "{first} and {second} can hardly be separated: correlation {shown}",
+    "weakest_combination": (
+        "weakest parameter combination: {changes}, standard error {value:.2g} {unit}, {ratio:.3g} "
+        "times that of the strongest"
+    ),
+    "at_limit": (
+        "{name} ended at its limit, {limit}: its interval is cut there, and all intervals hold "
+        "inside the limits only"
+    ),
+    "alternative_seen": (
+        "the residuals contain the effect of {alternative} ({value:.3g} standard errors): the "
+        "{unknown} is not as assumed, and the intervals include the difference"
+    ),
+    "alternative_failed": (
+        "{alternative} cannot be computed: the {unknown} counts as known ({reason})"
+    ),
+    "unexplained": (
+        "the residuals are {value:.3g} times as large as the uncertainty of the target: the model "
+        "does not explain the data"
+    ),
+    "residuals_colored": (
+        "the residuals are colored: half of their power lies in the {side}est {value:.0%} of the "
+        "compared frequencies: the noise is not as assumed or the model is wrong"
+    ),
+    "residual_large": (
+        "the largest residual, at {position:.4g} {unit}, is {value:.3g} standard deviations: it is "
+        "not noise"
+    ),
+    "residuals_one_sign": (
+        "all {value:.0f} residuals have the same sign: they are not independent"
+    ),
+    "residuals_dependent": (
+        "the residuals change their sign {value:.0f} times where {expected:.0f} are expected: they "
+        "are not independent"
+    ),
+    "residuals_in_contact": (
+        "the residual is {value:.3g} {unit} during the contact and {high:.3g} {unit} otherwise: "
+        "the model differs from the force by more than the noise"
+    ),
+    "residuals_change": (
+        "the residuals are {value:.3g} times as large after the contact as before it: the noise is "
+        "not the same throughout"
+    ),
+    "background_too_short": (
+        "the background lasts {value:.3g} {unit}: offset, hum and color of the noise are not "
+        "known, and the intervals hold for white noise alone"
+    ),
+    "touch_at_limit": (
+        "the first touch lies at the limit of the search: give data from first touch on"
+    ),
+    "larger_than_expected": "the {name} is {value:.2g} times as large as expected",
     # Samples.
     "samples_failed": (
         "{value:.0f} of {high:.0f} samples have no results; most frequent reason: {reason}"

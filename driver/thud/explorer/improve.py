@@ -13,6 +13,7 @@ import numpy as np
 from thud.base._schema import MET_FROM, VERDICTS, FiniteElement
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
+from thud.base.note import Note
 from thud.base.units import scaled
 from thud.case.constructions import constructions
 from thud.case.keys import find_key, key_owners, limits, value_in, with_values
@@ -28,7 +29,7 @@ from thud.impact.ensemble import solve_many
 from thud.level.assessment import get_criteria
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
-from thud.studies.fitting.search import UNEXPLAINED, size_of_residuals, size_text
+from thud.studies.fitting.search import size_of_residuals
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
@@ -385,7 +386,7 @@ def fit_recording(
     for name, value in (known | fitted).items():
         key, _ = find_key(name, key_owners(case))
         values.setdefault(key.group, {})[key.name] = value
-    details = " ".join(f"{note[:1].upper()}{note[1:]}." for note in result.warnings)
+    details = " ".join(f"{text[:1].upper()}{text[1:]}." for text in map(str, result.warnings))
     text = f"Fitted to {Path(paths[0]).name}: {', '.join(texts)} (95 %){_misfit_text(result)}"
     text += " The verdict is that of the best values, not of their intervals."
     return {"values": values, "text": text, "details": details}
@@ -400,6 +401,6 @@ def _misfit_text(result: Fit) -> str:
     residual = np.abs(columns["residual_N"])
     percent = 100 * residual.max() / columns["target_N"].max()
     return (
-        f", but {UNEXPLAINED}: the largest residual is {residual.max():.0f} N, {percent:.2g} % of "
-        f"the peak, and {size_text(size)}."
+        f", but {Note('unexplained', value=size)}; the largest residual is {residual.max():.0f} N, "
+        f"{percent:.2g} % of the peak."
     )

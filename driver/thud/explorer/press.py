@@ -94,7 +94,7 @@ def fit_press(paths: Sequence[str], units: Mapping[str, str], values: Values) ->
     values.setdefault("ball", {})["youngs_modulus"] = float(f"{ends[0]:.4g}")
     radius, wall = (_shown(case.ball, key) for key in ("outer_radius", "wall_thickness"))
     sentences = [
-        *result.warnings,
+        *map(str, result.warnings),
         note,
         f"a curve determines the modulus only: radius {radius} and wall {wall} are as stated",
         "a press measures slowly: in an impact rubber is stiffer",

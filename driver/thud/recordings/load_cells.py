@@ -89,7 +89,7 @@ def check_signs(cells: Sequence[Signal], peak: float) -> tuple[Note, ...]:
         extremes = scan(cell.read, cell.n_sample, cell.name)
         up, down = extremes.peak(1.0), extremes.peak(-1.0)
         if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
-            others: dict[str, float | str] = {"cell": cell.name, "total": peak}
+            others: dict[str, float | str] = {"part": cell.name, "total": peak}
             notes.append(Note("cell_sign", value=-down, unit="N", others=others))
     return tuple(notes)
 
@@ -117,7 +117,7 @@ def check_cells(section: Section, forces: Sequence[NDArray[np.float64]]) -> list
                     "channels without it, or channel = this one",
                 )
     return [
-        Note("cell_without_force", value=share, others={"cell": cell.name})
+        Note("cell_without_force", value=share, others={"part": cell.name})
         for cell, share in zip(cells, shares, strict=True)
         if abs(share) < MIN_SHARE
     ]

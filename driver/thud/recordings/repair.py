@@ -102,7 +102,7 @@ def _repair_cells(section: Section) -> Section:
         recorded = replace(cell, quantization=section.quantization)
         filled = _fill(replace(recorded, notes=check_section(recorded)), peak)
         forces.append(filled.force)
-        notes += (replace(note, others={**note.others, "cell": cell.name}) for note in filled.notes)
+        notes += (replace(note, others={**note.others, "part": cell.name}) for note in filled.notes)
     notes += check_cells(section, forces)
     return replace(section, force=np.sum(forces, axis=0), cells=(), notes=tuple(notes))
 

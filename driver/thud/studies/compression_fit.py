@@ -15,6 +15,7 @@ from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
+from thud.base.note import Note
 from thud.case.case import Case, new_model
 from thud.case.keys import number_in
 from thud.impact.compression import CompressionCurve, compress
@@ -196,15 +197,15 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     x, best, converged = _refine(problem, x)
     added = problem.effects(x) @ best.effect
     residual = problem.residual(x) + added
-    texts, ratio = _warnings(best.whiten(residual), measured, x[1])
+    notes, ratio = _warnings(best.whiten(residual), measured, x[1])
     if not converged:
-        texts.append("the search has not converged: give another modulus of the ball to start from")
+        notes.append(Note("not_converged"))
     for name, value in zip(problem.names, np.abs(best.effect).tolist(), strict=True):
         if value > EXPECTED:
             ratio = max(ratio, value)
-            texts.append(f"the {name} is {value:.2g} times as large as expected")
-    for text in texts:
-        warnings.warn(text, FitWarning, stacklevel=3)
+            notes.append(Note("larger_than_expected", value=value, others={"name": name}))
+    for note in notes:
+        warnings.warn(FitWarning(note), stacklevel=3)
     scale = np.array([float(np.exp(x[0])) * problem.modulus, problem.span])
     errors = np.sqrt(np.diag(best.effect_covariance))
     nuisances = (problem.sizes * np.array([best.effect, errors])).T.tolist()
@@ -217,7 +218,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
         confidence=confidence,
         noise=best.deviation,
         residuals=residual,
-        warnings=tuple(texts),
+        warnings=tuple(notes),
         assumptions=tuple(problem.assumptions()),
         widened=ratio,
         deflection=measured,
@@ -383,16 +384,15 @@ def _require_gain(gain: object) -> None:
         refuse_value("gain", gain, "0 <= gain < 1")
 
 
-def _warnings(residual: Array, deflection: Array, relative_touch: float) -> tuple[list[str], float]:
+def _warnings(
+    residual: Array, deflection: Array, relative_touch: float
+) -> tuple[list[Note], float]:
     """Return warnings, and by how much residuals of unit variance that are not noise exceed it."""
     result = []
     if min(relative_touch - _BOUNDS[0][1], _BOUNDS[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
-        result.append(
-            "the first touch lies at the limit of the search: give data from first touch on"
-        )
+        result.append(Note("touch_at_limit"))
     if len(residual) >= MIN_TESTED:
-        texts = residual_warnings(residual, deflection, "mm")
+        notes = residual_warnings(residual, deflection, "mm")
     else:
-        texts = [text for text in [runs_warning(residual)] if text]
-    ratio = misfit_ratio(residual) if texts else 1.0
-    return [*result, *(f"{text}; the model does not explain the curve" for text in texts)], ratio
+        notes = runs_warning(residual)
+    return [*result, *notes], misfit_ratio(residual) if notes else 1.0

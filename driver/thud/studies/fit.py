@@ -136,8 +136,8 @@ def fit(  # noqa: PLR0913 - options of a search
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in bound})
     trained = None if surrogate is None else get_surrogate(surrogate)
     result = _search(pairs, get_ranges(case, bound), options, trained, progress=progress)
-    for message in result.warnings:
-        warnings.warn(message, FitWarning, stacklevel=3)
+    for note in result.warnings:
+        warnings.warn(FitWarning(note), stacklevel=3)
     return result
 
 

@@ -15,6 +15,8 @@ from thud.studies.study_result import StudyResult
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.base.note import Note
+
     Array = NDArray[np.float64]
 
 
@@ -38,7 +40,7 @@ class Estimates(StudyResult):
         Standard deviation of a residual, N or dB.
     residuals : ndarray, shape (n_residual,)
         Model minus measured values.
-    warnings : tuple of str
+    warnings : tuple of Note
         Why estimates or intervals may be wrong.
     assumptions : tuple of str
         Which unknowns the intervals include, and the effect of errors that no data can show.
@@ -55,7 +57,7 @@ class Estimates(StudyResult):
     confidence: float
     noise: float
     residuals: Array
-    warnings: tuple[str, ...]
+    warnings: tuple[Note, ...]
     assumptions: tuple[str, ...]
     widened: float
 
@@ -130,7 +132,7 @@ class Estimates(StudyResult):
 
     def __str__(self) -> str:
         """Return the table, and the warnings."""
-        return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
+        return "\n".join([self.table(), *(f"Warning: {note}." for note in self.warnings)])
 
 
 def _digits(value: float, error: float) -> int:

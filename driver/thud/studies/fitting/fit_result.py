@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.base.note import Note
     from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.studies.fitting.misfit import Misfit
@@ -90,7 +91,7 @@ class Fit(Estimates):
         Number of impacts computed, and of those that failed.
     converged : bool
         The search has converged.
-    identifiability : tuple of str
+    identifiability : tuple of Note
         How well the parameters can be separated.
     targets : tuple of FittedTarget
         Case, impact and comparison of each target.
@@ -103,7 +104,7 @@ class Fit(Estimates):
     evaluations: int
     failures: int
     converged: bool
-    identifiability: tuple[str, ...]
+    identifiability: tuple[Note, ...]
     targets: tuple[FittedTarget, ...]
     given_units: dict[str, tuple[str, float]] = field(default_factory=dict)
 
@@ -197,7 +198,7 @@ class Fit(Estimates):
             ]
             label = f"target {number}: " if len(deviations) > 1 else ""
             lines += [f"{label}{', '.join(parts)}"] if parts else []
-        lines += [*self.identifiability, *self.trust]
+        lines += [*map(str, self.identifiability), *self.trust]
         return [*lines, f"{self.evaluations} impacts computed{failures}"]
 
     def deviation_of(self, target: FittedTarget) -> float:
@@ -247,13 +248,13 @@ class Fit(Estimates):
                 }
                 for target in self.targets
             ],
-            "identifiability": list(self.identifiability),
+            "identifiability": list(map(str, self.identifiability)),
             "assumptions": list(self.assumptions),
             "widened": self.widened,
             "evaluations": self.evaluations,
             "failures": self.failures,
             "converged": self.converged,
-            "warnings": list(self.warnings),
+            "warnings": list(map(str, self.warnings)),
         }
 
     def to_dataframe(self, number: int = 1) -> pd.DataFrame:

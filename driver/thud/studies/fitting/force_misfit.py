@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from scipy.signal import ZoomFFT
 
 from thud.base.checks import refuse
 from thud.base.immutable import freeze
+from thud.base.note import Note
 from thud.impact.impact import Impact
 from thud.studies.fitting.inference import UNLIKELY, misfit_ratio, residual_warnings
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
@@ -227,7 +229,7 @@ class ForceMisfit(Misfit):
                 result[f"hum of {mains:g} Hz"] = size, error
         return result
 
-    def warnings(self, impact: Impact, own: Array, deviation: float, count: int) -> list[str]:
+    def warnings(self, impact: Impact, own: Array, deviation: float, count: int) -> list[Note]:
         """Return warnings where residuals are not noise of a deviation, after `count` parameters.
 
         Weighted noise is stationary and independent; errors of the model occur during contact only.
@@ -244,10 +246,8 @@ class ForceMisfit(Misfit):
             result = residual_warnings(weighted, time)
             result += _change_warning(weighted, time < begin, time > end)
         if not (self.background_record.known or self.target.offset is not None or self.exact):
-            result.append(
-                f"the background lasts {1e3 * self.background_record.seconds:.3g} ms: offset, hum "
-                "and color of the noise are not known, and the intervals hold for white noise alone"
-            )
+            lasts = 1e3 * self.background_record.seconds
+            result.append(Note("background_too_short", value=lasts, unit="ms"))
         return result
 
     def effect(self, impact: Impact, other: Impact, own: Array) -> Array:
@@ -305,7 +305,7 @@ class ForceMisfit(Misfit):
 
 def _contact_warning(
     weighted: Array, inside: NDArray[np.bool_], count: int, unit: float
-) -> list[str]:
+) -> list[Note]:
     """Return a warning if residuals during contact exceed those before and after it."""
     inside_count, outside_count = int(inside.sum()) - count, int((~inside).sum())
     if min(inside_count, outside_count) < MIN_FREEDOM:
@@ -314,17 +314,13 @@ def _contact_warning(
     outside = float((weighted[~inside] ** 2).sum()) / outside_count
     if square < stats.f.isf(UNLIKELY, inside_count, outside_count) * outside:
         return []
-    text = (
-        f"the residual is {unit * np.sqrt(square):.3g} N during the contact and "
-        f"{unit * np.sqrt(outside):.3g} N otherwise: the model differs from the force by more than "
-        "the noise"
-    )
-    return [text]
+    value, high = (unit * math.sqrt(part) for part in (square, outside))
+    return [Note("residuals_in_contact", value=value, high=high, unit="N")]
 
 
 def _change_warning(
     weighted: Array, before: NDArray[np.bool_], after: NDArray[np.bool_]
-) -> list[str]:
+) -> list[Note]:
     """Return a warning if residuals before contact differ from those after it."""
     counts = int(before.sum()), int(after.sum())
     if min(counts) < MIN_FREEDOM:
@@ -333,8 +329,4 @@ def _change_warning(
     tail = min(stats.f.sf(ratio, *counts[::-1]), stats.f.cdf(ratio, *counts[::-1]))
     if 2 * tail > UNLIKELY:
         return []
-    text = (
-        f"the residuals are {np.sqrt(ratio):.3g} times as large after the contact as before it: "
-        "the noise is not the same throughout"
-    )
-    return [text]
+    return [Note("residuals_change", value=math.sqrt(ratio))]

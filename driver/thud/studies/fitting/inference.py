@@ -10,6 +10,7 @@ from scipy import stats
 from scipy.linalg import qr
 
 from thud.base.checks import refuse_value
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -167,32 +168,24 @@ def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Arr
     return result
 
 
-def null_message(names: Sequence[str], direction: Array) -> str:
-    """Return the message on a direction that is not identifiable."""
+def null_note(names: Sequence[str], direction: Array) -> Note:
+    """Return the note on a direction that is not identifiable."""
     entries = _main_entries(names, direction)
-    listed = _join([name for name, _ in entries])
-    if len(entries) == 1:
-        return f"{listed} has no effect on the compared quantities: it cannot be fitted"
-    return (
-        f"{listed} are not identifiable: {_change(entries)} together do not change the compared "
-        f"quantities{_product(entries)}"
-    )
+    code = "not_identifiable" if len(entries) > 1 else "no_effect"
+    return Note(code, others=_direction(entries))
 
 
-def weak_message(names: Sequence[str], direction: Array, width: float, confidence: float) -> str:
-    """Return the message on a direction with a wide relative half interval, `width`."""
+def weak_note(names: Sequence[str], direction: Array, width: float, confidence: float) -> Note:
+    """Return the note on a direction with a wide relative half interval, `width`."""
     entries = _main_entries(names, direction)
-    listed = _join([name for name, _ in entries])
-    size = f"{confidence:.0%} interval is +-{100 * width * max(abs(v) for _, v in entries):.0f} %"
-    if len(entries) == 1:
-        return f"{listed} is hardly identifiable: its {size} of its value"
-    return (
-        f"{listed} are hardly identifiable: along {_change(entries)} the {size}{_product(entries)}"
-    )
+    size = 100 * width * max(abs(value) for _, value in entries)
+    code = "hardly_identifiable" if len(entries) > 1 else "hardly_known"
+    others: dict[str, float | str] = {**_direction(entries), "confidence": confidence}
+    return Note(code, value=size, unit="%", others=others)
 
 
-def pair_messages(names: Sequence[str], correlation: Array, minimum: float) -> list[str]:
-    """Return messages on pairs with at least a minimum correlation, the strongest first."""
+def pair_notes(names: Sequence[str], correlation: Array, minimum: float) -> list[Note]:
+    """Return notes on pairs with at least a minimum correlation, the strongest first."""
     strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
     pairs = sorted(np.argwhere(strong >= minimum).tolist(), key=lambda pair: -strong[*pair])
     result = []
@@ -200,15 +193,16 @@ def pair_messages(names: Sequence[str], correlation: Array, minimum: float) -> l
         size = strong[i, j]
         # 1.00 would hide a difference.
         digits = int(np.clip(np.ceil(-np.log10(max(1 - size, 1e-9))), 2, 9))
-        words = "cannot be" if size >= INSEPARABLE else "can hardly be"
-        value = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
-        result.append(f"{names[i]} and {names[j]} {words} separated: correlation {value}")
+        code = "inseparable" if size >= INSEPARABLE else "hardly_separable"
+        shown = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
+        others = {"first": names[i], "second": names[j], "shown": shown}
+        result.append(Note(code, value=float(correlation[i, j]), others=others))
     return result
 
 
 def identifiability(
     names: Sequence[str], covariance: Array, correlation: Array, count: int
-) -> list[str]:
+) -> list[Note]:
     """Return how well parameters can be separated, from the covariance of their relative values.
 
     The first `count` parameters are those of the model.
@@ -219,12 +213,10 @@ def identifiability(
         (worst, direction), (best, _) = directions[0], directions[-1]
         entries = _main_entries(names[:count], direction)
         size = 100 * worst * max(abs(float(value)) for value in direction)
-        change = _change(entries) if len(entries) > 1 else entries[0][0]
-        result.append(
-            f"weakest parameter combination: {change}, standard error {size:.2g} %, "
-            f"{worst / best:.3g} times that of the strongest"
-        )
-    return result + pair_messages(names, correlation, STRONG)
+        change = _direction(entries)["changes"] if len(entries) > 1 else entries[0][0]
+        others: dict[str, float | str] = {"changes": change, "ratio": worst / best}
+        result.append(Note("weakest_combination", value=size, unit="%", others=others))
+    return result + pair_notes(names, correlation, STRONG)
 
 
 def _main_entries(names: Sequence[str], direction: Array) -> list[tuple[str, float]]:
@@ -243,13 +235,18 @@ def _join(words: Sequence[str]) -> str:
     return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
 
 
-def _change(entries: Sequence[tuple[str, float]]) -> str:
-    return _join([f"{name} {value:+.2g} %" for name, value in entries])
+def _direction(entries: Sequence[tuple[str, float]]) -> dict[str, str]:
+    """Return the values of a note on a direction: its parameters, changes, and their product."""
+    return {
+        "names": _join([name for name, _ in entries]),
+        "changes": _join([f"{name} {value:+.2g} %" for name, value in entries]),
+        "product": _product(entries),
+    }
 
 
 def _product(entries: Sequence[tuple[str, float]]) -> str:
     """Return the product of powers that two parameters determine."""
-    if len(entries) > 2:  # noqa: PLR2004 - a pair determines one product of powers
+    if len(entries) != 2:  # noqa: PLR2004 - a pair determines one product of powers
         return ""
     (first, a), (second, b) = entries
     power = -a / b
@@ -282,64 +279,53 @@ def misfit_ratio(residual: Array) -> float:
     return float(np.sqrt(max(1.0, np.mean(residual**2), *bands)))
 
 
-def residual_warnings(residual: Array, position: Array, unit: str = "ms") -> list[str]:
+def residual_warnings(residual: Array, position: Array, unit: str = "ms") -> list[Note]:
     """Return warnings if residuals at uniform times, s, or positions, m, are not independent noise.
 
     `unit` is a thousandth of that of the position.
     """
     if len(residual) < MIN_TESTED:
         return []
-    result = (
-        _color_warning(residual),
-        _outlier_warning(residual, position, unit),
-        runs_warning(residual),
-    )
-    return [text for text in result if text]
+    return [
+        *_color_warning(residual),
+        *_outlier_warning(residual, position, unit),
+        *runs_warning(residual),
+    ]
 
 
-def _color_warning(residual: Array) -> str:
+def _color_warning(residual: Array) -> list[Note]:
     """Test the cumulative periodogram (Bartlett), which is uniform for white noise."""
     power = np.abs(np.fft.rfft(residual)[1:]) ** 2
     share = np.cumsum(power) / power.sum()
     result = stats.kstest(share[:-1], "uniform")
     if result.pvalue > UNLIKELY:
-        return ""
-    fraction = np.searchsorted(share, 0.5) / len(power)
+        return []
+    fraction = float(np.searchsorted(share, 0.5) / len(power))
     side = "low" if fraction < 0.5 else "high"  # noqa: PLR2004 - halves
-    return (
-        f"the residuals are colored: half of their power lies in the {side}est "
-        f"{min(fraction, 1 - fraction):.0%} of the compared frequencies: the noise is not as "
-        "assumed or the model is wrong"
-    )
+    value = min(fraction, 1 - fraction)
+    return [Note("residuals_colored", value=value, others={"side": side})]
 
 
-def _outlier_warning(residual: Array, position: Array, unit: str) -> str:
+def _outlier_warning(residual: Array, position: Array, unit: str) -> list[Note]:
     """Test the largest of n normal residuals by n times its probability (Bonferroni)."""
     index = int(np.argmax(np.abs(residual)))
     size = abs(float(residual[index]))
     if 2 * len(residual) * stats.norm.sf(size) > UNLIKELY:
-        return ""
-    return (
-        f"the largest residual, at {1e3 * position[index]:.4g} {unit}, is {size:.3g} standard "
-        "deviations: it is not noise"
-    )
+        return []
+    others = {"position": 1e3 * float(position[index])}
+    return [Note("residual_large", value=size, unit=unit, others=others)]
 
 
-def runs_warning(residual: Array) -> str:
+def runs_warning(residual: Array) -> list[Note]:
     """Return a warning if residuals have too few or many runs of one sign (Wald, Wolfowitz)."""
     positive = residual > 0
     n, m = int(positive.sum()), int((~positive).sum())
     if not min(n, m):
-        if 2 * 0.5 ** (n + m) > UNLIKELY:
-            return ""
-        return f"all {n + m} residuals have the same sign: they are not independent"
+        return [] if 2 * 0.5 ** (n + m) > UNLIKELY else [Note("residuals_one_sign", value=n + m)]
     product = 2 * n * m
     expected = 1 + product / (n + m)
     deviation = np.sqrt(product * (product - n - m) / (n + m - 1)) / (n + m)
     runs = 1 + int(np.count_nonzero(positive[1:] != positive[:-1]))
     if 2 * stats.norm.sf(abs(runs - expected) / deviation) > UNLIKELY:
-        return ""
-    return (
-        f"the residuals change their sign {runs - 1} times where {expected - 1:.0f} are expected: "
-        "they are not independent"
-    )
+        return []
+    return [Note("residuals_dependent", value=runs - 1, others={"expected": expected - 1})]

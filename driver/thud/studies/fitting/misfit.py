@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud.base.note import Note
     from thud.case.case import Case
     from thud.impact.impact import Impact
 
@@ -131,7 +132,7 @@ class Misfit(ABC):
         own: Array,  # noqa: ARG002
         deviation: float,  # noqa: ARG002
         count: int,  # noqa: ARG002
-    ) -> list[str]:
+    ) -> list[Note]:
         """Return warnings if residuals are not noise of a deviation, after `count` parameters."""
         return []
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from thud.base.errors import NumericalError, ThudError
+from thud.base.note import Note
 from thud.case.keys import with_values
 from thud.studies.fitting.alternatives import alternatives
 
@@ -53,13 +54,13 @@ class Effects(NamedTuple):
     columns : ndarray, shape (n_residual, n)
         Changes of the residuals; divided by the root of the number of alternatives to an unknown,
         so that the variance of an unknown is their mean square.
-    failures : tuple of str
+    failures : tuple of Note
         Alternatives that cannot be computed.
     """
 
     labels: tuple[tuple[str, str], ...]
     columns: Array
-    failures: tuple[str, ...]
+    failures: tuple[Note, ...]
 
 
 class Objective:
@@ -135,7 +136,7 @@ class Objective:
         impacts = self.impacts(x)
         fitted = [entry.name for entry in self.ranges]
         columns: dict[tuple[str, str], Array] = {}
-        failures: list[str] = []
+        failures: list[Note] = []
         first, size = 0, sum(term.misfit.size for term in self.terms)
         for term, impact in zip(self.terms, impacts, strict=True):
             rows = slice(first, first + term.misfit.size)
@@ -149,9 +150,8 @@ class Objective:
                 try:
                     other = term.misfit.solve(case)
                 except ThudError as error:
-                    failures.append(
-                        f"{label} cannot be computed: the {unknown} counts as known ({error})"
-                    )
+                    others = {"alternative": label, "unknown": unknown, "reason": str(error)}
+                    failures.append(Note("alternative_failed", others=others))
                     continue
                 column[rows] = term.misfit.effect(impact, other, self.own_values(term, x))
         count = Counter(unknown for unknown, _ in columns)

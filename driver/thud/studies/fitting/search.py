@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError, ThudError
+from thud.base.note import Note
 from thud.base.units import display_unit
 from thud.studies.fitting.fit_result import Fit, FittedTarget
 from thud.studies.fitting.inference import (
@@ -23,10 +24,10 @@ from thud.studies.fitting.inference import (
     coverage_factor,
     identifiability,
     infer,
-    null_message,
-    pair_messages,
+    null_note,
+    pair_notes,
     posterior,
-    weak_message,
+    weak_note,
     worst_directions,
 )
 from thud.studies.fitting.objective import Effects, Objective, new_terms
@@ -50,8 +51,6 @@ TOLERANCE = 1e-8
 AT_LIMIT = 1e-4
 # Minimum effect of an alternative, in standard deviations of a residual, that is tested.
 VISIBLE = 1e-3
-# What residuals that are larger than their uncertainty mean.
-UNEXPLAINED = "the model does not explain the data"
 # Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
 
@@ -210,26 +209,26 @@ def _new_fit(
             for term, impact in zip(terms, impacts, strict=True)
         ),
     )
-    texts = _warnings(objective, fit, x, inferred, noise)
-    residual_texts, ratio = _residual_warnings(fit, fit.residuals + wrong.visible @ wrong.mean)
-    texts += residual_texts
-    texts += effects.failures
+    notes = _warnings(objective, fit, x, inferred, noise)
+    residual_notes, ratio = _residual_warnings(fit, fit.residuals + wrong.visible @ wrong.mean)
+    notes += residual_notes
+    notes += effects.failures
     if not all(target.misfit.is_exact(target.impact, target.own) for target in fit.targets):
-        texts += _effect_warning(effects, wrong, fit)
-    text = identifiability(fit.names, noise, fit.correlation, count)
+        notes += _effect_warning(effects, wrong, fit)
+    separability = identifiability(fit.names, noise, fit.correlation, count)
     # The second moment of the posterior about the estimate, for which the case is as assumed.
     spread = ratio**2 * (noise + wrong.spread) + np.outer(wrong.shift, wrong.shift)
     return replace(
         fit,
         covariance=spread * np.outer(size, size),
         widened=ratio,
-        warnings=tuple(texts),
-        identifiability=tuple(text),
+        warnings=tuple(notes),
+        identifiability=tuple(separability),
         assumptions=tuple(_assumptions(objective, fit, inferred, noise, effects)),
     )
 
 
-def _effect_warning(effects: Effects, wrong: Posterior, fit: Fit) -> list[str]:
+def _effect_warning(effects: Effects, wrong: Posterior, fit: Fit) -> list[Note]:
     """Return a warning if residuals contain the effect of an alternative to the case."""
     length = np.linalg.norm(wrong.visible, axis=0)
     seen = length > VISIBLE
@@ -242,11 +241,8 @@ def _effect_warning(effects: Effects, wrong: Posterior, fit: Fit) -> list[str]:
     if tail[index] * len(size) > UNLIKELY:
         return []
     unknown, label = np.array(effects.labels)[seen][index]
-    text = (
-        f"the residuals contain the effect of {label} ({size[index]:.3g} standard errors): the "
-        f"{unknown} is not as assumed, and the intervals include the difference"
-    )
-    return [text]
+    others = {"alternative": str(label), "unknown": str(unknown)}
+    return [Note("alternative_seen", value=float(size[index]), others=others)]
 
 
 def _assumptions(
@@ -277,36 +273,33 @@ def _assumptions(
 
 def _warnings(
     objective: Objective, fit: Fit, x: Array, inferred: Inference, covariance: Array
-) -> list[str]:
+) -> list[Note]:
     """Return warnings of a fit; `covariance` is that of relative values."""
     result = []
     if not fit.converged:
-        result.append("the search has not converged; allow more steps, or start elsewhere")
-    result += [null_message(fit.names, direction) for direction in inferred.null]
+        result.append(Note("not_converged"))
+    result += [null_note(fit.names, direction) for direction in inferred.null]
     factor = coverage_factor(fit.confidence, fit.interval_freedom)
     count = objective.count
     # The factor is 0 for a confidence below rounding: no interval is wide then.
     wide = worst_directions(covariance[:count, :count], WIDE / factor) if factor else []
     for deviation, direction in wide:
-        result.append(
-            weak_message(fit.names[:count], direction, factor * deviation, fit.confidence)
-        )
+        result.append(weak_note(fit.names[:count], direction, factor * deviation, fit.confidence))
     if not inferred.null.size and not wide:
-        result += pair_messages(fit.names, fit.correlation, INSEPARABLE)
+        result += pair_notes(fit.names, fit.correlation, INSEPARABLE)
     for entry, value, low, high in zip(
         objective.ranges, x, objective.low, objective.high, strict=False
     ):
         if min(value - low, high - value) < AT_LIMIT:
             limit = (low if value - low < high - value else high) * entry.scale
             unit, factor = display_unit(entry.unit, limit)
-            result.append(
-                f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
-                + ": its interval is cut there, and all intervals hold inside the limits only"
-            )
+            shown = f"{limit / factor:g} {unit}".rstrip()
+            others = {"name": entry.name, "limit": shown}
+            result.append(Note("at_limit", value=limit, unit=entry.unit, others=others))
     return result
 
 
-def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[str], float]:
+def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[Note], float]:
     """Return warnings of residuals that are not noise, and by how much the latter exceed it.
 
     `unexplained` are the residuals without the effects of unknowns.
@@ -320,19 +313,16 @@ def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[str], float]:
         first = rows.stop
         freedom = misfit.size - misfit.absorbed - len(fit.names) / len(fit.targets)
         size = size_of_residuals(fit, number - 1)
-        own = [] if math.isnan(size) else [f"{size_text(size)}: {UNEXPLAINED}"]
+        own = [] if math.isnan(size) else [Note("unexplained", value=size)]
         own += misfit.warnings(target.impact, target.own, deviation, len(fit.names))
         if own:
             excess = misfit.excess(target.impact, target.own, unexplained[rows])
             ratio = max(ratio, excess * float(np.sqrt(misfit.size / max(freedom, 1.0))))
-        prefix = "" if len(fit.targets) == 1 else f"target {number}: "
-        result += [f"{prefix}{text}" for text in own]
+        if len(fit.targets) > 1:
+            part = {"part": f"target {number}"}
+            own = [replace(note, others={**note.others, **part}) for note in own]
+        result += own
     return result, ratio
-
-
-def size_text(size: float) -> str:
-    """Return `size_of_residuals` in words."""
-    return f"the residuals are {size:.3g} times as large as the uncertainty of the target"
 
 
 def size_of_residuals(fit: Fit, number: int = 0) -> float:
