@@ -1,12 +1,13 @@
 !> The questions that callers in other languages can ask, by name.
 module thud_answer
+   use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
    use thud_bundle, only: bundle_type
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
    use thud_column, only: column_type, find_columns
    use thud_compression, only: compression_type, compute_compression
    use thud_compute, only: compute, results_type, scope_type
-   use thud_constants, only: get_compiler, version
+   use thud_constants, only: version
    use thud_directory_answers, only: answer_directory
    use thud_error, only: error_type, input_error
    use thud_field, only: name_length
@@ -53,7 +54,7 @@ contains
          continue
       case ('library')
          call bundle%add_text('version', version)
-         call bundle%add_text('compiler', trim(get_compiler()))
+         call bundle%add_text('compiler', compiler_version()//', options '//compiler_options())
       case ('effective_case')
          ! Of the namelist file `path`, which may have a room without a floor.
          call request%get_text('path', text)

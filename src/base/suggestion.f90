@@ -11,7 +11,8 @@ module thud_suggestion
 
 contains
 
-   !> The known word that a misspelled one probably means.
+   !> The known word that a misspelled one probably means, by the number of insertions, deletions and replacements of letters
+   !> that turn one into the other (Levenshtein distance).
    pure subroutine get_suggestion(word, known, suggestion)
       !> The misspelled word.
       character(len=*), intent(in) :: word
@@ -19,34 +20,28 @@ contains
       character(len=*), intent(in) :: known(:)
       !> ` (did you mean 'height'?)`; empty if no word is close.
       character(len=:), allocatable, intent(out) :: suggestion
+      ! Distance between the first j letters of the word and the first i letters of a known one; that for i - 1.
+      integer :: row(0:len(word)), before(0:len(word))
       integer :: distance(size(known))
-      integer :: i
+      integer :: i, j, k
 
       suggestion = ''
       if (size(known) == 0 .or. len(word) > max_length) return
-      distance = [(get_distance(lower_case(word), lower_case(trim(known(i)))), i=1, size(known))]
-      i = minloc(distance, dim=1)
-      ! A third of the letters may be wrong.
-      if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
-   end subroutine get_suggestion
-
-   !> Number of insertions, deletions and replacements of letters that turn one word into the other (Levenshtein distance).
-   pure function get_distance(first, second) result(distance)
-      character(len=*), intent(in) :: first, second
-      integer :: distance
-      ! Element (j, i): distance between the first i letters of `first` and the first j letters of `second`.
-      integer :: table(0:len(second), 0:len(first))
-      integer :: i, j
-
-      table(:, 0) = [(j, j=0, len(second))]
-      do i = 1, len(first)
-         table(0, i) = i
-         do j = 1, len(second)
-            table(j, i) = min(table(j, i - 1) + 1, table(j - 1, i) + 1, &
-               table(j - 1, i - 1) + merge(0, 1, first(i:i) == second(j:j)))
+      do k = 1, size(known)
+         row = [(j, j=0, len(word))]
+         do i = 1, len_trim(known(k))
+            before = row
+            row(0) = i
+            do j = 1, len(word)
+               row(j) = min(row(j - 1) + 1, before(j) + 1, &
+                  before(j - 1) + merge(0, 1, lower_case(word(j:j)) == lower_case(known(k)(i:i))))
+            end do
          end do
+         distance(k) = row(len(word))
       end do
-      distance = table(len(second), len(first))
-   end function get_distance
+      k = minloc(distance, dim=1)
+      ! A third of the letters may be wrong.
+      if (3*distance(k) <= max(len(word), len_trim(known(k)))) suggestion = ' (did you mean '//quoted(known(k))//'?)'
+   end subroutine get_suggestion
 
 end module thud_suggestion

@@ -52,9 +52,9 @@ contains
    !> Integer without blanks.
    pure function integer_to_text(value) result(text)
       integer, intent(in) :: value
-      character(len=len_trim(format_integer(value))) :: text
+      character(len=len_trim(format_fixed(real(value, wp), 0))) :: text
 
-      text = format_integer(value)
+      text = format_fixed(real(value, wp), 0)
    end function integer_to_text
 
    !> Shortest decimal text from which exactly the same number is read.
@@ -86,14 +86,6 @@ contains
       text = format_significant(value, digits)
    end function significant
 
-   !> Integer, padded with blanks.
-   pure function format_integer(value) result(buffer)
-      integer, intent(in) :: value
-      character(len=number_length) :: buffer
-
-      write (buffer, '(i0)') value
-   end function format_integer
-
    !> Number with fixed decimals, padded with blanks.
    pure function format_fixed(value, decimals) result(buffer)
       real(wp), intent(in) :: value
@@ -120,8 +112,7 @@ contains
       character(len=12) :: form
       integer :: exponent
 
-      buffer = '0'
-      if (.not. ieee_is_finite(value)) buffer = format_real(value)
+      buffer = format_fixed(value, 0)
       if (.not. (abs(value) > 0.0_wp .and. ieee_is_finite(value))) return
       ! The exponent of the rounded number.
       write (form, '(a,i0,a)') '(es40.', digits - 1, 'e3)'
@@ -160,7 +151,8 @@ contains
          write (form, '(a,i0,a)') '(f40.', max(digits - exponent, 1), ')'
          write (buffer, form) value
       else
-         buffer = adjustl(buffer(:number_length - 5)//trim(merge('0e', 'e ', digits == 0))//format_integer(exponent))
+         write (form, '(a,i0)') trim(merge('0e', 'e ', digits == 0)), exponent
+         buffer = adjustl(buffer(:number_length - 5)//form)
       end if
       buffer = adjustl(buffer)
    end function format_real
@@ -278,13 +270,13 @@ contains
       character(len=*), intent(in) :: words(:)
       !> The words in quotes, separated by commas.
       character(len=sum(quoted_length(words)) + 2*max(size(words) - 1, 0)) :: text
-      character(len=2*len(words) + 2) :: constants(size(words))
-      integer :: i
+      integer :: i, at
 
+      at = 1
       do i = 1, size(words)
-         constants(i) = quoted(words(i))
+         text(at:) = quoted(words(i))//','
+         at = at + quoted_length(words(i)) + 2
       end do
-      text = join(constants)
    end function join_quoted
 
    !> Texts separated by commas: `one, two, three`.
@@ -294,12 +286,10 @@ contains
       character(len=sum(len_trim(words)) + 2*max(size(words) - 1, 0)) :: text
       integer :: i, at
 
-      text = ''
       at = 1
       do i = 1, size(words)
-         text(at:) = words(i)
+         text(at:) = trim(words(i))//','
          at = at + len_trim(words(i)) + 2
-         if (i < size(words)) text(at - 2:) = ','
       end do
    end function join_words
 

@@ -3,7 +3,6 @@
 !>
 !> The energies follow dE/dt = -A E with constant coefficients: the exponential of the matrix gives exact steps.
 module thud_energy_flow
-   use thud_constants, only: fast_time, reference_pressure
    use thud_kinds, only: wp
    use thud_lapack, only: dgetf2, dgetrs
    use thud_matrix_exponential, only: get_exponential
@@ -11,8 +10,17 @@ module thud_energy_flow
    implicit none (type, external)
    private
 
-   public :: connect, energy_flow_type, get_entering_energies, get_fast_level, get_fast_maximum, get_loss_matrix
-   public :: new_energy_flow
+   public :: connect, decay_of_60_db, energy_flow_type, fast_time, get_entering_energies, get_fast_level, get_fast_maximum
+   public :: get_loss_matrix, new_energy_flow, reference_pressure
+
+   !> Reference sound pressure, Pa.
+   real(wp), parameter :: reference_pressure = 2.0e-5_wp
+
+   !> Time constant of the Fast detector, s (IEC 61672-1).
+   real(wp), parameter :: fast_time = 0.125_wp
+
+   !> Natural logarithm of an energy decay of 60 dB.
+   real(wp), parameter :: decay_of_60_db = 6*log(10.0_wp)
 
    !> Time step of the search for the maximum, s: a twentieth of the detector's time constant.
    real(wp), parameter :: search_step = fast_time/20

@@ -2,9 +2,8 @@
 module thud_flanking
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, list_type, name_length, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, get_critical_frequency, get_surface_mass, plate_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -49,20 +48,20 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('wall_lengths', walls%lengths, 'm', &
+         new_field('wall_lengths', walls%lengths, 'm', &
          'lengths of the flanking walls along the floor (default: no walls)', '[0.1, 100]'), &
-         real_field('wall_height', walls%height, 'm', 'height of the walls', '[0.5, 20]'), &
-         list_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls: one, or one for each of ' &
+         new_field('wall_height', walls%height, 'm', 'height of the walls', '[0.5, 20]'), &
+         new_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls: one, or one for each of ' &
          //'wall_lengths', '[0.005, 2]'), &
-         list_field('wall_density', walls%density, 'kg/m3', 'density of the walls: one, or one for each', &
+         new_field('wall_density', walls%density, 'kg/m3', 'density of the walls: one, or one for each', &
          '[10, 20000]'), &
-         list_field('wall_wave_speed', walls%wave_speed, 'm/s', &
+         new_field('wall_wave_speed', walls%wave_speed, 'm/s', &
          'speed of longitudinal waves in the walls: one, or one for each', '[100, 10000]'), &
-         list_field('wall_loss_factor', walls%loss_factor, '', &
+         new_field('wall_loss_factor', walls%loss_factor, '', &
          'internal loss factor of the walls: one, or one for each', '[0, 1]'), &
-         choice_field('wall_junction', walls%junction, &
-         'junction of floor and walls: rigid cross or T, or described by junction_index', junctions), &
-         list_field('junction_index', walls%index, 'dB', &
+         new_field('wall_junction', walls%junction, '', &
+         'junction of floor and walls: rigid cross or T, or described by junction_index', choices=junctions), &
+         new_field('junction_index', walls%index, 'dB', &
          'vibration reduction index from floor to wall, for wall_junction index: one, or one for each wall', &
          '[-10, 80]')]
    end function get_wall_fields

@@ -4,7 +4,8 @@
 !> velocity of the floor drives the air; the air acts back on the floor only by the loss factor of the floor.
 module thud_modal_room
    use thud_band, only: band_type
-   use thud_constants, only: decay_of_60_db, fast_time, pi, reference_pressure
+   use thud_constants, only: pi
+   use thud_energy_flow, only: decay_of_60_db, fast_time, reference_pressure
    use thud_floor_modes, only: floor_modes_type, get_poles, get_selected_modes
    use thud_function_set, only: function_set_type, get_functions, get_quadrature
    use thud_injected_energy, only: get_spectrum

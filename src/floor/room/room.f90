@@ -5,10 +5,9 @@ module thud_room
    use thud_constants, only: pi
    use thud_energy_flow, only: energy_flow_type, get_fast_level
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, list_type, name_length, new_field
    use thud_flanking, only: check_walls, get_wall_fields, walls_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: air_type, plate_type
    use thud_rating, only: get_a_weighted_level, get_rated_bands, get_standardization, rating_names
    use thud_text, only: to_text
@@ -164,31 +163,31 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', room%length, 'm', 'length of the room; 0: that of the floor', '[0, 100]', &
-         derived_at_zero=.true.), &
-         real_field('width', room%width, 'm', 'width of the room; 0: that of the floor', '[0, 100]', &
-         derived_at_zero=.true.), &
-         real_field('height', room%height, 'm', 'height of the room; 0: from the volume, without it 2.5 m', '[0, 100]', &
-         derived_at_zero=.true.), &
-         real_field('volume', room%volume, 'm3', 'volume of the room; 0: length times width times height', '[0, 100000]', &
-         derived_at_zero=.true.), &
-         list_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room: one, ' &
+         new_field('length', room%length, 'm', 'length of the room; 0: that of the floor', '[0, 100]', &
+         trait='derived'), &
+         new_field('width', room%width, 'm', 'width of the room; 0: that of the floor', '[0, 100]', &
+         trait='derived'), &
+         new_field('height', room%height, 'm', 'height of the room; 0: from the volume, without it 2.5 m', '[0, 100]', &
+         trait='derived'), &
+         new_field('volume', room%volume, 'm3', 'volume of the room; 0: length times width times height', '[0, 100000]', &
+         trait='derived'), &
+         new_field('reverberation_time', room%reverberation_time, 's', 'reverberation time of the room: one, ' &
          //'4 for octaves or 12 for one-third octaves', '[0.05, 20]'), &
-         choice_field('reverberation_of', room%reverberation_of, 'room of the reverberation time: finished, or bare, ' &
-         //'without floor, walls and ceiling', [character(len=8) :: finished_room, 'bare']), &
-         real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
-         real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
+         new_field('reverberation_of', room%reverberation_of, '', 'room of the reverberation time: finished, or bare, ' &
+         //'without floor, walls and ceiling', choices=[character(len=8) :: finished_room, 'bare']), &
+         new_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
+         new_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
          get_wall_fields(room%walls), get_ceiling_fields(room%ceiling), &
-         real_field('corner_x', room%corner_x, 'm', 'position of the room along the length of a larger floor', '[0, 100)'), &
-         real_field('corner_y', room%corner_y, 'm', 'position of the room along the width of a larger floor', '[0, 100)'), &
-         choice_field('radiation', room%radiation, 'radiation factor of the floor, by its modes or by ISO 12354-1', &
-         [character(len=9) :: modal_radiation, 'iso_12354']), &
-         choice_field('positions', room%positions, &
+         new_field('corner_x', room%corner_x, 'm', 'position of the room along the length of a larger floor', '[0, 100)'), &
+         new_field('corner_y', room%corner_y, 'm', 'position of the room along the width of a larger floor', '[0, 100)'), &
+         new_field('radiation', room%radiation, '', 'radiation factor of the floor, by its modes or by ISO 12354-1', &
+         choices=[character(len=9) :: modal_radiation, 'iso_12354']), &
+         new_field('positions', room%positions, '', &
          'positions of ball and microphone: those of the rating, 5 standard ones each (octaves), or 16 even ones each', &
-         [character(len=8) :: positions_of_rating, standard_positions, 'even']), &
-         choice_field('rating', room%rating, 'rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2)', &
-         rating_names), &
-         real_field('required', room%required, 'dB', 'maximum of that rating that is required; 0: none', '[0, 200]')]
+         choices=[character(len=8) :: positions_of_rating, standard_positions, 'even']), &
+         new_field('rating', room%rating, '', 'rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2)', &
+         choices=rating_names), &
+         new_field('required', room%required, 'dB', 'maximum of that rating that is required; 0: none', '[0, 200]')]
    end function get_room_fields
 
    !> Checks the numbers of reverberation times and of values of the walls.
