@@ -54,9 +54,12 @@ contains
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name, text
 
-      call add_record(self, name, [len(text)], text)
-      allocate (self%records(self%n_record)%values(0, 1, 1))
-      if (.not. allocated(self%text)) self%text = ''
+      call add_record(self, name, 't'//to_text(len(text)))
+      associate (record => self%records(self%n_record))
+         record%kind = 'text'
+         record%text = text
+         allocate (record%values(0, 1, 1))
+      end associate
       self%text = self%text//text
    end subroutine add_text
 
@@ -69,11 +72,11 @@ contains
       character(len=:), allocatable :: lines
       integer :: i
 
-      lines = trim(texts(1))
-      do i = 2, size(texts)
+      lines = ''
+      do i = 1, size(texts)
          lines = lines//newline//trim(texts(i))
       end do
-      call self%add_text(name, lines)
+      call self%add_text(name, lines(2:))
    end subroutine add_texts
 
    !> Adds a number.
@@ -83,9 +86,8 @@ contains
       real(wp), intent(in) :: value
       !> See `record_type` (default: no unit, `real`).
       character(len=*), intent(in), optional :: unit, kind
-      integer :: extents(0)
 
-      call self%add_array(name, extents, [value], unit, kind)
+      call self%add_array(name, [integer ::], [value], unit, kind)
    end subroutine add_number
 
    !> Adds an array of any rank.
@@ -98,7 +100,7 @@ contains
       !> See `record_type` (default: no unit, `real`).
       character(len=*), intent(in), optional :: unit, kind
 
-      call add_record(self, name, extents)
+      call add_record(self, name, get_form(extents))
       associate (record => self%records(self%n_record))
          record%values = reshape(values(:product(extents)), [product(extents), 1, 1])
          if (present(unit)) record%unit = unit
@@ -113,43 +115,39 @@ contains
       !> The array, unallocated afterwards: [:, :, :].
       real(wp), allocatable, intent(inout) :: values(:, :, :)
 
-      call add_record(self, name, shape(values))
+      call add_record(self, name, get_form(shape(values)))
       call move_alloc(values, self%records(self%n_record)%values)
    end subroutine move_array
 
+   !> Extents of an array, each followed by a comma.
+   pure function get_form(extents) result(form)
+      !> The extents: [rank].
+      integer, intent(in) :: extents(:)
+      character(len=12*size(extents)) :: form
+
+      write (form, '(*(i0,","))') extents
+   end function get_form
+
    !> Adds a record without values, and its line of the header.
-   subroutine add_record(self, name, extents, text)
+   subroutine add_record(self, name, form)
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
-      !> Extents of the array: [rank].
-      integer, intent(in) :: extents(:)
-      !> The text, if it is one.
-      character(len=*), intent(in), optional :: text
-      character(len=12*size(extents)) :: form
+      !> See `header`.
+      character(len=*), intent(in) :: form
       type(record_type), allocatable :: more(:)
-      integer :: i
 
-      if (.not. allocated(self%records)) allocate (self%records(4))
-      if (self%n_record == size(self%records)) then
+      if (.not. allocated(self%records)) then
+         allocate (self%records(64))
+         self%header = ''
+         self%text = ''
+      else if (self%n_record == size(self%records)) then
          allocate (more(2*self%n_record))
-         do i = 1, self%n_record
-            associate (old => self%records(i))
-               more(i) = record_type(group=old%group, name=old%name, kind=old%kind, unit=old%unit)
-               call move_alloc(old%text, more(i)%text)
-               call move_alloc(old%values, more(i)%values)
-            end associate
-         end do
+         more(:self%n_record) = self%records
          call move_alloc(more, self%records)
       end if
       self%n_record = self%n_record + 1
-      self%records(self%n_record) = record_type(group=self%group, name=name)
-      write (form, '(*(i0,","))') extents
-      if (present(text)) then
-         self%records(self%n_record)%kind = 'text'
-         self%records(self%n_record)%text = text
-         form = 't'//to_text(len(text))
-      end if
-      if (.not. allocated(self%header)) self%header = ''
+      self%records(self%n_record)%group = self%group
+      self%records(self%n_record)%name = name
       if (self%group /= '') self%header = self%header//trim(self%group)//'.'
       self%header = self%header//trim(name)//tab//trim(form)//newline
    end subroutine add_record
@@ -165,28 +163,18 @@ contains
 
    !> Copies the numbers of all records, in the order of the header.
    subroutine copy_values(self, values)
-      class(bundle_type), intent(in) :: self
+      class(bundle_type), intent(in), target :: self
       !> The numbers: [count_values].
       real(wp), intent(out) :: values(:)
+      real(wp), pointer :: numbers(:)
       integer :: i, at
 
       at = 0
       do i = 1, self%n_record
-         call append(size(self%records(i)%values), self%records(i)%values)
+         numbers(1:size(self%records(i)%values)) => self%records(i)%values
+         values(at + 1:at + size(numbers)) = numbers
+         at = at + size(numbers)
       end do
-
-   contains
-
-      !> Appends the numbers of one record, without a copy of them.
-      subroutine append(n, numbers)
-         !> Count of the numbers.
-         integer, intent(in) :: n
-         real(wp), intent(in) :: numbers(n)
-
-         values(at + 1:at + n) = numbers
-         at = at + n
-      end subroutine append
-
    end subroutine copy_values
 
    !> Stores a bundle for its caller to collect; after an error it holds the `message`, `group`, `key` and `problem` if it is
@@ -214,8 +202,8 @@ contains
             call bundle%add_text('key', error%key)
             call bundle%add_text('problem', error%problem)
          end if
-         if (error%low <= error%high) call bundle%add_array('range', [5], [error%value, error%low, error%high, &
-            merge(1.0_wp, 0.0_wp, error%low_open), merge(1.0_wp, 0.0_wp, error%high_open)])
+         if (allocated(error%range)) call bundle%add_array('range', [5], [error%value, error%range%lower, error%range%upper, &
+            merge(1.0_wp, 0.0_wp, error%range%lower_open), merge(1.0_wp, 0.0_wp, error%range%upper_open)])
       end if
       if (.not. allocated(bundle%header)) bundle%header = ''
       if (.not. allocated(bundle%text)) bundle%text = ''

@@ -1,6 +1,7 @@
 !> Errors as values: a procedure that can fail has an allocatable argument `error`, unallocated on success.
 module thud_error
    use thud_constants, only: not_a_number
+   use thud_interval, only: interval_type
    use thud_kinds, only: wp
    use thud_text, only: is_utf8
    implicit none (type, external)
@@ -25,10 +26,9 @@ module thud_error
       character(len=:), allocatable :: message
       !> Group and key that the message is about, and what it says of them; unallocated if it is about no group.
       character(len=:), allocatable :: group, key, problem
-      !> Value outside its range, and the ends of the range, in the unit of the key; NaN if the message is about no range.
-      real(wp) :: value = not_a_number, low = not_a_number, high = not_a_number
-      !> The end of the range is excluded.
-      logical :: low_open = .false., high_open = .false.
+      !> Value outside its range, in the unit of the key, and the range; unallocated if the message is about no range.
+      real(wp) :: value = not_a_number
+      type(interval_type), allocatable :: range
       !> Whether the time steps are too long; shorter ones may succeed.
       logical :: has_coarse_steps = .false.
       !> Whether the record is clearly shorter than the contact, which may have no end, at any resolution.
@@ -46,38 +46,24 @@ contains
       type(error_type) :: error
 
       error%code = bad_input
-      call set_message(error, problem, group, key)
-   end function input_error
-
-   !> Error of a failed computation.
-   pure function numerical_error(problem, group, key) result(error)
-      !> What failed; the message for the user if no group is given.
-      character(len=*), intent(in) :: problem
-      !> Group and key that are the reason, with which the message begins.
-      character(len=*), intent(in), optional :: group, key
-      type(error_type) :: error
-
-      error%code = numerical_failure
-      call set_message(error, problem, group, key)
-   end function numerical_error
-
-   !> Sets the message about a group and a key.
-   pure subroutine set_message(error, problem, group, key)
-      type(error_type), intent(inout) :: error
-      !> What is wrong.
-      character(len=*), intent(in) :: problem
-      !> Group and key.
-      character(len=*), intent(in), optional :: group, key
-
       error%message = shown(problem)
       if (.not. present(group)) return
       error%problem = error%message
       error%group = shown(trim(group))
       error%key = ''
       if (present(key)) error%key = shown(trim(key))
-      error%message = '&'//error%group//': '//error%problem
-      if (error%key /= '') error%message = '&'//error%group//': '//error%key//' '//error%problem
-   end subroutine set_message
+      error%message = '&'//error%group//': '//trim(adjustl(error%key//' '//error%problem))
+   end function input_error
+
+   !> Error of a failed computation, by the same arguments.
+   pure function numerical_error(problem, group, key) result(error)
+      character(len=*), intent(in) :: problem
+      character(len=*), intent(in), optional :: group, key
+      type(error_type) :: error
+
+      error = input_error(problem, group, key)
+      error%code = numerical_failure
+   end function numerical_error
 
    !> Puts a place, such as a path, in front of the message of an error.
    pure subroutine prefix_error(error, place)

@@ -1,5 +1,6 @@
 !> One key of the input: its name, unit, allowed range and meaning, and the variable that it sets. The input is read,
-!> checked, written and documented by this description.
+!> checked, written and documented by this description. `in_group` sets the group and the owner of keys, `only_with` the
+!> choice that they need.
 module thud_field
    use thud_error, only: error_type, input_error
    use thud_interval, only: get_range_text, interval_type, key_length, new_interval
@@ -9,7 +10,8 @@ module thud_field
    implicit none (type, external)
    private
 
-   public :: check_fields, field_type, get_interval, key_length, list_type, name_length, text_list_type
+   public :: check_fields, field_type, get_interval, in_group, key_length, list_type, name_length, new_field, only_with
+   public :: text_list_type
 
    !> Maximum number of entries of a list.
    integer, parameter :: list_length = 64
@@ -60,18 +62,13 @@ module thud_field
       character(len=6) :: kind = ''
       !> The variable: real, integer, logical, text, `list_type` or `text_list_type`.
       class(*), pointer :: value => null()
-      !> Allowed range of numbers, see `thud_interval`.
+      !> Allowed range of numbers such as `(0, 10]`, see `thud_interval`.
       character(len=72) :: range = ''
-      !> The entries of the list must be whole numbers.
-      logical :: whole_entries = .false.
-      !> The key belongs to the resolution or the output, and is no property of the source.
-      logical :: is_numerical = .false.
-      !> The text is the path of a file, relative to the directory of the case or to the current one.
-      logical :: is_path = .false.
-      !> At the value 0 the key is derived from others.
-      logical :: derived_at_zero = .false.
-      !> Calibrated on the standard ball: where the key is not stated, it has the value of the standard ball by the model.
-      logical :: is_calibrated = .false.
+      !> What else there is to know: `whole` (only integers), `numerical` (belongs to the resolution or the output, and is no
+      !> property of the source), `path` (of a file, relative to the directory of the case or to the current one),
+      !> `derived` (at the value 0 it follows from other keys), or `calibrated` (on the standard ball: where the key is not
+      !> stated, it has the value of the standard ball by the model).
+      character(len=10) :: trait = ''
       !> A choice and its values with which the key has an effect, the calibrated one first; blank: with all:
       !> [max_choices].
       character(len=key_length) :: needs(max_choices) = ''
@@ -88,25 +85,83 @@ module thud_field
       procedure :: get_words
       procedure :: get_text
       procedure :: get_allowed
-      procedure :: get_needed_choice
       procedure :: has_effect
       procedure :: get_error
    end type field_type
 
 contains
 
-   !> The value of the choice that decides whether a key has an effect; blank if there is none.
-   pure function get_needed_choice(field, fields) result(choice)
-      class(field_type), intent(in) :: field
-      !> Keys that the case uses: [n_field].
+   !> Describes a key.
+   function new_field(key, variable, unit, meaning, range, choices, trait) result(field)
+      character(len=*), intent(in) :: key
+      !> Real, integer, logical, text of `name_length`, `list_type` or `text_list_type`.
+      class(*), intent(in), target :: variable
+      !> SI unit, empty if there is none; help text.
+      character(len=*), intent(in) :: unit, meaning
+      !> Allowed range of numbers, of a list that of each entry (default: all).
+      character(len=*), intent(in), optional :: range
+      !> The allowed words (default: any text): [n_choice].
+      character(len=*), intent(in), optional :: choices(:)
+      !> See `field_type` (default: none, of an integer `whole`).
+      character(len=*), intent(in), optional :: trait
+      type(field_type) :: field
+
+      field = field_type(key=key, unit=unit, meaning=meaning)
+      field%value => variable
+      if (present(range)) field%range = range
+      select type (variable)
+      type is (real(wp))
+         field%kind = 'real'
+      type is (integer)
+         field%kind = 'whole'
+         field%trait = 'whole'
+      type is (logical)
+         field%kind = 'flag'
+      type is (list_type)
+         field%kind = 'list'
+      type is (text_list_type)
+         field%kind = 'texts'
+      class default
+         field%kind = 'text'
+      end select
+      if (present(trait)) field%trait = trait
+      if (.not. present(choices)) return
+      field%kind = 'choice'
+      field%n_choice = size(choices)
+      field%choices(:size(choices)) = choices
+   end function new_field
+
+   !> Puts keys into a namelist group, except keys that have one already, and sets their owner: [n_field].
+   function in_group(group, fields, owner) result(placed)
+      character(len=*), intent(in) :: group
+      !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      character(len=key_length) :: choice
+      !> A source model, a floor, `modes`, `compression`, `unknowns`, `floor` or `room` (default: the present one).
+      character(len=*), intent(in), optional :: owner
+      type(field_type) :: placed(size(fields))
+
+      placed = fields
+      where (placed%group == '') placed%group = group
+      if (present(owner)) placed%owner = owner
+   end function in_group
+
+   !> Keys that have an effect only with some values of a choice.
+   function only_with(choice, values, fields) result(needing)
+      !> Key of the choice.
+      character(len=*), intent(in) :: choice
+      !> Its values, the calibrated one first: [n_value].
+      character(len=*), intent(in) :: values(:)
+      !> The keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      type(field_type) :: needing(size(fields))
       integer :: i
 
-      choice = ''
-      i = findloc(fields%owner == field%owner .and. fields%key == field%needs(1), .true., dim=1)
-      if (i > 0) choice = fields(i)%choices(nint(fields(i)%get_number()))
-   end function get_needed_choice
+      needing = fields
+      needing%needs(1) = choice
+      do i = 1, size(values)
+         needing%needs(i + 1) = values(i)
+      end do
+   end function only_with
 
    !> Whether a key has an effect with the choices of the case.
    pure function has_effect(field, fields) result(yes)
@@ -114,8 +169,11 @@ contains
       !> Keys that the case uses: [n_field].
       type(field_type), intent(in) :: fields(:)
       logical :: yes
+      integer :: i
 
-      yes = field%needs(1) == '' .or. any(field%needs(2:) == field%get_needed_choice(fields))
+      i = findloc(fields%owner == field%owner .and. fields%key == field%needs(1), .true., dim=1)
+      yes = field%needs(1) == ''
+      if (i > 0) yes = any(field%needs(2:) == fields(i)%choices(nint(fields(i)%get_number())))
    end function has_effect
 
    !> Returns an error for the first value outside its range, NaN included.
@@ -132,10 +190,8 @@ contains
          associate (field => fields(i))
             inside = field%kind /= 'choice' .or. field%get_number() > 0.0_wp
             interval = get_interval(fields, i)
-            if (field%range /= '') then
-               inside = all(interval%contains(field%get_entries()))
-               if (field%whole_entries) inside = inside .and. all(is_whole(field%get_entries()))
-            end if
+            if (field%range /= '') inside = all(interval%contains(field%get_entries()))
+            if (field%trait == 'whole') inside = inside .and. all(is_whole(field%get_entries()))
             if (inside) cycle
             call field%get_text(text)
             error = field%get_error(text, interval)
@@ -212,11 +268,9 @@ contains
       do while (remaining /= '')
          last = scan(remaining, ' ,') - 1
          star = index(remaining(:last), '*')
-         n = 1
-         status = 0
-         if (star > 0) status = verify(remaining(:star - 1), '0123456789')
-         if (star > 0 .and. status == 0) read (remaining(:star - 1), *, iostat=status, iomsg=message) n
-         valid = status == 0 .and. n > 0 .and. n <= list_length - list%count .and. is_number(remaining(star + 1:last))
+         n = merge(0, 1, star > 0)
+         if (any(star == [2, 3, 4]) .and. verify(remaining(:star - 1), '0123456789') == 0) read (remaining(:star - 1), *) n
+         valid = n > 0 .and. n <= list_length - list%count .and. is_number(remaining(star + 1:last))
          if (valid) read (remaining(star + 1:last), *, iostat=status, iomsg=message) number
          valid = valid .and. status == 0
          if (.not. valid) return
@@ -264,11 +318,8 @@ contains
       class(field_type), intent(in) :: self
       !> The number; 0 for a choice that is not allowed, for free text and lists.
       real(wp) :: number
-      real(wp), allocatable :: entries(:)
 
-      number = 0.0_wp
-      allocate (entries, source=self%get_entries())
-      if (size(entries) == 1 .and. self%kind /= 'list') number = entries(1)
+      number = merge(0.0_wp, sum(self%get_entries()), self%kind == 'list')
    end function get_number
 
    !> Entries of a list; of another kind its value as a number: [n_entry].
@@ -363,10 +414,7 @@ contains
          self%key)
       if (.not. present(interval)) return
       error%value = self%get_number()
-      error%low = interval%lower
-      error%high = interval%upper
-      error%low_open = interval%lower_open
-      error%high_open = interval%upper_open
+      error%range = interval
    end function get_error
 
    !> The value in namelist syntax.
@@ -412,11 +460,9 @@ contains
          if (present(interval)) range = interval
          call get_range_text(range, trim(self%key), text)
          if (self%unit /= '') text = text//' '//trim(self%unit)
-         if (self%kind == 'whole' .or. self%whole_entries) text = text//', whole'
+         if (self%trait == 'whole') text = text//', whole'
          if (self%kind == 'list') text = text//', up to '//to_text(list_length)//' numbers'
       end select
    end subroutine get_allowed
-
-   !> Whether the field is a list without entries, which a namelist cannot hold.
 
 end module thud_field

@@ -5,11 +5,10 @@ module thud_case
    use thud_compression, only: check_compression, compression_options_type, get_compression_fields
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: check_fields, field_type, key_length, name_length
+   use thud_field, only: check_fields, field_type, in_group, key_length, name_length, new_field
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, in_group, plain_field
    use thud_rectangular_floor, only: rectangular_floor_type
    use thud_registry, only: first_radiating, floor_names, floor_slot_type, model_names, model_slot_type, new_floors, &
       new_models, standard_moduli
@@ -182,26 +181,26 @@ contains
       integer :: i
 
       fields = [ &
-         in_group('case', [plain_field('name', case%name, 'name of the case and of its output directory')]), &
+         in_group('case', [new_field('name', case%name, '', 'name of the case and of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
          in_group('modes', get_modes_fields(case%modes), owner='modes'), &
          in_group('compression', get_compression_fields(case%compression), owner='compression'), &
          in_group('drop', get_drop_fields(case%drop)), &
          in_group('model', [ &
-         choice_field('name', case%model, 'source model', model_names)])]
+         new_field('name', case%model, '', 'source model', choices=model_names)])]
       do i = 1, size(case%models)
          fields = [fields, in_group(model_names(i), case%models(i)%model%get_fields(), owner=model_names(i))]
       end do
       fields = [fields, &
          in_group('sampling', get_sampling_fields(case%sampling)), &
          in_group('levels', [ &
-         choice_field('method', case%level_method, 'method of computing the levels', level_methods), &
-         choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
-         choice_field('force', case%level_force, 'assessed force, for which levels, peak force and verdict are reported', &
-         [character(len=8) :: 'floor', 'elastic'])]), &
-         in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
+         new_field('method', case%level_method, '', 'method of computing the levels', choices=level_methods), &
+         new_field('bands', case%bands, '', 'bands of levels.csv', choices=band_choices), &
+         new_field('force', case%level_force, '', 'assessed force, for which levels, peak force and verdict are reported', &
+         choices=[character(len=8) :: 'floor', 'elastic'])]), &
+         in_group('limits', [new_field('source', case%source, '', 'source whose limits apply', choices=source_names)]), &
          in_group('unknowns', get_unknowns_fields(case%unknowns), owner='unknowns'), &
-         in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)], owner='floor')]
+         in_group('floor', [new_field('name', case%floor, '', 'floor under the source', choices=floor_names)], 'floor')]
       do i = 1, size(case%floors)
          fields = [fields, in_group(floor_names(i), case%floors(i)%model%get_fields(), owner=floor_names(i))]
       end do

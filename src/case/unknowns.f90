@@ -1,10 +1,9 @@
 !> What is not known of a source: keys of the case, and the distributions of their values.
 module thud_unknowns
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, get_interval, key_length, list_type, text_list_type
+   use thud_field, only: field_type, get_interval, key_length, list_type, new_field, text_list_type
    use thud_interval, only: interval_type
    use thud_kinds, only: wp
-   use thud_new_field, only: list_field, plain_field
    use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
@@ -34,12 +33,12 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         plain_field('key', unknowns%key, 'keys of ball, drop and model whose values are not known'), &
-         list_field('low', unknowns%low, '', 'their minima, in the units of the keys', '[-1e30, 1e30]'), &
-         list_field('high', unknowns%high, '', 'their maxima', '[-1e30, 1e30]'), &
-         list_field('standard_deviation', unknowns%standard_deviation, '', &
+         new_field('key', unknowns%key, '', 'keys of ball, drop and model whose values are not known'), &
+         new_field('low', unknowns%low, '', 'their minima, in the units of the keys', '[-1e30, 1e30]'), &
+         new_field('high', unknowns%high, '', 'their maxima', '[-1e30, 1e30]'), &
+         new_field('standard_deviation', unknowns%standard_deviation, '', &
          'standard deviations around the values of the case, truncated by low and high; 0: uniform', '[0, 1e30]'), &
-         plain_field('reason', unknowns%reason, 'reasons of the ranges, with their sources')]
+         new_field('reason', unknowns%reason, '', 'reasons of the ranges, with their sources')]
    end function get_unknowns_fields
 
    !> Returns an error if lists differ in length, a key is not known, or a range is empty or not allowed.
@@ -95,7 +94,7 @@ contains
 
       associate (key => unknowns%key%values(i), low => unknowns%low%values(i), high => unknowns%high%values(i))
          field = findloc(fields%key == key, .true., dim=1)
-         known = pack(fields%key, .not. fields%is_numerical)
+         known = pack(fields%key, fields%trait /= 'numerical')
          if (.not. any(known == key)) then
             call get_suggestion(trim(key), known, suggestion)
             suggestion = ' is not allowed'//suggestion
@@ -111,7 +110,7 @@ contains
          call fields(field)%get_allowed(allowed, interval)
          if (.not. (interval%contains(low) .and. interval%contains(high) .and. low < high)) then
             error = input_error(range//' of '//trim(key)//' are not allowed; allowed: low < high, '//allowed, 'unknowns')
-         else if (fields(field)%derived_at_zero .and. .not. low > 0.0_wp) then
+         else if (fields(field)%trait == 'derived' .and. .not. low > 0.0_wp) then
             error = input_error('= '//to_text(low)//' of '//trim(key)//' is not allowed: at 0 it is derived from other ' &
                //'keys; allowed: above 0', 'unknowns', 'low')
          else if (value < low .or. value > high) then

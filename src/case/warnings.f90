@@ -4,7 +4,7 @@ module thud_warnings
    use thud_band, only: get_band_name, octave_count, octaves
    use thud_case, only: case_type, get_active_fields, get_model_number, get_unstated_fields
    use thud_constants, only: not_a_number
-   use thud_field, only: field_type, key_length
+   use thud_field, only: field_type
    use thud_floor_model, only: floor_state_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -209,17 +209,19 @@ contains
       type(case_type), intent(in), target :: case
       !> The warnings: [n].
       type(note_type), allocatable, intent(inout) :: warnings(:)
-      type(field_type), allocatable :: fields(:)
-      character(len=key_length) :: law
-      integer :: i
+      type(field_type), allocatable :: active(:), fields(:)
+      character(len=:), allocatable :: law
+      integer :: i, j
 
+      allocate (active, source=get_active_fields(case))
       allocate (fields, source=get_unstated_fields(case))
       do i = 1, size(fields)
          if (fields(i)%key /= 'loss_factor') cycle
-         law = fields(i)%get_needed_choice(get_active_fields(case))
-         if (law /= fields(i)%needs(2)) call add(warnings, 'law_of_standard_ball', fields(i)%group, 'loss_factor', '= ' &
+         j = findloc(active%owner == fields(i)%owner .and. active%key == fields(i)%needs(1), .true., dim=1)
+         call active(j)%get_text(law)
+         if (law /= quoted(fields(i)%needs(2))) call add(warnings, 'law_of_standard_ball', fields(i)%group, 'loss_factor', '= ' &
             //to_text(fields(i)%get_number())//' is that of the standard ball with '//trim(fields(i)%needs(1))//' = ' &
-            //quoted(fields(i)%needs(2))//'; state it for '//quoted(law))
+            //quoted(fields(i)%needs(2))//'; state it for '//law)
       end do
    end subroutine add_law_warning
 

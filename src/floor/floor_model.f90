@@ -7,11 +7,10 @@
 module thud_floor_model
    use thud_band, only: band_type
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length, list_type
+   use thud_field, only: field_type, key_length, list_type, new_field
    use thud_floor_modes, only: floor_modes_type, new_floor_receiver
    use thud_injected_energy, only: get_mean_conductances
    use thud_kinds, only: wp
-   use thud_new_field, only: list_field, real_field
    use thud_plate, only: air_type, get_resistance, plate_type
    use thud_receiver, only: receiver_type
    use thud_screed, only: get_lower_conductance, screed_type
@@ -107,9 +106,9 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         real_field('source_x', self%source_x, '', 'relative source position along the length; ' &
+         new_field('source_x', self%source_x, '', 'relative source position along the length; ' &
          //'levels in the room are means over positions', '(0, 1)'), &
-         real_field('source_y', self%source_y, '', 'relative source position along the width', '(0, 1)')]
+         new_field('source_y', self%source_y, '', 'relative source position along the width', '(0, 1)')]
    end function get_source_fields
 
    !> Fields of the points: [2].
@@ -118,9 +117,9 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         list_field('point_x', self%point_x, 'm', &
+         new_field('point_x', self%point_x, 'm', &
          'positions along the length of points whose velocity is computed', '[0, 1000]'), &
-         list_field('point_y', self%point_y, 'm', 'positions of these points along the width', '[0, 1000]')]
+         new_field('point_y', self%point_y, 'm', 'positions of these points along the width', '[0, 1000]')]
    end function get_point_fields
 
    !> Checks options that depend on each other; by default, none do.

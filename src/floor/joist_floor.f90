@@ -1,10 +1,9 @@
 !> A timber joist floor: sheathing on joists as ribs; its mean properties are those of an orthotropic plate.
 module thud_joist_floor
    use thud_constants, only: pi
-   use thud_field, only: field_type, name_length
+   use thud_field, only: field_type, name_length, new_field
    use thud_floor_model, only: floor_state_type
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, real_field
    use thud_plate, only: get_thin_limit, plate_type
    use thud_plate_stack, only: get_spaced_positions, new_orthotropic, orthotropic_type, ribs_type
    use thud_rectangular_floor, only: rectangular_floor_type
@@ -45,26 +44,26 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', self%length, 'm', 'span of the joists', '[0.5, 100]'), &
-         real_field('width', self%width, 'm', 'width of the floor across the joists', '[0.5, 100]'), &
-         real_field('sheathing_thickness', self%sheathing_thickness, 'm', 'thickness of the sheathing', '[0.003, 0.3]'), &
-         real_field('sheathing_density', self%sheathing_density, 'kg/m3', 'density of the sheathing', '[10, 20000]'), &
-         real_field('sheathing_modulus', self%sheathing_modulus, 'Pa', &
+         new_field('length', self%length, 'm', 'span of the joists', '[0.5, 100]'), &
+         new_field('width', self%width, 'm', 'width of the floor across the joists', '[0.5, 100]'), &
+         new_field('sheathing_thickness', self%sheathing_thickness, 'm', 'thickness of the sheathing', '[0.003, 0.3]'), &
+         new_field('sheathing_density', self%sheathing_density, 'kg/m3', 'density of the sheathing', '[10, 20000]'), &
+         new_field('sheathing_modulus', self%sheathing_modulus, 'Pa', &
          'modulus of elasticity of the sheathing in bending', '[1e7, 1e12]'), &
-         real_field('spacing', self%spacing, 'm', &
+         new_field('spacing', self%spacing, 'm', &
          'distance between the axes of adjacent joists', '(joist_width, width)'), &
-         real_field('joist_width', self%joist_width, 'm', 'width of a joist', '[0.005, 1]'), &
-         real_field('joist_height', self%joist_height, 'm', 'height of a joist', '[0.01, 2]'), &
-         real_field('joist_density', self%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
-         real_field('joist_modulus', self%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
-         real_field('connection', self%connection, '', &
+         new_field('joist_width', self%joist_width, 'm', 'width of a joist', '[0.005, 1]'), &
+         new_field('joist_height', self%joist_height, 'm', 'height of a joist', '[0.01, 2]'), &
+         new_field('joist_density', self%joist_density, 'kg/m3', 'density of the joists', '[10, 20000]'), &
+         new_field('joist_modulus', self%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
+         new_field('connection', self%connection, '', &
          'composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1 annex B', '[0, 1]'), &
-         real_field('loss_factor', self%loss_factor, '', &
+         new_field('loss_factor', self%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          self%get_source_fields(), &
-         choice_field('source_on', self%source_on, &
+         new_field('source_on', self%source_on, '', &
          'impact location: midway between the next joists, on the next joist, or exactly the position', &
-         [character(len=9) :: 'sheathing', 'joist', 'position']), &
+         choices=[character(len=9) :: 'sheathing', 'joist', 'position']), &
          self%get_build_up_fields(.true.), self%get_point_fields()]
    end function get_fields
 

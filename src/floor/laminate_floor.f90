@@ -1,10 +1,9 @@
 !> A plate of crossed layers that yield in shear, as cross-laminated timber.
 module thud_laminate_floor
-   use thud_field, only: field_type, list_type
+   use thud_field, only: field_type, list_type, new_field
    use thud_floor_model, only: floor_state_type
    use thud_kinds, only: wp
    use thud_legendre, only: get_gauss_legendre
-   use thud_new_field, only: list_field, real_field
    use thud_plate, only: plate_type
    use thud_plate_stack, only: orthotropic_type
    use thud_rectangular_floor, only: rectangular_floor_type
@@ -45,23 +44,23 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', self%length, 'm', 'length of the floor, along the grain of the first layer', &
+         new_field('length', self%length, 'm', 'length of the floor, along the grain of the first layer', &
          '[0.5, 100]'), &
-         real_field('width', self%width, 'm', 'width of the floor', '[0.5, 100]'), &
-         list_field('layer_thickness', self%layer_thickness, 'm', &
+         new_field('width', self%width, 'm', 'width of the floor', '[0.5, 100]'), &
+         new_field('layer_thickness', self%layer_thickness, 'm', &
          'thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm)', '[0.003, 0.5]'), &
-         real_field('youngs_modulus', self%youngs_modulus, 'Pa', &
+         new_field('youngs_modulus', self%youngs_modulus, 'Pa', &
          'modulus of elasticity along the grain', '[1e8, 1e12]'), &
-         real_field('cross_modulus', self%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
-         real_field('shear_modulus', self%shear_modulus, 'Pa', 'shear modulus along the grain', '[1e6, 1e12]'), &
-         real_field('rolling_shear_modulus', self%rolling_shear_modulus, 'Pa', &
+         new_field('cross_modulus', self%cross_modulus, 'Pa', 'modulus of elasticity across the grain', '[0, 1e12]'), &
+         new_field('shear_modulus', self%shear_modulus, 'Pa', 'shear modulus along the grain', '[1e6, 1e12]'), &
+         new_field('rolling_shear_modulus', self%rolling_shear_modulus, 'Pa', &
          'modulus of rolling shear', '[1e6, 1e12]'), &
-         real_field('torsion_factor', self%torsion_factor, '', &
+         new_field('torsion_factor', self%torsion_factor, '', &
          'fraction of the torsional stiffness that joints between boards leave', '[0, 1]'), &
-         real_field('density', self%density, 'kg/m3', 'density of the layers', '[10, 20000]'), &
-         real_field('added_mass', self%added_mass, 'kg/m2', &
+         new_field('density', self%density, 'kg/m3', 'density of the layers', '[10, 20000]'), &
+         new_field('added_mass', self%added_mass, 'kg/m2', &
          'mass without stiffness on the plate, as gravel', '[0, 1000]'), &
-         real_field('loss_factor', self%loss_factor, '', &
+         new_field('loss_factor', self%loss_factor, '', &
          'loss factor of the floor including its edges, without radiation', '(0, 1]'), &
          self%get_source_fields(), self%get_build_up_fields(.false.), self%get_point_fields()]
    end function get_fields

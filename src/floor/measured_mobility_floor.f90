@@ -3,11 +3,10 @@
 module thud_measured_mobility_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_field, only: check_fields, field_type, list_type
+   use thud_field, only: check_fields, field_type, in_group, list_type, new_field
    use thud_floor_model, only: floor_model_type, floor_state_type
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_new_field, only: in_group, list_field, real_field
    use thud_passivity, only: find_violations, make_passive
    use thud_plate, only: get_plate_fields, plate_type
    use thud_plate_floor, only: plate_floor_type
@@ -54,18 +53,18 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('direct', self%direct, 'm/(N s)', 'limit of the mobility at high frequencies', '[0, 1000]'), &
-         list_field('pole_frequency', self%pole_frequency, 'Hz', &
+         new_field('direct', self%direct, 'm/(N s)', 'limit of the mobility at high frequencies', '[0, 1000]'), &
+         new_field('pole_frequency', self%pole_frequency, 'Hz', &
          'magnitudes of the poles divided by 2 pi', '[1e-6, 1e7]'), &
-         list_field('damping_ratio', self%damping_ratio, '', 'damping ratios of the poles; 1 for a real pole', &
+         new_field('damping_ratio', self%damping_ratio, '', 'damping ratios of the poles; 1 for a real pole', &
          '[1e-12, 1]'), &
-         list_field('residue_real', self%residue_real, 'm/(N s2)', &
+         new_field('residue_real', self%residue_real, 'm/(N s2)', &
          'real parts of the residues, doubled for a pair of poles', '[-1e12, 1e12]'), &
-         list_field('residue_imaginary', self%residue_imaginary, 'm/(N s2)', &
+         new_field('residue_imaginary', self%residue_imaginary, 'm/(N s2)', &
          'imaginary parts of the residues, doubled for a pair of poles', '[-1e12, 1e12]'), &
-         real_field('lowest_frequency', self%lowest_frequency, 'Hz', 'lowest frequency of the measurement', &
+         new_field('lowest_frequency', self%lowest_frequency, 'Hz', 'lowest frequency of the measurement', &
          '(0, highest_frequency)'), &
-         real_field('highest_frequency', self%highest_frequency, 'Hz', &
+         new_field('highest_frequency', self%highest_frequency, 'Hz', &
          'highest frequency of the measurement', '(0, 1e7]'), &
          get_plate_fields(self%radiator%plate, .true.)]
    end function get_fields

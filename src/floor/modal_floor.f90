@@ -3,11 +3,10 @@ module thud_modal_floor
    use thud_ascending, only: get_ascending_order
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, name_length
+   use thud_field, only: field_type, name_length, new_field
    use thud_floor_model, only: floor_model_type, floor_state_type
    use thud_floor_modes, only: floor_modes_type, new_floor_receiver
    use thud_kinds, only: wp
-   use thud_new_field, only: plain_field, real_field
    use thud_plate, only: get_mode_density, get_plate_fields, get_resistance, get_surface_mass, plate_type
    use thud_sampled_modes, only: read_sampled_modes
    use thud_text, only: fixed, to_text
@@ -43,10 +42,10 @@ contains
 
       fields = get_plate_fields(self%plate, .true.)
       fields = [ &
-         plain_field('file', self%file, 'file of the modes: frequencies, loss factors, shapes on a grid', &
-         is_path=.true.), &
+         new_field('file', self%file, '', 'file of the modes: frequencies, loss factors, shapes on a grid', &
+         trait='path'), &
          self%get_source_fields(), &
-         real_field('residual_compliance', self%residual_compliance, 'm/N', &
+         new_field('residual_compliance', self%residual_compliance, 'm/N', &
          'static compliance at the source of the modes above those of the file; 0: that of the plate', '[0, 1]'), &
          pack(fields, fields%key == 'thickness' .or. fields%key == 'density' .or. fields%key == 'wave_speed' &
          .or. fields%key == 'stiffness_ratio' .or. fields%key == 'torsion_ratio'), self%get_point_fields()]

@@ -1,9 +1,8 @@
 !> A homogeneous rectangular plate, isotropic or orthotropic: resistance if infinite, radiation and losses (ISO 12354-1).
 module thud_plate
    use thud_constants, only: pi
-   use thud_field, only: field_type, name_length
+   use thud_field, only: field_type, name_length, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, real_field
    implicit none (type, external)
    private
 
@@ -66,21 +65,21 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('length', plate%length, 'm', 'length of the floor', '[0.5, 100]'), &
-         real_field('width', plate%width, 'm', 'width of the floor', '[0.5, 100]'), &
-         real_field('thickness', plate%thickness, 'm', 'thickness of the floor', '[0.001, 2]'), &
-         real_field('density', plate%density, 'kg/m3', 'density of the floor', '[10, 20000]'), &
-         real_field('wave_speed', plate%wave_speed, 'm/s', 'speed of longitudinal waves in the floor', '[100, 10000]'), &
-         real_field('stiffness_ratio', plate%stiffness_ratio, '', &
+         new_field('length', plate%length, 'm', 'length of the floor', '[0.5, 100]'), &
+         new_field('width', plate%width, 'm', 'width of the floor', '[0.5, 100]'), &
+         new_field('thickness', plate%thickness, 'm', 'thickness of the floor', '[0.001, 2]'), &
+         new_field('density', plate%density, 'kg/m3', 'density of the floor', '[10, 20000]'), &
+         new_field('wave_speed', plate%wave_speed, 'm/s', 'speed of longitudinal waves in the floor', '[100, 10000]'), &
+         new_field('stiffness_ratio', plate%stiffness_ratio, '', &
          'ratio of the bending stiffness along the width to that along the length', '[0.0001, 10000]'), &
-         real_field('torsion_ratio', plate%torsion_ratio, '', &
+         new_field('torsion_ratio', plate%torsion_ratio, '', &
          'ratio of the twisting stiffness to the geometric mean of both bending stiffnesses', '[0, 1]'), &
-         real_field('loss_factor', plate%loss_factor, '', 'internal loss factor of the floor', '[0, 1]'), &
-         choice_field('edges', plate%edges, 'losses at the edges of the floor', &
-         [character(len=10) :: 'building', 'laboratory', 'absorption']), &
-         real_field('edge_absorption', plate%edge_absorption, 'm', &
+         new_field('loss_factor', plate%loss_factor, '', 'internal loss factor of the floor', '[0, 1]'), &
+         new_field('edges', plate%edges, '', 'losses at the edges of the floor', &
+         choices=[character(len=10) :: 'building', 'laboratory', 'absorption']), &
+         new_field('edge_absorption', plate%edge_absorption, 'm', &
          'sum of edge lengths times absorption coefficients, for absorption', '[0, 1000]')]
-      if (is_optional) fields(3) = real_field('thickness', plate%thickness, 'm', &
+      if (is_optional) fields(3) = new_field('thickness', plate%thickness, 'm', &
          'thickness of the plate that radiates into a room; 0: none', '[0, 2]')
    end function get_plate_fields
 

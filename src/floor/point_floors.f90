@@ -2,10 +2,9 @@
 !> damper (one mode of a floor, or a force plate on its mounts), and a thin infinite plate, which is a resistance.
 module thud_point_floors
    use thud_error, only: error_type
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_floor_model, only: floor_model_type, floor_state_type
    use thud_kinds, only: wp
-   use thud_new_field, only: real_field
    implicit none (type, external)
    private
 
@@ -67,7 +66,7 @@ contains
       class(infinite_plate_floor_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
-      fields = [real_field('resistance', self%resistance, 'N s/m', &
+      fields = [new_field('resistance', self%resistance, 'N s/m', &
          'driving-point resistance: force divided by velocity', '[1, 1e15]')]
    end function get_infinite_fields
 
@@ -87,9 +86,9 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('mass', self%mass, 'kg', 'moving mass under the source', '[1e-3, 1e12]'), &
-         real_field('stiffness', self%stiffness, 'N/m', 'stiffness of the support', '[0, 1e15]'), &
-         real_field('damping', self%damping, 'N s/m', 'damping coefficient of the support', '[0, 1e12]')]
+         new_field('mass', self%mass, 'kg', 'moving mass under the source', '[1e-3, 1e12]'), &
+         new_field('stiffness', self%stiffness, 'N/m', 'stiffness of the support', '[0, 1e15]'), &
+         new_field('damping', self%damping, 'N s/m', 'damping coefficient of the support', '[0, 1e12]')]
    end function get_oscillator_fields
 
    !> Y = s/(m s**2 + c s + k) with the poles -c/(2 m) +- sqrt(c**2/(4 m**2) - k/m).

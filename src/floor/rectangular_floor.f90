@@ -2,11 +2,10 @@
 module thud_rectangular_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, list_type, name_length, new_field
    use thud_floor_model, only: floor_model_type, floor_state_type, third_bands
    use thud_floor_modes, only: get_floor_modes, mode_limit, new_floor_receiver
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, real_field
    use thud_plate, only: get_resistance, get_thin_limit
    use thud_plate_stack, only: edge_type, get_spaced_positions, layer_type, new_orthotropic, orthotropic_type, &
       plate_stack_type, rigid_support
@@ -86,22 +85,22 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         choice_field('support', self%support, 'support of the edges', supports), &
-         list_field('support_stiffness', self%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
+         new_field('support', self%support, '', 'support of the edges', choices=supports), &
+         new_field('support_stiffness', self%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
          //'deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)', '[0, 1e14]'), &
-         list_field('support_rotation', self%support_rotation, 'N', &
+         new_field('support_rotation', self%support_rotation, 'N', &
          'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
-         list_field('line_x', self%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
+         new_field('line_x', self%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
          '(0, 100)'), &
-         list_field('line_y', self%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
+         new_field('line_y', self%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
          '(0, 100)'), &
          get_screed_fields(self%screed), &
          get_subceiling_fields(self%subceiling, on_joists), &
-         real_field('covering_stiffness', self%covering_stiffness, 'N/m', &
+         new_field('covering_stiffness', self%covering_stiffness, 'N/m', &
          'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
-         real_field('covering_loss_factor', self%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
+         new_field('covering_loss_factor', self%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
          '[0.01, 2]'), &
-         list_field('covering_improvement', self%covering_improvement, 'dB', 'measured reduction of heavy impact sound ' &
+         new_field('covering_improvement', self%covering_improvement, 'dB', 'measured reduction of heavy impact sound ' &
          //'by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz', '[-30, 60]')]
    end function get_build_up_fields
 

@@ -1,8 +1,7 @@
 !> A subceiling below any plate, on channels, battens or hangers, with the air between: its keys, and its plate.
 module thud_subceiling
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: real_field
    use thud_plate, only: plate_type
    implicit none (type, external)
    private
@@ -30,22 +29,22 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('subceiling_thickness', subceiling%thickness, 'm', 'thickness of a subceiling that radiates ' &
+         new_field('subceiling_thickness', subceiling%thickness, 'm', 'thickness of a subceiling that radiates ' &
          //'instead of the floor; 0: none', '[0, 0.2]'), &
-         real_field('subceiling_density', subceiling%density, 'kg/m3', 'density of the subceiling', '[10, 20000]'), &
-         real_field('subceiling_modulus', subceiling%modulus, 'Pa', 'modulus of elasticity of the subceiling in bending', &
+         new_field('subceiling_density', subceiling%density, 'kg/m3', 'density of the subceiling', '[10, 20000]'), &
+         new_field('subceiling_modulus', subceiling%modulus, 'Pa', 'modulus of elasticity of the subceiling in bending', &
          '[1e7, 1e12]'), &
-         real_field('subceiling_loss_factor', subceiling%loss_factor, '', &
+         new_field('subceiling_loss_factor', subceiling%loss_factor, '', &
          'loss factor of the subceiling', '[0, 1]'), &
-         real_field('channel_stiffness', subceiling%channel_stiffness, 'N/m2', 'stiffness per length of each line that ' &
+         new_field('channel_stiffness', subceiling%channel_stiffness, 'N/m2', 'stiffness per length of each line that ' &
          //'holds the subceiling (channels, battens, hangers)', '[0, 1e12]'), &
-         real_field('channel_loss_factor', subceiling%channel_loss_factor, '', 'loss factor of these lines', '[0, 1]'), &
-         real_field('cavity_depth', subceiling%cavity_depth, 'm', 'depth of the air between floor and subceiling', &
+         new_field('channel_loss_factor', subceiling%channel_loss_factor, '', 'loss factor of these lines', '[0, 1]'), &
+         new_field('cavity_depth', subceiling%cavity_depth, 'm', 'depth of the air between floor and subceiling', &
          '[0.005, 2]'), &
-         real_field('cavity_loss_factor', subceiling%cavity_loss_factor, '', &
+         new_field('cavity_loss_factor', subceiling%cavity_loss_factor, '', &
          'loss factor of this air, high with absorber in it', '[0, 1]')]
       if (.not. on_joists) fields = [fields, &
-         real_field('channel_spacing', subceiling%channel_spacing, 'm', &
+         new_field('channel_spacing', subceiling%channel_spacing, 'm', &
          'distance of the lines that hold the subceiling, which run along the length', '[0.05, 100]')]
    end function get_subceiling_fields
 

@@ -1,9 +1,8 @@
 !> The ball: geometry, mass, material and the gas in it.
 module thud_ball
    use thud_constants, only: pi
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: real_field
    implicit none (type, external)
    private
 
@@ -38,17 +37,17 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('outer_radius', ball%outer_radius, 'm', 'outer radius', '(0, 10]'), &
-         real_field('wall_thickness', ball%wall_thickness, 'm', 'wall thickness, less than the outer radius', &
+         new_field('outer_radius', ball%outer_radius, 'm', 'outer radius', '(0, 10]'), &
+         new_field('wall_thickness', ball%wall_thickness, 'm', 'wall thickness, less than the outer radius', &
          '(0, outer_radius)'), &
-         real_field('mass', ball%mass, 'kg', 'mass', '[1e-12, 1000000]'), &
-         real_field('youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
-         '(0, 1e13]', is_calibrated=.true.), &
-         real_field('poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", '(-1, 0.5]', is_calibrated=.true.), &
-         real_field('gauge_pressure', ball%gauge_pressure, 'Pa', &
+         new_field('mass', ball%mass, 'kg', 'mass', '[1e-12, 1000000]'), &
+         new_field('youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
+         '(0, 1e13]', trait='calibrated'), &
+         new_field('poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", '(-1, 0.5]', trait='calibrated'), &
+         new_field('gauge_pressure', ball%gauge_pressure, 'Pa', &
          'overpressure of the gas in the undeformed ball', '[0, 1e8]'), &
-         real_field('ambient_pressure', ball%ambient_pressure, 'Pa', 'pressure of the air around the ball', '[0, 1e8]'), &
-         real_field('heat_capacity_ratio', ball%heat_capacity_ratio, '', &
+         new_field('ambient_pressure', ball%ambient_pressure, 'Pa', 'pressure of the air around the ball', '[0, 1e8]'), &
+         new_field('heat_capacity_ratio', ball%heat_capacity_ratio, '', &
          'ratio of specific heats of the enclosed gas', '[1, 2]')]
    end function get_ball_fields
 

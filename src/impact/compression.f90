@@ -2,9 +2,8 @@
 module thud_compression
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, name_length
+   use thud_field, only: field_type, name_length, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, integer_field, real_field
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -40,11 +39,11 @@ contains
       type(field_type) :: fields(3)
 
       fields = [ &
-         real_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '[1e-15, 10]'), &
-         integer_field('points', options%points, &
+         new_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '[1e-15, 10]'), &
+         new_field('points', options%points, '', &
          'number of points of the curve, including the undeformed ball', '[2, 10000]'), &
-         choice_field('gas', options%gas, 'gas in the ball: leaves through the hole (vented), or is sealed in', &
-         [character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]
+         new_field('gas', options%gas, '', 'gas in the ball: leaves through the hole (vented), or is sealed in', &
+         choices=[character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]
    end function get_compression_fields
 
    !> Checks that the ball allows a compression.

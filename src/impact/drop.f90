@@ -1,8 +1,7 @@
 !> The drop: its height, and gravity.
 module thud_drop
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: real_field
    implicit none (type, external)
    private
 
@@ -26,8 +25,8 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         real_field('height', drop%height, 'm', "height of the ball's lowest point above the floor", '[1e-12, 1000000]'), &
-         real_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', '[1e-12, 1000]')]
+         new_field('height', drop%height, 'm', "height of the ball's lowest point above the floor", '[1e-12, 1000000]'), &
+         new_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', '[1e-12, 1000]')]
    end function get_drop_fields
 
    !> Velocity at first touch, m/s (paper eq. 4).

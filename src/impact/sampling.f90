@@ -1,9 +1,8 @@
 !> How a force is sampled in time: rate, length of the record, steps per sample.
 module thud_sampling
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: integer_field, plain_field, real_field
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -41,11 +40,11 @@ contains
       type(field_type) :: fields(4)
 
       fields = [ &
-         real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second; from 16000 with finite_element', &
+         new_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second; from 16000 with finite_element', &
          '[2000, 1e7]'), &
-         real_field('duration', sampling%duration, 's', 'duration of the record from first touch', '[0.001, 10]'), &
-         integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]'), &
-         plain_field('verify', sampling%verify, 'compute again at a finer resolution, and state the changes')]
+         new_field('duration', sampling%duration, 's', 'duration of the record from first touch', '[0.001, 10]'), &
+         new_field('substeps', sampling%substeps, '', 'integration steps per sampling interval', '[1, 10000]'), &
+         new_field('verify', sampling%verify, '', 'compute again at a finer resolution, and state the changes')]
    end function get_sampling_fields
 
    !> Checks the numbers of samples and steps of a record.

@@ -68,7 +68,7 @@ contains
          '&room is given without &floor; allowed: both, for the level in the room below')
       if (present(directory) .and. .not. allocated(error)) call resolve_paths(fields, directory, error)
       if (allocated(error)) return
-      case%unstated = pack(get_full_key(fields), fields%is_calibrated .and. .not. stated)
+      case%unstated = pack(get_full_key(fields), fields%trait == 'calibrated' .and. .not. stated)
       if (any(case%unstated == 'ball.youngs_modulus')) call set_standard_modulus(case)
       call set_floor_air(case)
       ! The use of other keys depends on these, even in an unchecked case.
@@ -94,7 +94,7 @@ contains
       integer :: i
 
       do i = 1, size(fields)
-         if (.not. fields(i)%is_path) cycle
+         if (fields(i)%trait /= 'path') cycle
          call fields(i)%get_words(words)
          if (words(1) == '' .or. words(1)(1:1) == '/') cycle
          inquire (file=directory//trim(words(1)), size=bytes)
@@ -237,7 +237,7 @@ contains
             text = text//newline//mark//'&'//trim(fields(i)%group)//newline
          end if
          text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline
-         if (mark == '' .and. (size(fields(i)%get_entries()) == 0 .or. fields(i)%is_calibrated)) text = text//'! '
+         if (mark == '' .and. (size(fields(i)%get_entries()) == 0 .or. fields(i)%trait == 'calibrated')) text = text//'! '
          text = text//mark//'   '//trim(fields(i)%key)//' = '//value//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
       end do

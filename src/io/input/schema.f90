@@ -106,7 +106,7 @@ contains
          call set_standard_modulus(case)
          fields = get_active_fields(case)
          do j = 1, size(fields)
-            if (.not. fields(j)%is_calibrated) cycle
+            if (fields(j)%trait /= 'calibrated') cycle
             if (text /= '') text = text//','//newline
             text = text//'{"model": '//text_value(models(i))//', "key": ' &
                //text_value(fields(j)%key)//', "value": '//json_value(fields(j))//'}'
@@ -123,7 +123,7 @@ contains
       character(len=:), allocatable :: value
 
       value = json_value(field)
-      if (field%is_calibrated) value = 'null'
+      if (field%trait == 'calibrated') value = 'null'
       text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
          //text_value(field%key)//', "kind": '//text_value(field%kind)//', "unit": '//text_value(field%unit) &
          //', "default": '//value//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
@@ -134,7 +134,7 @@ contains
             //end_value(interval%upper, interval%upper_key)//', "lower_open": ' &
             //trim(merge('true ', 'false', interval%lower_open))//', "upper_open": ' &
             //trim(merge('true ', 'false', interval%upper_open))//', "whole": ' &
-            //trim(merge('true ', 'false', field%whole_entries .or. field%kind == 'whole'))
+            //trim(merge('true ', 'false', field%trait == 'whole'))
       end if
       text = text//'}'
    end subroutine describe

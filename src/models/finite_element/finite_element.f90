@@ -9,7 +9,7 @@ module thud_finite_element
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error, numerical_failure
-   use thud_field, only: field_type
+   use thud_field, only: field_type, in_group, new_field
    use thud_floor_contact, only: contact_options_type, get_contact_fields, new_floor_contact
    use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
    use thud_impact_record, only: check_interval, check_run, contacts_type, continue_flight, finish_record, follow_contact, &
@@ -22,7 +22,6 @@ module thud_finite_element
    use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, get_nodal_areas, mesh_options_type, mesh_type, &
       min_radial, new_mesh
    use thud_motion, only: snapshot_type
-   use thud_new_field, only: in_group, integer_field, real_field
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_receiver, only: receiver_type
@@ -115,18 +114,18 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         integer_field('bounces', self%bounces, 'number of contacts to compute', '[1, 100]'), &
-         real_field('flight_before', self%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
-         is_numerical=.true.), &
-         real_field('flight_after', self%flight_after, 's', 'duration of free flight after the last contact', &
-         '[0, 10]', is_numerical=.true.), &
-         real_field('step_safety', self%step_safety, '', 'time step divided by a bound on stable steps', &
-         '[0.01, 0.98]', is_numerical=.true.), &
+         new_field('bounces', self%bounces, '', 'number of contacts to compute', '[1, 100]'), &
+         new_field('flight_before', self%flight_before, 's', 'duration of free flight before first touch', '[0, 1]', &
+         trait='numerical'), &
+         new_field('flight_after', self%flight_after, 's', 'duration of free flight after the last contact', &
+         '[0, 10]', trait='numerical'), &
+         new_field('step_safety', self%step_safety, '', 'time step divided by a bound on stable steps', &
+         '[0.01, 0.98]', trait='numerical'), &
          in_group('mesh', get_mesh_fields(self%mesh)), &
          in_group('material', get_material_fields(self%material)), &
          in_group('contact', get_contact_fields(self%contact)), &
-         in_group('output', [real_field('snapshot_interval', self%snapshot_interval, 's', &
-         'time between snapshots of the deformed ball; 0: none', '[0, 10]', is_numerical=.true.)])]
+         in_group('output', [new_field('snapshot_interval', self%snapshot_interval, 's', &
+         'time between snapshots of the deformed ball; 0: none', '[0, 10]', trait='numerical')])]
    end function get_fields
 
    !> Returns an error if options do not fit each other, the ball or the memory.

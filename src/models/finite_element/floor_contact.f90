@@ -11,10 +11,9 @@
 module thud_floor_contact
    use thud_ball, only: ball_type
    use thud_constants, only: pi
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_kinds, only: wp
    use thud_mesh, only: get_nodal_areas, mesh_type
-   use thud_new_field, only: real_field
    implicit none (type, external)
    private
 
@@ -47,9 +46,9 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('friction', options%friction, '', 'coefficient of friction between ball and floor', '[0, 100]', &
-         is_calibrated=.true.), &
-         real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
+         new_field('friction', options%friction, '', 'coefficient of friction between ball and floor', '[0, 100]', &
+         trait='calibrated'), &
+         new_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
          'stiffness per area of a thin layer on the floor; 0: hard floor without a layer', '[0, 1e13]')]
    end function get_contact_fields
 

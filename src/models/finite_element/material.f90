@@ -3,9 +3,8 @@ module thud_material
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, list_type, name_length, new_field, only_with
    use thud_kinds, only: wp
-   use thud_new_field, only: choice_field, list_field, only_with, real_field
    use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_modulus_ratio
    use thud_text, only: to_text
    implicit none (type, external)
@@ -67,24 +66,24 @@ contains
       character(len=*), parameter :: lossy(4) = [character(len=13) :: 'fractional', 'kelvin_voigt', 'constant_loss', 'prony']
 
       fields = [ &
-         choice_field('law', options%law, 'law of elasticity', &
-         [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
-         only_with('law', ['mooney_rivlin'], [real_field('mooney_share', options%mooney_share, '', &
+         new_field('law', options%law, '', 'law of elasticity', &
+         choices=[character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
+         only_with('law', ['mooney_rivlin'], [new_field('mooney_share', options%mooney_share, '', &
          'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]')]), &
-         real_field('bulk_ratio', options%bulk_ratio, '', &
+         new_field('bulk_ratio', options%bulk_ratio, '', &
          "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", '[2, 100000]'), &
-         choice_field('viscosity', options%viscosity, 'law of viscosity', &
-         [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
+         new_field('viscosity', options%viscosity, '', 'law of viscosity', &
+         choices=[character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
          only_with('viscosity', lossy(:3), [ &
-         real_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
-         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', is_calibrated=.true.)]), &
-         only_with('viscosity', lossy, [real_field('loss_frequency', options%loss_frequency, 'Hz', &
-         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', is_calibrated=.true.)]), &
-         only_with('viscosity', lossy(:1), [real_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', is_calibrated=.true.)]), &
-         only_with('viscosity', lossy(4:), [list_field('prony_share', options%prony_share, '', &
+         new_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
+         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', trait='calibrated')]), &
+         only_with('viscosity', lossy, [new_field('loss_frequency', options%loss_frequency, 'Hz', &
+         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', trait='calibrated')]), &
+         only_with('viscosity', lossy(:1), [new_field('fractional_order', options%fractional_order, '', &
+         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', trait='calibrated')]), &
+         only_with('viscosity', lossy(4:), [new_field('prony_share', options%prony_share, '', &
          'moduli of the branches divided by the long-term modulus, for prony', '[0, 1000]'), &
-         list_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &
+         new_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &
          '(0, 1000]')])]
    end function get_material_fields
 

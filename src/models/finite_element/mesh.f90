@@ -4,9 +4,8 @@ module thud_mesh
    use thud_ball, only: ball_type
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_kinds, only: wp
-   use thud_new_field, only: integer_field
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -62,9 +61,9 @@ contains
       type(field_type) :: fields(2)
 
       fields = [ &
-         integer_field('radial_elements', options%radial_elements, 'number of elements through the wall; 0: automatic', &
+         new_field('radial_elements', options%radial_elements, '', 'number of elements through the wall; 0: automatic', &
          '[0, 64]'), &
-         integer_field('polar_elements', options%polar_elements, 'number of elements from pole to pole, from 8; ' &
+         new_field('polar_elements', options%polar_elements, '', 'number of elements from pole to pole, from 8; ' &
          //'0: automatic', '[0, 1024]')]
    end function get_mesh_fields
 

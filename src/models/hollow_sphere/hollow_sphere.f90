@@ -6,11 +6,10 @@ module thud_hollow_sphere
    use thud_contact_source, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_source_type
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, numerical_error
-   use thud_field, only: field_type, name_length
+   use thud_field, only: field_type, name_length, new_field
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_lumped, only: solve_lumped
-   use thud_new_field, only: choice_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
@@ -74,8 +73,8 @@ contains
       class(hollow_sphere_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
 
-      fields = [choice_field('momentum_flux', self%momentum_flux, &
-         'term for the momentum of wall that enters or leaves the flat cap', flux_choices)]
+      fields = [new_field('momentum_flux', self%momentum_flux, '', &
+         'term for the momentum of wall that enters or leaves the flat cap', choices=flux_choices)]
    end function get_fields
 
    !> Limits of the assumptions: a thin shell, a wall that stays close to the sphere, and no gravity during the contact.

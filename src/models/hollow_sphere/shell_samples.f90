@@ -8,12 +8,11 @@ module thud_shell_samples
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: not_a_number, pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
-   use thud_field, only: field_type
+   use thud_field, only: field_type, in_group
    use thud_force_history, only: holds_impulse, min_contact_samples
    use thud_hollow_sphere, only: compression_weights, get_shell_stiffness, restitution_weights
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
-   use thud_new_field, only: in_group
    use thud_sampling, only: get_sample_count, sampling_type
    use thud_shell_impacts, only: impact_batch_type, solve_impacts
    use thud_shell_series, only: batch_size

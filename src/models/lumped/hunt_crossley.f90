@@ -6,11 +6,10 @@ module thud_hunt_crossley
       get_contact_force
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, signal_base
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_lumped, only: solve_lumped
-   use thud_new_field, only: real_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
@@ -60,15 +59,15 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('stiffness', self%stiffness, '', &
-         'contact stiffness, N/m^exponent; 0: derived from contact_time', '[0, 1e15]', derived_at_zero=.true.), &
-         real_field('contact_time', self%contact_time, 's', &
-         'target contact time; 0: derived from stiffness', '[0, 10]', derived_at_zero=.true.), &
-         real_field('exponent', self%exponent, '', 'exponent of the deflection in the contact force', '[1, 5]'), &
-         real_field('damping', self%damping, 's/m', &
+         new_field('stiffness', self%stiffness, '', &
+         'contact stiffness, N/m^exponent; 0: derived from contact_time', '[0, 1e15]', trait='derived'), &
+         new_field('contact_time', self%contact_time, 's', &
+         'target contact time; 0: derived from stiffness', '[0, 10]', trait='derived'), &
+         new_field('exponent', self%exponent, '', 'exponent of the deflection in the contact force', '[1, 5]'), &
+         new_field('damping', self%damping, 's/m', &
          'damping coefficient alpha; 0: derived from restitution', '[0, 100]'), &
-         real_field('restitution', self%restitution, '', &
-         'target coefficient of restitution; 0: derived from damping', '[0, 1]', derived_at_zero=.true.)]
+         new_field('restitution', self%restitution, '', &
+         'target coefficient of restitution; 0: derived from damping', '[0, 1]', trait='derived')]
    end function get_fields
 
    !> Returns an error if values are missing or contradict each other.

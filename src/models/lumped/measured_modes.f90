@@ -6,11 +6,10 @@ module thud_measured_modes
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type
+   use thud_field, only: field_type, list_type, new_field
    use thud_force_history, only: force_history_type, new_force_history
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
-   use thud_new_field, only: list_field, plain_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: get_sample_count, sampling_type
    use thud_source_model, only: source_model_type
@@ -62,10 +61,10 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('frequency', self%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
-         '[0.001, 1000000]'), list_field('damping_ratio', self%damping_ratio, '', 'damping ratios, one per mode', &
-         '[0, 1)'), list_field('effective_mass', self%effective_mass, 'kg', 'effective masses, one per mode', &
-         '[1e-12, 1000000]'), plain_field('allow_mass_mismatch', self%allow_mass_mismatch, &
+         new_field('frequency', self%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
+         '[0.001, 1000000]'), new_field('damping_ratio', self%damping_ratio, '', 'damping ratios, one per mode', &
+         '[0, 1)'), new_field('effective_mass', self%effective_mass, 'kg', 'effective masses, one per mode', &
+         '[1e-12, 1000000]'), new_field('allow_mass_mismatch', self%allow_mass_mismatch, '', &
          'effective masses need not add up to the mass of the ball')]
    end function get_fields
 

@@ -7,11 +7,10 @@ module thud_two_mass
    use thud_contact_source, only: contact_law_type, contact_source_type, get_contact_force
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type
+   use thud_field, only: field_type, new_field
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_lumped, only: solve_lumped
-   use thud_new_field, only: real_field
    use thud_receiver, only: is_rigid, receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
@@ -84,21 +83,21 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('belt_mass', self%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
+         new_field('belt_mass', self%belt_mass, 'kg', 'mass of belt and tread, less than the mass of the source', &
          '(0, 1000000)'), &
-         real_field('inflation_pressure', self%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
-         real_field('contact_width', self%contact_width, 'm', &
+         new_field('inflation_pressure', self%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
+         new_field('contact_width', self%contact_width, 'm', &
          'contact area divided by deflection of the contact patch', &
          '[0, 100]'), &
-         real_field('carcass_stiffness', self%carcass_stiffness, 'N/m', &
+         new_field('carcass_stiffness', self%carcass_stiffness, 'N/m', &
          'force of the carcass divided by its deflection, at 20 mm', '[0, 1e12]'), &
-         real_field('carcass_exponent', self%carcass_exponent, '', &
+         new_field('carcass_exponent', self%carcass_exponent, '', &
          'exponent of the deflection in the force of the carcass', '[1.5, 5]'), &
-         real_field('contact_damping', self%contact_damping, 's/m', &
+         new_field('contact_damping', self%contact_damping, 's/m', &
          'damping force of the contact divided by elastic force and velocity', '[0, 100]'), &
-         real_field('belt_frequency', self%belt_frequency, 'Hz', &
+         new_field('belt_frequency', self%belt_frequency, 'Hz', &
          'natural frequency of the belt on the sidewall with fixed rim', '(0, 1000000]'), &
-         real_field('belt_damping', self%belt_damping, '', &
+         new_field('belt_damping', self%belt_damping, '', &
          'damping ratio of the belt on the sidewall with fixed rim', '[0, 10]')]
    end function get_fields
 

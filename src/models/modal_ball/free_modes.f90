@@ -4,11 +4,10 @@ module thud_free_modes
    use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_field, only: field_type
+   use thud_field, only: field_type, in_group, new_field
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_legendre, only: get_legendre
-   use thud_new_field, only: in_group, integer_field
    use thud_sphere_modes, only: basis_type, get_displacements, get_modes, new_basis
    use thud_text, only: to_text
    implicit none (type, external)
@@ -71,7 +70,7 @@ contains
       !> One field per component: [1].
       type(field_type), allocatable :: fields(:)
 
-      fields = in_group('modes', [integer_field('count', options%count, 'number of elastic free modes', '[1, 100]')])
+      fields = in_group('modes', [new_field('count', options%count, '', 'number of elastic free modes', '[1, 100]')])
    end function get_modes_fields
 
    !> Returns an error if the wall is too thin.

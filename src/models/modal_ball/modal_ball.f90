@@ -9,13 +9,12 @@ module thud_modal_ball
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length
+   use thud_field, only: field_type, list_type, name_length, new_field, only_with
    use thud_force_history, only: add_model_quantity, force_history_type
    use thud_kinds, only: wp
    use thud_modal_compression, only: compress_modal_ball, get_flexibilities
    use thud_modal_run, only: march, modal_run_type, start_run
    use thud_mode_step, only: damping_type, index_amplitude, new_damping, new_modes, new_static_step, set_factors
-   use thud_new_field, only: choice_field, integer_field, list_field, only_with, plain_field, real_field
    use thud_prony, only: check_fractional_loss
    use thud_receiver, only: new_receiver_step, receiver_type
    use thud_ring_contact, only: new_ring_contact
@@ -114,26 +113,26 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         real_field('highest_frequency', self%highest_frequency, 'Hz', &
+         new_field('highest_frequency', self%highest_frequency, 'Hz', &
          'highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic', '[0, 20000]', &
-         is_numerical=.true.), &
-         integer_field('rings', self%rings, &
+         trait='numerical'), &
+         new_field('rings', self%rings, '', &
          'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
-         choice_field('damping_law', self%damping_law, 'damping law: loss factor as a function of frequency', &
-         [character(len=10) :: 'constant', 'rising', 'fractional']), &
-         only_with('damping_law', ['rising    ', 'fractional', 'constant  '], [real_field('loss_factor', &
-         self%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', is_calibrated=.true.)]), &
-         only_with('damping_law', ['rising    ', 'fractional'], [real_field('loss_frequency', self%loss_frequency, 'Hz', &
+         new_field('damping_law', self%damping_law, '', 'damping law: loss factor as a function of frequency', &
+         choices=[character(len=10) :: 'constant', 'rising', 'fractional']), &
+         only_with('damping_law', ['rising    ', 'fractional', 'constant  '], [new_field('loss_factor', &
+         self%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', trait='calibrated')]), &
+         only_with('damping_law', ['rising    ', 'fractional'], [new_field('loss_frequency', self%loss_frequency, 'Hz', &
          'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]', &
-         is_calibrated=.true.)]), &
-         only_with('damping_law', ['fractional'], [real_field('fractional_order', self%fractional_order, '', &
+         trait='calibrated')]), &
+         only_with('damping_law', ['fractional'], [new_field('fractional_order', self%fractional_order, '', &
          'order of the derivative, for fractional; 1: as rising', '(0, 1]')]), &
-         plain_field('cavity_gas', self%cavity_gas, 'the gas in the cavity resists volume changes'), &
-         plain_field('contact_gravity', self%contact_gravity, 'gravity acts also during the contact'), &
-         choice_field('floor_friction', self%floor_friction, 'friction of the floor: none or infinite (sticking)', &
-         [character(len=5) :: 'none', 'stick']), &
-         list_field('static_families', self%static_families, '', 'harmonics treated as quasi-static', &
-         '[0, 400]', whole=.true.)]
+         new_field('cavity_gas', self%cavity_gas, '', 'the gas in the cavity resists volume changes'), &
+         new_field('contact_gravity', self%contact_gravity, '', 'gravity acts also during the contact'), &
+         new_field('floor_friction', self%floor_friction, '', 'friction of the floor: none or infinite (sticking)', &
+         choices=[character(len=5) :: 'none', 'stick']), &
+         new_field('static_families', self%static_families, '', 'harmonics treated as quasi-static', &
+         '[0, 400]', trait='whole')]
    end function get_fields
 
    !> Returns an error if no fractional law has this loss factor, if there is a single ring, or if the modes without inertia
