@@ -87,7 +87,7 @@ contains
       !> See `record_type` (default: no unit, `real`).
       character(len=*), intent(in), optional :: unit, kind
 
-      call self%add_array(name, [integer ::], [value], unit, kind)
+      call self%add_array(name, [integer :: ], [value], unit, kind)
    end subroutine add_number
 
    !> Adds an array of any rank.
@@ -202,8 +202,8 @@ contains
             call bundle%add_text('key', error%key)
             call bundle%add_text('problem', error%problem)
          end if
-         if (allocated(error%range)) call bundle%add_array('range', [5], [error%value, error%range%lower, error%range%upper, &
-            merge(1.0_wp, 0.0_wp, error%range%lower_open), merge(1.0_wp, 0.0_wp, error%range%upper_open)])
+         if (allocated(error%range)) call bundle%add_array('range', [5], [error%value, error%range%lower, &
+            error%range%upper, merge(1.0_wp, 0.0_wp, [error%range%lower_open, error%range%upper_open])])
       end if
       if (.not. allocated(bundle%header)) bundle%header = ''
       if (.not. allocated(bundle%text)) bundle%text = ''

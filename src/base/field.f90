@@ -319,7 +319,17 @@ contains
       !> The number; 0 for a choice that is not allowed, for free text and lists.
       real(wp) :: number
 
-      number = merge(0.0_wp, sum(self%get_entries()), self%kind == 'list')
+      number = 0.0_wp
+      select type (value => self%value)
+      type is (real(wp))
+         number = value
+      type is (integer)
+         number = real(value, wp)
+      type is (logical)
+         number = merge(1.0_wp, 0.0_wp, value)
+      type is (character(len=*))
+         number = real(findloc(self%choices(:self%n_choice) == value, .true., dim=1), wp)
+      end select
    end function get_number
 
    !> Entries of a list; of another kind its value as a number: [n_entry].
@@ -328,20 +338,12 @@ contains
       real(wp), allocatable :: entries(:)
 
       select type (value => self%value)
-      type is (real(wp))
-         entries = [value]
-      type is (integer)
-         entries = [real(value, wp)]
-      type is (logical)
-         entries = [merge(1.0_wp, 0.0_wp, value)]
-      type is (character(len=*))
-         entries = [real(findloc(self%choices(:self%n_choice) == value, .true., dim=1), wp)]
       type is (list_type)
          entries = value%values(:value%count)
       type is (text_list_type)
          entries = spread(0.0_wp, 1, value%count)
       class default
-         allocate (entries(0))
+         entries = [self%get_number()]
       end select
    end function get_entries
 

@@ -219,8 +219,8 @@ contains
          if (fields(i)%key /= 'loss_factor') cycle
          j = findloc(active%owner == fields(i)%owner .and. active%key == fields(i)%needs(1), .true., dim=1)
          call active(j)%get_text(law)
-         if (law /= quoted(fields(i)%needs(2))) call add(warnings, 'law_of_standard_ball', fields(i)%group, 'loss_factor', '= ' &
-            //to_text(fields(i)%get_number())//' is that of the standard ball with '//trim(fields(i)%needs(1))//' = ' &
+         if (law /= quoted(fields(i)%needs(2))) call add(warnings, 'law_of_standard_ball', fields(i)%group, 'loss_factor', &
+            '= '//to_text(fields(i)%get_number())//' is that of the standard ball with '//trim(fields(i)%needs(1))//' = ' &
             //quoted(fields(i)%needs(2))//'; state it for '//law)
       end do
    end subroutine add_law_warning

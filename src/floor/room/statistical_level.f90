@@ -3,7 +3,8 @@
 module thud_statistical_level
    use thud_ceiling, only: get_cavity_mode_density, get_forced_velocity_ratio, get_mass_law
    use thud_constants, only: pi
-   use thud_energy_flow, only: connect, decay_of_60_db, energy_flow_type, get_entering_energies, get_fast_level, new_energy_flow
+   use thud_energy_flow, only: connect, decay_of_60_db, energy_flow_type, get_entering_energies, get_fast_level, &
+      new_energy_flow
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_walls
    use thud_kinds, only: wp
    use thud_modal_radiation, only: modal_radiation_type

@@ -188,7 +188,12 @@ contains
          end associate
       end do
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, n_written)
-      sampled = sum(force(block_size + 1:, :n_written), dim=2)/sampling%sample_rate
+      ! A loop over instants, which compilers vectorize, unlike the sum of an array over its second dimension.
+      sampled = 0.0_wp
+      do i = 1, n_written
+         sampled = sampled + force(block_size + 1:, i)
+      end do
+      sampled = sampled/sampling%sample_rate
       do i = 1, size(samples)
          associate (ball => samples(i)%ball, v0 => impacts%impact_velocity(i), max_deflection => impacts%max_deflection(i), &
             outcome => outcomes(i))
