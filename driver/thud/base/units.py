@@ -97,6 +97,28 @@ def find_unit(text: str) -> str:
     return name if name in UNITS else lower if lower in UNITS else ""
 
 
+def size_of(text: str) -> tuple[str, float]:
+    """Return the base unit of a unit that a text names, and its size in it; empty and 1 if none.
+
+    >>> size_of("kHz"), size_of("mmHg")
+    (('Hz', 1000.0), ('', 1.0))
+    """
+    return UNITS.get(find_unit(text), ("", 1.0))
+
+
+def factor_to(unit: str, text: str, label: str, allowed: str = "") -> float:
+    """Return the factor from a unit that a text names to a unit of `UNITS`; 1 without a text.
+
+    Raise InputError if the unit is not known or of another quantity.
+    """
+    base, size = size_of(text) if text else UNITS[unit]
+    if base != UNITS[unit][0]:
+        known = ", ".join(name for name, entry in UNITS.items() if entry[0] == UNITS[unit][0])
+        problem = "does not fit" if base else "is not known"
+        refuse(f"{label}: the unit {shown(text)} {problem}", allowed or known)
+    return size / UNITS[unit][1]
+
+
 def power_of(unit: object, key_unit: str, label: str) -> int:
     """Return the power of ten that converts a unit to the unit of a key.
 

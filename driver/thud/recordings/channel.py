@@ -28,6 +28,8 @@ MAX_SHOWN = 100
 MIB = 2**20
 # Minimum number of samples of a recording.
 MIN_SAMPLES = 8
+# Maximum number of columns of a table, or of a matrix of channels.
+MAX_COLUMNS = 256
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,11 @@
-"""Tables of numbers from spreadsheets, instruments and data loggers, with a unit per column."""
+"""Tables of numbers from spreadsheets, instruments and data loggers, with a unit per column.
+
+Stages: lines → columns of the first line of numbers → header → decimal mark → arrays.
+"""
 
 from __future__ import annotations
 
+import codecs
 import itertools
 import re
 from dataclasses import dataclass, field
@@ -11,23 +15,11 @@ from typing import TYPE_CHECKING, NoReturn
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.base.columns import (
-    GROUPING,
-    DecimalMark,
-    find_decimal,
-    find_encoding,
-    find_separator,
-    is_number,
-    read_lines,
-    split_line,
-    strip_comment,
-    to_number,
-)
 from thud.base.errors import InputError
-from thud.base.units import UNITS, find_unit
+from thud.base.units import UNITS, factor_to, find_unit, size_of
 from thud.base.workbooks import read_workbook
-from thud.recordings.channel import require_small, shown_path, shown_text
-from thud.recordings.header_aliases import (
+from thud.recordings.channel import MAX_COLUMNS, require_small, shown_path, shown_text
+from thud.recordings.header import (
     BRACKETS,
     DATE,
     LOOSE,
@@ -41,19 +33,31 @@ from thud.recordings.header_aliases import (
     plain,
     split_title,
 )
+from thud.recordings.numbers import (
+    COMMENT,
+    GROUPING,
+    MARKS,
+    NUMBERS,
+    find_separator,
+    is_number,
+    split_line,
+    to_number,
+)
 from thud.recordings.times import DATE as DATE_CELL, seconds_of_day
-from thud.recordings.variables import MAX_COLUMNS
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
+
+    Pairs = list[tuple[str, str]]
 
 COMMENTS = "#%!*'/;"
 # Marks at the end of a line that separate nothing.
 TRAILING = "\t; "
-# Maximum number of lines in a header, and of numbers in a table.
+# Maximum length of a line, number of lines in a header, and of numbers in a table.
+MAX_LINE = 2**16
 MAX_HEADER = 1000
 MAX_NUMBERS = 2**24
 # Number of lines per conversion.
@@ -63,6 +67,11 @@ UNUSUAL = {
     ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
     ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
 }
+# Encodings that are not Unicode: Western European, Korean and Japanese spreadsheets; characters
+# other than ASCII of German titles and of units; bytes from which the encoding is determined.
+ENCODINGS = ("latin-1", "cp949", "cp932")
+GERMAN = set("ÄÖÜäöüß°²³µ")
+MAX_HEADER_SIZE = 2**16
 # Separators of name and value in a header, and begin of a value.
 PAIR = re.compile(r"[:=\t;,]")
 VALUE = re.compile(r"[:=]\s*[-+]?\d")
@@ -111,21 +120,12 @@ class Column:
         """Whether title or unit are those of times."""
         return is_time(f"{self.name} [{self.unit}]")
 
-    def factor(self, unit: str, allowed: str) -> float:
-        """Return a number of the column in a unit; without a unit in the file it is 1.
+    def to(self, unit: str, allowed: str = "") -> NDArray[np.float64]:
+        """Return the numbers in a unit of `UNITS`; without a unit in the file it is that unit.
 
         Raise InputError if the unit of the file is not known or of another quantity.
         """
-        base, size = UNITS.get(find_unit(self.unit), ("", 0.0))
-        if self.unit and base != UNITS[unit][0]:
-            text = "does not fit" if base else "is not known"
-            refuse(f"{self.table}: {self}: the unit {shown_text(self.unit)!r} {text}", allowed)
-        return size / UNITS[unit][1] if self.unit else 1.0
-
-    def to(self, unit: str, allowed: str = "") -> NDArray[np.float64]:
-        """Return the numbers in a unit of `UNITS`, see `factor`."""
-        known = ", ".join(name for name, entry in UNITS.items() if entry[0] == UNITS[unit][0])
-        return self.values * self.factor(unit, allowed or known)
+        return self.values * factor_to(unit, self.unit, f"{self.table}: {self}", allowed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ class Table:
 
     name: str
     columns: list[Column]
-    header: list[tuple[str, str]]
+    header: Pairs
     decimal: str = ""
     has_titles: bool = False
     clock: NDArray[np.float64] | None = None
@@ -162,13 +162,15 @@ class _Layout:
 
     `used` are the columns of numbers with the units in their first cells, `clock` is a column of
     times of day, `width` the number of columns and `full_width` that with empty ones behind them.
+    Line `shown` shows the decimal mark; 0 if none does.
     """
 
     name: str
     allowed: str
     lines: Callable[[], Iterator[str]]
     separator: str | None = None
-    decimal: DecimalMark = field(default_factory=DecimalMark)
+    decimal: str = "."
+    shown: int = 0
     first: int = 1
     width: int = 0
     full_width: int = 0
@@ -177,23 +179,13 @@ class _Layout:
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line of numbers."""
-        text = strip_comment(line).rstrip(TRAILING.replace(self.separator or " ", ""))
+        text = COMMENT.split(line, 1)[0].strip(" \r")
+        text = text.rstrip(TRAILING.replace(self.separator or " ", ""))
         return split_line(text, self.separator) if text else []
 
     def rows(self) -> Iterator[tuple[int, str]]:
         """Yield number and text of the lines from the first number on."""
         return itertools.islice(enumerate(self.lines(), 1), self.first - 1, None)
-
-    def decisive(self) -> Iterator[tuple[int, list[str], bool]]:
-        """Yield number, numeric cells and use of quotes of lines that may show the decimal mark."""
-        for number, line in self.rows():
-            if "." in line or "," in line:
-                cells = self.cells(line)
-                yield (
-                    number,
-                    [_value(cells[i])[0] for i in self.used if i < len(cells)],
-                    '"' in line,
-                )
 
     def refuse(self, line: int, reason: str, allowed: str = "") -> NoReturn:
         """Raise InputError for a line."""
@@ -203,14 +195,14 @@ class _Layout:
 def read_table(
     path: str | os.PathLike[str],
     allowed: str = ALLOWED,
-    is_known: Callable[[str], bool] | None = None,
+    is_known: Callable[[str], bool] = lambda _: False,
 ) -> Table:
     """Read a text of columns, or the first sheet with numbers of a workbook (.xlsx).
 
     Separators (commas, semicolons, tabs, blanks) and decimal mark hold for all numbers. Lines above
     the first number are titles, units, or names and values. A unit of a column stands in its title,
     in a line of units, in the header or in its cells. Columns without numbers are left out. Words
-    of which `is_known` is true show the encoding, see `find_encoding`.
+    of which `is_known` is true show the encoding.
 
     Raises
     ------
@@ -222,11 +214,19 @@ def read_table(
     file = Path(path)
     name = shown_path(file)
     try:
-        layout = _open(file, name, allowed, is_known)
+        if file.suffix.lower() == ".xlsx":
+            sheet, rows = read_workbook(file, allowed)
+            layout = _Layout(f"{name}, sheet {sheet!r}", allowed, lambda: iter(rows), "\t", ".", 1)
+        else:
+            if not file.is_file():  # opening a pipe could block
+                refuse(f"{name}: cannot be read (no such regular file)", allowed)
+            require_small(file, "text")
+            encoding = _find_encoding(file, is_known)
+            layout = _Layout(name, allowed, lambda: _read_lines(file, encoding, name, allowed))
         header, titles, has_titles = _read_header(_find_numbers(layout), layout)
-        if not layout.decimal.line:
-            layout.decimal = find_decimal(layout.decisive(), layout.separator, name)
-        if layout.separator == "," and not layout.decimal.line and not has_titles:
+        if not layout.shown:
+            layout.decimal, layout.shown = _find_decimal(layout)
+        if layout.separator == "," and not layout.shown and not has_titles:
             layout.refuse(
                 layout.first,
                 "the commas may separate columns or be decimal marks",
@@ -239,8 +239,8 @@ def read_table(
         refuse(f"{name}: cannot be read ({shown_text(error)})", allowed, error)
     clock = None if layout.clock is None else values.pop(layout.clock)
     columns = [Column(i + 1, *titles[i], numbers, layout.name) for i, numbers in values.items()]
-    mark = layout.decimal.mark if layout.decimal.line else ""
-    return Table(layout.name, columns, header, mark, has_titles, clock)
+    decimal = layout.decimal if layout.shown else ""
+    return Table(layout.name, columns, header, decimal, has_titles, clock)
 
 
 def time_and_force(table: Table) -> NDArray[np.float64]:
@@ -254,25 +254,50 @@ def time_and_force(table: Table) -> NDArray[np.float64]:
     return np.column_stack([time.to("s"), force.to("N")])
 
 
-def _open(file: Path, name: str, allowed: str, is_known: Callable[[str], bool] | None) -> _Layout:
-    """Return the layout of a workbook, or of a text whose header may show its encoding."""
-    if file.suffix.lower() == ".xlsx":
-        sheet, cells = read_workbook(file, allowed)
-        label = f"{name}, sheet {sheet!r}"
-        return _Layout(label, allowed, lambda: iter(cells), "\t", DecimalMark(".", 1))
-    if not file.is_file():  # opening a pipe could block
-        refuse(f"{name}: cannot be read (no such regular file)", allowed)
-    require_small(file, "text")
+# Lines.
 
-    def is_word(word: str) -> bool:
-        title, unit = split_title(word)
-        if unit and not unit.isascii():
-            return bool(find_unit(unit))
-        known = plain(title) in WORDS or bool(find_unit(title))
-        return known or (is_known is not None and is_known(title))
 
-    encoding = find_encoding(file, is_word)
-    return _Layout(name, allowed, lambda: read_lines(file, encoding, name, allowed))
+def _find_encoding(path: Path, is_known: Callable[[str], bool]) -> str:
+    """Return the encoding of a text.
+
+    UTF-16 has a byte order mark. A header that is not UTF-8 has that of `ENCODINGS` in which the
+    most words that are not ASCII are known, or Latin-1 if its only such characters are those of
+    German and of units; else the result is UTF-8, with characters that show what is not.
+    """
+    with path.open("rb") as file:
+        header = file.read(MAX_HEADER_SIZE)
+    if header.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(header)
+    except UnicodeDecodeError:
+        pass
+    else:
+        return "utf-8-sig"
+
+    def count(encoding: str) -> int:
+        known = 0
+        for word in re.split(r"[\t\n;,:=]", header.decode(encoding, "replace")):
+            if not word.isascii():
+                title, unit = split_title(word.strip(" \r\"'#"))
+                is_word = plain(title) in WORDS or find_unit(title) or is_known(title)
+                known += bool(is_word if unit.isascii() else find_unit(unit))
+        return known
+
+    best = max(ENCODINGS, key=count)
+    others = {character for character in header.decode("latin-1") if not character.isascii()}
+    return best if others <= GERMAN or count(best) else "utf-8-sig"
+
+
+def _read_lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
+    """Yield the lines of a text without line ends; refuse long ones and zero bytes."""
+    with path.open(encoding=encoding, errors="replace") as text:
+        for number, line in enumerate(iter(lambda: text.readline(MAX_LINE + 2), ""), start=1):
+            if "\0" in line:
+                refuse(f"{name}: line {number} holds zero bytes", allowed)
+            if len(line) > MAX_LINE + 1:
+                refuse(f"{name}: line {number} is longer than {MAX_LINE} characters", allowed)
+            yield line.removesuffix("\n")
 
 
 def _value(cell: str) -> tuple[str, str]:
@@ -288,7 +313,7 @@ def _find_numbers(layout: _Layout) -> list[str]:
     is_workbook = layout.separator is not None
     for line in itertools.islice(layout.lines(), MAX_HEADER):
         if not is_workbook:
-            text = strip_comment(line)
+            text = COMMENT.split(line, 1)[0].strip(" \r")
             bare = text.rstrip(TRAILING)
             # Behind the only number of a line, a mark shows that its comma separates nothing.
             layout.separator = find_separator(text if is_number(bare) else bare)
@@ -300,16 +325,10 @@ def _find_numbers(layout: _Layout) -> list[str]:
         dates = [i for i, cell in filled.items() if DATE_CELL.fullmatch(cell)] + clocks
         # Dates precede the numbers, and further columns may hold words, such as a state.
         is_first = bool(used) and min(filled) in {*used, *dates}
-        if (
-            is_first
-            and min(used) > max(dates, default=-1)
-            and len(used) > (len(filled) - len(dates)) / 2
-        ):
-            layout.first, layout.used, layout.clock = (
-                len(above) + 1,
-                used,
-                min(clocks, default=None),
-            )
+        is_first = is_first and min(used) > max(dates, default=-1)
+        if is_first and len(used) > (len(filled) - len(dates)) / 2:
+            layout.first, layout.used = len(above) + 1, used
+            layout.clock = min(clocks, default=None)
             layout.width, layout.full_width = max(filled) + 1, len(cells)
             if layout.width > MAX_COLUMNS:
                 refuse(f"{layout.name}: {layout.width} columns", f"up to {MAX_COLUMNS}")
@@ -321,21 +340,14 @@ def _find_numbers(layout: _Layout) -> list[str]:
 # Header: titles, units, names and values.
 
 
-def _read_header(
-    above: list[str], layout: _Layout
-) -> tuple[list[tuple[str, str]], list[tuple[str, str]], bool]:
+def _read_header(above: list[str], layout: _Layout) -> tuple[Pairs, Pairs, bool]:
     """Return names and values of the header, name and unit of each column, and if it has a line."""
-    header: list[tuple[str, str]] = []
+    header: Pairs = []
     rows: list[tuple[int, list[str]]] = []
     others: list[tuple[int, str]] = []
     for number, line in enumerate(above, 1):
-        if not (text := line.lstrip(COMMENTS + " \t").strip()):
-            continue
-        is_marked = PAIR.search(text)
-        parts = PAIR.split(text, maxsplit=1) if is_marked else text.rsplit(maxsplit=1)
-        name, value = parts[0].strip(), "".join(parts[1:]).strip(" :=\t;,")
-        if value and _is_known_pair(plain(split_title(name)[0] if is_marked else name), value):
-            header.append((name, value))
+        if pair := _known_pair(line.lstrip(COMMENTS + " \t").strip()):
+            header.append(pair)
         elif cells := _title_row(line, layout):
             rows.append((number, cells))
         else:
@@ -359,7 +371,10 @@ def _read_header(
         stated[i].append(unit or name)
     for i, unit in layout.used.items():
         stated[i].append(unit)
-    _add_header_units(header, names, stated, layout)
+    times = [i for i in layout.used if is_time(f"{names[i][0]} [{stated[i][0]}]")]
+    for title, value in header:
+        for i, unit in _header_units(title, value, times, layout):
+            stated[i].append(unit)
     columns = []
     for i, (name, _) in enumerate(names):
         known = {find_unit(unit) or unit: unit for unit in stated[i] if unit not in {"", "-", "--"}}
@@ -370,11 +385,15 @@ def _read_header(
     return [(name, re.split(r"[\t;]", value)[0]) for name, value in header], columns, bool(rows)
 
 
-def _is_known_pair(name: str, value: str) -> bool:
-    """Whether a line of the header is a known name with its value."""
-    if name in DATE:
-        return bool(DATE_LIKE.search(value))
-    return name in UNIT | TIME_UNIT or (name in RATE | STEP and bool(re.match(r"[-+.]?\d", value)))
+def _known_pair(text: str) -> tuple[str, str] | None:
+    """Return name and value of a line of a header if the name is known and the value is one."""
+    is_marked = PAIR.search(text)
+    parts = PAIR.split(text, maxsplit=1) if is_marked else text.rsplit(maxsplit=1)
+    name, value = "".join(parts[:1]).strip(), "".join(parts[1:]).strip(" :=\t;,")
+    word = plain(split_title(name)[0] if is_marked else name)
+    is_pair = word in UNIT | TIME_UNIT or (word in DATE and DATE_LIKE.search(value))
+    is_pair = is_pair or (word in RATE | STEP and re.match(r"[-+.]?\d", value))
+    return (name, value) if value and is_pair else None
 
 
 def _title_row(line: str, layout: _Layout) -> list[str]:
@@ -387,18 +406,22 @@ def _title_row(line: str, layout: _Layout) -> list[str]:
         text = text.strip(" ;\t")
         is_value = re.search(r"[:=]|[\t;]\s*\S", text) or is_number(text)
         return [] if is_value or not text else [text.strip('"')]
-    for variant in (text, text.partition("#")[0].rstrip()):
-        for cells in _splits(variant, separator):
-            filled = cells[: max((i for i, cell in enumerate(cells, 1) if cell), default=0)]
-            extra = filled[layout.width :]
-            has_number = any(
-                is_number(c.rstrip(":")) or DATE_CELL.fullmatch(c) or seconds_of_day(c) is not None
-                for c in filled
-            )
-            is_wide = len(filled) > layout.full_width and not all(plain(c) in REMARK for c in extra)
-            if filled and len(cells) >= layout.width and not is_wide and not has_number:
-                return cells[: max(layout.width, len(filled))]
+    for cells in (*_splits(text, separator), *_splits(text.partition("#")[0].rstrip(), separator)):
+        filled = cells[: _width(cells)]
+        has_number = any(
+            is_number(c.rstrip(":")) or DATE_CELL.fullmatch(c) or seconds_of_day(c) is not None
+            for c in filled
+        )
+        extra = filled[layout.width :]
+        is_wide = len(filled) > layout.full_width and not all(plain(c) in REMARK for c in extra)
+        if filled and len(cells) >= layout.width and not is_wide and not has_number:
+            return cells[: max(layout.width, len(filled))]
     return []
+
+
+def _width(cells: Sequence[str]) -> int:
+    """Return the number of cells without empty ones at the end."""
+    return max((i for i, cell in enumerate(cells, 1) if cell), default=0)
 
 
 def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
@@ -426,6 +449,15 @@ def _are_units(cells: list[str]) -> bool:
     )
 
 
+def _states_unit(text: str) -> bool:
+    """Whether a text holds a unit in brackets, or ends with one after a mark or "in"."""
+    units = ["".join(groups) for groups in BRACKETS.findall(text)]
+    loose = LOOSE.fullmatch(text)
+    if loose and loose["mark"].strip():
+        units.append(loose["unit"])
+    return any(map(find_unit, units))
+
+
 def _refuse_titles(
     line: str, number: int, layout: _Layout, *, is_last: bool, is_open: bool
 ) -> None:
@@ -436,12 +468,11 @@ def _refuse_titles(
     text = line.lstrip(COMMENTS + " \t").strip()
     is_comment = line.lstrip(" ")[:1] in tuple(COMMENTS)
     row = [] if is_comment else layout.cells(line.strip(" "))
-    row = row[: max((i for i, cell in enumerate(row, 1) if cell), default=0)]
-    first = next(filter(None, row), "")
+    row = row[: _width(row)]
     if len(row) == layout.width and any(map(is_number, row)):
         # A word may stand in front of the numbers of the first row.
         is_row = is_last and all(is_number(row[i]) for i in layout.used)
-        if is_row or not any(map(str.isalpha, first)):
+        if is_row or not any(map(str.isalpha, next(filter(None, row)))):
             wrong = next(cell for cell in row if cell and not is_number(cell))
             layout.refuse(number, f"{shown_text(wrong)!r} is not a number")
     cells = next(_splits(text, layout.separator), [text])
@@ -457,45 +488,61 @@ def _refuse_titles(
         layout.refuse(number, f"{shown_text(text)!r}: {reason}", ONE_TITLE)
 
 
-def _states_unit(text: str) -> bool:
-    """Whether a text holds a unit in brackets, or ends with one after a mark or "in"."""
-    units = ["".join(groups) for groups in BRACKETS.findall(text)]
-    loose = LOOSE.fullmatch(text)
-    if loose and loose["mark"].strip():
-        units.append(loose["unit"])
-    return any(map(find_unit, units))
-
-
-def _add_header_units(
-    header: list[tuple[str, str]],
-    names: list[tuple[str, str]],
-    stated: list[list[str]],
-    layout: _Layout,
-) -> None:
-    """Add units that the header states for the columns of times, or for the others."""
-    used = [*layout.used]
-    times = [i for i in used if is_time(f"{names[i][0]} [{stated[i][0]}]")]
+def _header_units(
+    title: str, value: str, times: list[int], layout: _Layout
+) -> Iterator[tuple[int, str]]:
+    """Yield columns and units of an entry of the header, of times or of the other columns."""
+    used, word = [*layout.used], plain(split_title(title)[0])
     channels = [i for i in used if i not in times]
-    for title, value in header:
-        words = plain(split_title(title)[0])
-        units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
-        if words in TIME_UNIT:
-            chosen, units = times or used[:1], units[:1]
-        elif words in UNIT and len(units) == 1:
-            chosen = channels
-        elif words in UNIT:
-            lists = ([*range(layout.width)], used, channels, used[1:])
-            chosen = next((some for some in lists if len(some) == len(units)), [])
-            if not chosen:
-                count = f"{len(units)} units for {len(channels)} channels"
-                refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
-        else:
-            continue
-        for i, unit in zip(chosen, itertools.cycle(units), strict=False):
-            stated[i].append(unit)
+    units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
+    if word in TIME_UNIT:
+        yield from ((i, units[0]) for i in times or used[:1])
+    elif word in UNIT and len(units) == 1:
+        yield from ((i, units[0]) for i in channels)
+    elif word in UNIT:
+        lists = ([*range(layout.width)], used, channels, used[1:])
+        chosen = next((some for some in lists if len(some) == len(units)), [])
+        if not chosen:
+            count = f"{len(units)} units for {len(channels)} channels"
+            refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
+        yield from zip(chosen, units, strict=True)
 
 
 # Numbers.
+
+
+def _find_decimal(layout: _Layout) -> tuple[str, int]:
+    """Return the decimal mark of a table, and the number of the line that shows it, 0 if none.
+
+    The first number that is valid with only one mark decides: ``0,5``, ``1.234,5`` and ``1,2345``
+    show a decimal comma; ``1,575`` is ambiguous. Raise InputError, naming its line, if no number
+    decides.
+    """
+    ambiguous: tuple[int, str] | None = None
+    for line, text in layout.rows():
+        if "." not in text and "," not in text:
+            continue
+        # If commas separate columns, unquoted numbers have decimal points.
+        has_points = layout.separator == "," and '"' not in text
+        cells = layout.cells(text)
+        for cell in (_value(cells[i])[0] for i in layout.used if i < len(cells)):
+            if "." not in cell and "," not in cell:
+                continue
+            marks = [mark for mark, pattern in NUMBERS.items() if pattern.fullmatch(cell)]
+            if len(marks) == 1:
+                return marks[0], line
+            if marks and ambiguous is None and not (has_points and "." in cell):
+                ambiguous = line, cell
+    if ambiguous is not None:
+        line, cell = ambiguous
+        value = to_number(cell, "," if "," in cell else ".")
+        readings = " or ".join(f"{to_number(cell, mark):.15g}" for mark in MARKS)
+        layout.refuse(
+            line,
+            f"{cell!r} may be {readings}, and no number of the table decides",
+            f"tables with a number that shows the decimal mark, such as {cell}0 for {value:.15g}",
+        )
+    return ".", 0
 
 
 def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
@@ -504,7 +551,7 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     blocks: list[NDArray[np.float64]] = []
     rows = layout.rows()
     while block := list(itertools.islice(rows, BLOCK)):
-        values = _convert([line for _, line in block], columns, layout)
+        values = _convert([line for _, line in block], len(columns), layout)
         if values is None:
             texts = [_convert_row(number, line, columns, layout) for number, line in block]
             values = np.array(list(filter(None, texts)), dtype=np.float64)
@@ -518,21 +565,21 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     return {column: table[:, k].copy() for k, column in enumerate(columns)}
 
 
-def _convert(lines: list[str], columns: list[int], layout: _Layout) -> NDArray[np.float64] | None:
+def _convert(lines: list[str], count: int, layout: _Layout) -> NDArray[np.float64] | None:
     """Return the numbers of lines at once; None if they hold anything else."""
-    separator, decimal = layout.separator, layout.decimal.mark
-    joined = "\n".join(lines)
-    if len(columns) < layout.width or UNUSUAL[decimal].search(joined):
+    text = "\n".join(lines)
+    if count < layout.width or UNUSUAL[layout.decimal].search(text):
         return None
-    if decimal == ",":
-        lines = joined.replace(",", ".").split("\n")
-    lines = [line.rstrip(TRAILING + (separator or "")) for line in lines]
+    if layout.decimal == ",":
+        text = text.replace(",", ".")
+    separator = layout.separator
+    lines = [line.rstrip(TRAILING + (separator or "")) for line in text.split("\n")]
     try:
         values = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except (ValueError, OverflowError):
         return None
     # Empty lines are left out.
-    return values if values.shape[1] == len(columns) else None
+    return values if values.shape[1] == count else None
 
 
 def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) -> list[float] | None:
@@ -540,31 +587,28 @@ def _convert_row(number: int, line: str, columns: list[int], layout: _Layout) ->
     cells = layout.cells(line)
     if not cells:
         return None
-    row = [_cell_value(cells[i], i, number, layout) for i in columns if i < len(cells)]
-    if len(row) < len(columns) or any(cells[layout.width :]):
+    if len(cells) <= max(columns) or any(cells[layout.width :]):
         layout.refuse(number, f"{len(cells)} columns, {layout.width} in the lines above")
+    row = []
+    for i in columns:
+        cell, unit = cells[i], layout.used.get(i, "")
+        text, own = _value(cell) if unit else (cell, "")
+        reason = f"{shown_text(cell)!r} is not a number"
+        if i == layout.clock:
+            value, reason = seconds_of_day(cell), f"{shown_text(cell)!r} is not a time"
+        else:
+            value = to_number(text, layout.decimal)
+        if unit:
+            reason = f"{shown_text(cell)!r} is not in {unit}"
+            (base, size), (own_base, own_size) = size_of(unit), size_of(own)
+            value = None if value is None or base != own_base else value * own_size / size
+        elif is_number(cell) and layout.shown:
+            reason += f" with the decimal {MARKS[layout.decimal]} of line {layout.shown}"
+        if value is None:
+            layout.refuse(number, reason)
+        row.append(value)
     for i in {*range(len(cells))} - {*columns}:
         if is_number(cells[i]):
             text = f"column {i + 1} has a number, {shown_text(cells[i])}, but none in line "
             layout.refuse(number, text + str(layout.first), "columns of numbers or of words")
     return row
-
-
-def _cell_value(cell: str, column: int, number: int, layout: _Layout) -> float:
-    """Return the number or the time of day, s, of a cell, in the unit of the first cell."""
-    unit = layout.used.get(column, "")
-    if column == layout.clock:
-        value, reason = seconds_of_day(cell), f"{shown_text(cell)!r} is not a time"
-    elif unit:
-        text, own = _value(cell)
-        base, size = UNITS.get(find_unit(own), ("", 0.0))
-        own_base, own_size = UNITS[find_unit(unit)]
-        value = to_number(text, layout.decimal.mark) if base == own_base else None
-        value = None if value is None else value * size / own_size
-        reason = f"{shown_text(cell)!r} is not in {unit}"
-    else:
-        value = to_number(cell, layout.decimal.mark)
-        reason = "" if value is not None else layout.decimal.explain(shown_text(cell))
-    if value is None:
-        layout.refuse(number, reason)
-    return value

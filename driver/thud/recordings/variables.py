@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MAX_IN_MEMORY, MIN_SAMPLES, Channel
+from thud.base.units import factor_to
+from thud.recordings.channel import MAX_COLUMNS, MAX_IN_MEMORY, MIN_SAMPLES, Channel
 from thud.recordings.force_units import find_unit
-from thud.recordings.header_aliases import (
+from thud.recordings.header import (
     DATE,
     TIME,
     UNIT,
@@ -25,7 +26,6 @@ from thud.recordings.header_aliases import (
     read_number,
     split_title,
     text_of,
-    time_scale,
 )
 from thud.recordings.times import uniform_grid
 
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
 
-# Maximum number of columns of a matrix of channels.
-MAX_COLUMNS = 256
 # Maximum number of times, and number of rows that show whether a vector may hold times.
 MAX_TIMES = MAX_IN_MEMORY // 8
 SHOWN_TIMES = 4096
@@ -247,7 +245,7 @@ def _rate(time: Vector, header: Header, name: str) -> tuple[float | None, str, t
         if find_unapplied((entry for entry in own if entry not in applied), "s"):
             return None, "", ()
         unit, _, since = find_word(own, UNIT).partition(" since ")
-        scale = time_scale(unit or split_title(time.title)[1], label)
+        scale = factor_to("s", unit or split_title(time.title)[1], label)
     values = (time.read(0, time.n_sample) * factor + offset) * scale
     _, step, notes = uniform_grid(values, label)
     return 1 / step, since, notes

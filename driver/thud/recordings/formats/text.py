@@ -11,7 +11,7 @@ from thud.base.checks import refuse
 from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.recordings.channel import MIN_SAMPLES, Channel
-from thud.recordings.header_aliases import DATE, find_rate, find_word
+from thud.recordings.header import DATE, find_rate, find_word
 from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
 from thud.recordings.times import ROUNDED_TOLERANCE, last_digit, uniform_grid

@@ -11,9 +11,8 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.note import Note
+from thud.base.units import factor_to, size_of
 from thud.recordings.channel import Channel, library, require_small, shown_path
-from thud.recordings.force_units import UNITS, find_unit
-from thud.recordings.header_aliases import time_scale
 from thud.recordings.signal import read_array
 from thud.recordings.times import uniform_grid
 
@@ -94,7 +93,7 @@ def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
     # A final line feed may add a value to binary data sets.
     if data.size < expected or expected < 1:
         refuse(f"{name}: {data.size} samples, {expected} expected", "a complete file")
-    scale = time_scale(data_set.label("abscissa_axis_units_lab"), name)
+    scale = factor_to("s", data_set.label("abscissa_axis_units_lab"), name)
     notes: tuple[Note, ...] = ()
     if record["abscissa_spacing"] == 1:
         step = record["abscissa_inc"] * scale
@@ -123,7 +122,7 @@ def _ordinate(data_set: DataSet) -> tuple[str, float, tuple[Note, ...]]:
     label, force = data_set.label("ordinate_axis_units_lab"), data_set.force
     kind = data_set.record["ordinate_spec_data_type"]
     if label:
-        base, size = UNITS.get(find_unit(label), ("", 1.0))
+        base, size = size_of(label)
         if base == "N" and force and kind in FORCES and abs(force / size - 1) > SAME_UNIT:
             return f"{label} by the label, {force:.5g} N by data set 164", 1.0, ()
         return label, 1.0, ()

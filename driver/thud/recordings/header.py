@@ -1,18 +1,17 @@
-"""Names of sample rate, sampling interval, date, unit and time in headers of files."""
+"""Words, units and numbers in headers of files, and in titles of columns."""
 
 from __future__ import annotations
 
 import re
 from typing import TYPE_CHECKING
 
-from thud.base.checks import refuse
-from thud.base.columns import GROUPING, MARKS, to_number
-from thud.base.units import UNITS, find_unit
+import numpy as np
+
+from thud.base.units import find_unit, size_of
+from thud.recordings.numbers import GROUPING, MARKS, to_number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    import numpy as np
 
 
 def _words(text: str) -> frozenset[str]:
@@ -99,6 +98,12 @@ def split_title(title: str) -> tuple[str, str]:
     return text, ""
 
 
+def is_time(title: str) -> bool:
+    """Whether a title names a column of times."""
+    name, unit = split_title(title)
+    return plain(name) in TIME or size_of(unit)[0] == "s"
+
+
 def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     """Return a number and the unit after it; None if there is no number.
 
@@ -108,8 +113,6 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     >>> read_number("51,2 kHz")
     (51.2, 'kHz')
     """
-    if isinstance(text, int | float):
-        return float(text), ""
     match = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:MAX_LENGTH])
     if not match:
         return None
@@ -121,16 +124,7 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     return (value, match["unit"].strip(" []()")) if value is not None else None
 
 
-def time_scale(unit: str, name: str) -> float:
-    """Return a unit of time in s, 1 without a unit; raise InputError if it is none."""
-    base, size = UNITS.get(find_unit(unit), ("", 1.0)) if unit else ("s", 1.0)
-    if base != "s":
-        allowed = ", ".join(name for name, (base, _) in UNITS.items() if base == "s")
-        refuse(f"{name}: the unit of the times is {unit!r}", allowed)
-    return size
-
-
-def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:
+def find_rate(items: Iterable[tuple[str, str]], decimal: str = "") -> float | None:
     """Return the sample rate, Hz, from names and values of a header; None if there is none.
 
     `decimal` is that of `read_number`.
@@ -139,12 +133,18 @@ def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float |
         name, titled = split_title(title)
         kind = "Hz" if plain(name) in RATE else "s" if plain(name) in STEP else ""
         number, own = (read_number(value, decimal) if kind else None) or (0.0, "")
-        base, size = kind, 1.0
-        if unit := own or titled:
-            base, size = UNITS.get(find_unit(unit), ("", 1.0))
+        base, size = size_of(own or titled or kind)
         if number * size > 0 and base == kind:
             return number * size if kind == "Hz" else 1 / (number * size)
     return None
+
+
+def find_word(items: Iterable[tuple[str, str]], words: frozenset[str]) -> str:
+    """Return the first value of a header whose name is one of some words, or an empty string."""
+    for title, value in items:
+        if plain(split_title(title)[0]) in words and value.strip():
+            return value.strip().strip("\"'")[:MAX_LENGTH]
+    return ""
 
 
 def neutral_value(name: str, unit: str = "") -> float | None:
@@ -156,39 +156,22 @@ def neutral_value(name: str, unit: str = "") -> float | None:
     alias = plain(split_title(name)[0])
     if alias in _OFFSET:
         return 0.0
-    if alias in _SENSITIVITY:
-        return None if unit else 1.0
-    return 1.0 if _FACTOR.fullmatch(alias) else None
+    is_factor = not unit if alias in _SENSITIVITY else _FACTOR.fullmatch(alias)
+    return 1.0 if is_factor else None
 
 
-def find_unapplied(items: Iterable[tuple[str, object]], unit: str) -> str:
+def find_unapplied(items: Iterable[tuple[str, str]], unit: str) -> str:
     """Return the first factor or offset in a header that changes values; `unit` is theirs."""
     for title, value in items:
         neutral = neutral_value(title, unit)
         if neutral is not None and (read_number(value) or (None, ""))[0] != neutral:
-            return f"{title[:MAX_LENGTH]} = {str(value)[:MAX_LENGTH]}"
+            return f"{title[:MAX_LENGTH]} = {value[:MAX_LENGTH]}"
     return ""
-
-
-def find_word(items: Iterable[tuple[str, object]], words: frozenset[str]) -> str:
-    """Return the first value of a header whose name is one of some words, or an empty string."""
-    for title, value in items:
-        if plain(split_title(title)[0]) in words and str(value).strip():
-            return str(value).strip().strip("\"'")[:MAX_LENGTH]
-    return ""
-
-
-def is_time(title: str) -> bool:
-    """Whether a title names a column of times."""
-    name, unit = split_title(title)
-    return plain(name) in TIME or UNITS.get(find_unit(unit), ("",))[0] == "s"
 
 
 def text_of(value: object) -> str:
     """Return an attribute as text: bytes, text, a number, or an array with one element."""
-    item: np.ndarray | object = value
-    if hasattr(item, "tolist"):
-        item = item.tolist()
+    item = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
     while isinstance(item, list | tuple) and len(item) == 1:
         item = item[0]
     if isinstance(item, bytes):
