@@ -42,7 +42,7 @@ from thud.recordings.config import Config, Instrument, Properties, ReportConfig,
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
 from thud.recordings.plate import Plate
-from thud.recordings.polarity import Extremes, check_peak, scan
+from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.recorder_filter import RecorderFilter
 from thud.recordings.signal import Signal
 from thud.recordings.times import uniform_grid
@@ -227,13 +227,13 @@ def test_quiet_is_found_at_either_end() -> None:
         np.append(force, np.full(15, 500.0)),
         np.append(np.full(15, 500.0), force[::-1]),
     ):
-        seen = scan(lambda start, stop, one=record: one[start:stop], record.size, "t.csv")
-        assert seen.background == 500
+        above, below = find_peaks(Signal.from_array(record, 8000.0))
+        assert (above, below) == (record.max() - 500, 500 - record.min())
 
 
 def test_polarity_is_doubted_from_half_as_much_again_on() -> None:
-    for low, expected in ((-1490.0, False), (-1510.0, True)):
-        told = check_peak(Extremes(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
+    for opposite, expected in ((1490.0, False), (1510.0, True)):
+        told = check_peak(1000.0, opposite, "t.csv")
         assert any(note.code == "polarity_doubtful" for note in told) == expected
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
+from collections import Counter
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
@@ -167,7 +169,7 @@ def unit_of_chain(calibration: str | Calibration) -> str:
     chain = calibration.chain if isinstance(calibration, Calibration) else calibration
     factors = read_chain(chain)
     others = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
-    ends = [unit for unit in others if _follow(unit, factors, None) is not None]
+    ends = [unit for unit in others if _product(unit, factors) is not None]
     return ends[0] if len(ends) == 1 else ""
 
 
@@ -182,10 +184,10 @@ def newtons_per_unit(
     """
     if unit == ASSUMED:
         return 1.0, "values assumed to be in N", None
-    base, multiple = UNITS.get(unit, ("", 1.0))
+    base, multiple = units.size_of(unit)
     if calibration is None:
         if base != "N":
-            description = {"FS": "full-scale values"}.get(unit, f"values in {unit}")
+            description = "full-scale values" if unit == "FS" else f"values in {unit}"
             refuse(
                 f"{label}: enter a calibration: the file holds {description}",
                 EXAMPLES,
@@ -198,8 +200,9 @@ def newtons_per_unit(
         return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
     stated = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
     factors = read_chain(stated.chain)
-    scale = Factor(counts, "counts", "FS") if counts else None
-    size = _follow(base, factors, scale)
+    size = _product(base, factors)
+    if size is None and counts:
+        size = _product(base, [*factors, Factor(counts, "counts", "FS")])
     if size is None:
         refuse(
             f"{label}: calibration {stated.chain!r} does not convert {unit} to N with all of "
@@ -207,20 +210,24 @@ def newtons_per_unit(
             EXAMPLES,
         )
     value = size * multiple
-    if not math.isfinite(value) or not SIZES[0] < abs(value) < SIZES[1]:
+    if not SIZES[0] < abs(value) < SIZES[1]:
         refuse(f"{label}: calibration {stated.chain!r} gives {value:g} N per {unit}", EXAMPLES)
     origin = f" ({stated.origin})" if stated.origin else ""
     return value, f"{stated.chain}: {value:.6g} N per {unit}{origin}", stated.uncertainty
 
 
-def _follow(unit: str, factors: list[Factor], scale: Factor | None) -> float | None:
-    """Return N per unit from all factors, each used once, and from full scale if necessary."""
-    if unit == "N" and not factors:
-        return 1.0
-    for i, (value, top, bottom) in enumerate(factors):
-        others = factors[:i] + factors[i + 1 :]
-        # This direction first: a gain, such as 10 V/V, divides.
-        for start, end, step in ((top, bottom, 1 / value), (bottom, top, value)):
-            if start == unit and (remainder := _follow(end, others, scale)) is not None:
-                return step * remainder
-    return _follow(unit, [*factors, scale], None) if scale else None
+def _product(unit: str, factors: list[Factor]) -> float | None:
+    """Return N per unit as the product of all factors or their inverses; None if none is."""
+    # Inverses first: a gain, such as 10 V/V, divides.
+    for powers in itertools.product((-1, 1), repeat=len(factors)):
+        dimension = Counter({"N": -1})
+        dimension[unit] += 1
+        for power, factor in zip(powers, factors, strict=True):
+            dimension[factor.top] += power
+            dimension[factor.bottom] -= power
+        if not any(dimension.values()):
+            sizes = (
+                f.value if p > 0 else 1 / f.value for p, f in zip(powers, factors, strict=True)
+            )
+            return math.prod(sizes)
+    return None

@@ -12,7 +12,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.recordings.config_values import SUM
-from thud.recordings.polarity import MIN_PEAK_RATIO, scan
+from thud.recordings.polarity import MIN_PEAK_RATIO, find_peaks
 from thud.recordings.signal import common_uncertainty
 
 if TYPE_CHECKING:
@@ -79,19 +79,18 @@ def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.fl
     return total
 
 
-def check_signs(cells: Sequence[Signal], peak: float) -> tuple[Note, ...]:
+def check_signs(cells: Sequence[Signal], peak: float) -> list[Note]:
     """Return a warning for each cell whose force is mostly negative; the peak is that of the sum.
 
     Raise InputError if all samples of a cell are equal.
     """
     notes = []
     for cell in cells:
-        extremes = scan(cell.read, cell.n_sample, cell.name)
-        up, down = extremes.peak(1.0), extremes.peak(-1.0)
+        up, down = find_peaks(cell)
         if down > max(MIN_PEAK_RATIO * up, MIN_OPPOSITE * peak):
             others: dict[str, float | str] = {"part": cell.name, "total": peak}
             notes.append(Note("cell_sign", value=-down, unit="N", others=others))
-    return tuple(notes)
+    return notes
 
 
 def check_cells(section: Section, forces: Sequence[NDArray[np.float64]]) -> list[Note]:

@@ -1,8 +1,7 @@
-"""Extremes of a signal: its polarity, and whether they are plausible forces of a source."""
+"""Sign and peak of a recorded force, and whether both are plausible."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +10,7 @@ from thud.base.checks import refuse
 from thud.base.note import Note
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
+    from thud.recordings.signal import Signal
 
 # Peak forces of heavy/soft sources, N: from drops of some centimeters to the tyre on stiff floors.
 PEAKS = (300.0, 15000.0)
@@ -27,79 +24,47 @@ MIN_PEAK_RATIO = 1.5
 # Number of samples per read, and approximate number from which the background level is estimated.
 BLOCK = 2**18
 SAMPLED = 2**16
-# Fraction of a file at either end from which the background level is estimated.
-EDGE = 0.01
 
 
-@dataclass(frozen=True)
-class Extremes:
-    """Minimum, maximum and background level of a signal, in its own unit."""
+def find_peaks(signal: Signal) -> tuple[float, float]:
+    """Return the largest deviations of a force above and below its background level, N.
 
-    low: float
-    high: float
-    background: float
-
-    def peak(self, scale: float) -> float:
-        """Return the positive peak above the background, N, if `scale` is N per value."""
-        high, low = self.high - self.background, self.low - self.background
-        return max(high * scale, low * scale) + 0.0  # never -0
-
-
-def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: str) -> Extremes:
-    """Return the extremes of a signal; raise InputError if values are not finite or all equal."""
+    Raise InputError if values are not finite or all equal.
+    """
     low, high = np.inf, -np.inf
-    stride = max(1, count // SAMPLED)
+    stride = max(1, signal.n_sample // SAMPLED)
     thinned = []
-    for start in range(0, count, BLOCK):
-        stop = min(count, start + BLOCK)
-        block = samples(start, stop)
-        if block.shape != (stop - start,):
-            refuse(f"{name}: is cut off at sample {start + block.size + 1}", "a complete file")
-        if not np.isfinite(block).all():
-            index = start + int(np.flatnonzero(~np.isfinite(block))[0])
-            refuse(f"{name}: sample {index + 1} is not finite", "real numbers")
+    for start in range(0, signal.n_sample, BLOCK):
+        block = signal.read(start, min(signal.n_sample, start + BLOCK))
         low, high = min(low, float(block.min())), max(high, float(block.max()))
         thinned.append(block[-start % stride :: stride].copy())
     if low == high:
-        refuse(f"{name}: all samples are {low:g}", "a recording of drops")
+        refuse(f"{signal.name}: all samples are {low:g}", "a recording of drops")
     thin = np.concatenate(thinned)
-    edge = max(1, int(EDGE * thin.size))
+    edge = max(1, thin.size // 100)
     # If the pulse fills the record, the background is at one end only; with many drops, overall.
     levels = [float(np.median(section)) for section in (thin[:edge], thin[-edge:], thin)]
     middle = low + (high - low) / 2
-    return Extremes(low, high, max(levels, key=lambda level: abs(level - middle)))
+    background = max(levels, key=lambda level: abs(level - middle))
+    return high - background, background - low
 
 
-def find_sign(extremes: Extremes, name: str) -> tuple[float, tuple[Note, ...]]:
-    """Return the sign that makes a compression positive, and notes, from extremes in N."""
-    up, down = extremes.peak(1.0), extremes.peak(-1.0)
-    if max(up, down) < MIN_PEAK_RATIO * min(up, down):
-        refuse(
-            f"{name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
-            "polarity = 'positive' or 'negative', the sign of a compression",
-            subject="polarity",
-        )
-    return (1.0, ()) if up > down else (-1.0, (Note("sign_changed", name, -down, unit="N"),))
-
-
-def check_peak(
-    extremes: Extremes, sign: float, name: str, *, assumed: bool = False
-) -> tuple[Note, ...]:
-    """Return warnings about a peak force from extremes in N; `sign` is that of a compression.
+def check_peak(peak: float, opposite: float, name: str, *, assumed: bool = False) -> list[Note]:
+    """Return warnings about a peak force, N, and that of the opposite sign.
 
     Raise InputError if the unit must be wrong, or may be if it is `assumed`.
     """
     low, high = PEAKS
-    peak, opposite_peak = extremes.peak(sign), extremes.peak(-sign)
-    peaks = f"the peaks are {-opposite_peak:.4g} N and {peak:.4g} N"
     allowed = f"{low:g} to {high:g} N for heavy/soft sources"
-    if not low <= peak <= high:
-        if assumed:
-            unknown = f"{name}: the values are without a unit and reach {peak:.4g}"
-            refuse(unknown, f"{allowed}, or unit")
-        if low <= opposite_peak <= high:
-            cause = "the polarity is wrong, or the force does not return from its peak"
-            refuse(f"{name}: {peaks}; {cause}", allowed)
+    if low <= peak <= high:
+        notes = []
+    elif assumed:
+        unknown = f"{name}: the values are without a unit and reach {peak:.4g}"
+        refuse(unknown, f"{allowed}, or unit")
+    elif low <= opposite <= high:
+        cause = "the polarity is wrong, or the force does not return from its peak"
+        refuse(f"{name}: the peaks are {-opposite:.4g} N and {peak:.4g} N; {cause}", allowed)
+    else:
         for unit, factor in WRONG_UNITS.items():
             if low <= peak * factor <= high:
                 refuse(
@@ -109,10 +74,8 @@ def check_peak(
                 )
         if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
             refuse(f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong", allowed)
-    notes: tuple[Note, ...] = ()
-    if not low <= peak <= high:
-        notes += (Note("peak_unusual", name, peak, low, high, "N"),)
-    if opposite_peak > MIN_PEAK_RATIO * peak:
-        others = {"opposite": -opposite_peak}
-        notes += (Note("polarity_doubtful", name, peak, unit="N", others=others),)
+        notes = [Note("peak_unusual", name, peak, low, high, "N")]
+    if opposite > MIN_PEAK_RATIO * peak:
+        others = {"opposite": -opposite}
+        notes.append(Note("polarity_doubtful", name, peak, unit="N", others=others))
     return notes

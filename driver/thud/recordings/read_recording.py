@@ -28,7 +28,7 @@ from thud.recordings.config import Config, read_config
 from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, cut_section, find_drops
 from thud.recordings.measured_drop import Drop, measure_drop
-from thud.recordings.polarity import check_peak, scan
+from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
@@ -194,8 +194,7 @@ def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
         elif item.path:
             yield item
         else:
-            extremes = scan(item.read, item.n_sample, item.name)
-            notes = check_peak(extremes, 1.0, item.name, assumed=False)
+            notes = check_peak(*find_peaks(item), item.name)
             yield replace(item, notes=(*item.notes, *notes))
 
 

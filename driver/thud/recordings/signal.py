@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -78,6 +78,11 @@ class Signal(Immutable):
             refuse(f"{name}: a value is not finite", "real numbers")
         return cls(name, "", float(sample_rate), len(values), partial(read_array, values.copy()))
 
+    def scaled(self, factor: float) -> Signal:
+        """Return the signal, and those of its load cells, times a factor."""
+        cells = tuple(cell.scaled(factor) for cell in self.cells)
+        return replace(self, samples=partial(read_scaled, self.samples, factor), cells=cells)
+
     @cached_property
     def checksum(self) -> str:
         """SHA-256 of the file, or of the values of an array, in hexadecimal digits."""
@@ -116,6 +121,14 @@ def common_uncertainty(values: Sequence[float | None]) -> float | None:
     """Return the largest of relative uncertainties of signals, None if one is not known."""
     known = [value for value in values if value is not None]
     return max(known) if len(known) == len(values) else None
+
+
+def read_scaled(
+    samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Return samples from start to before stop times a factor."""
+    values = samples(start, stop)
+    return values if factor == 1.0 else values * factor
 
 
 def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from thud.base.checks import refuse, shown
 from thud.base.errors import InputError
 from thud.base.note import Note
-from thud.recordings.channel import MIN_SAMPLES, Channel, regular_file, shown_path, shown_text
+from thud.base.units import size_of
+from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_path, shown_text
 from thud.recordings.config import Config
 from thud.recordings.config_values import SUM
 from thud.recordings.force_units import (
     ALLOWED,
     ASSUMED,
-    UNITS,
     Calibration,
     find_unit,
     newtons_per_unit,
@@ -23,16 +23,14 @@ from thud.recordings.force_units import (
 )
 from thud.recordings.formats import read_channels
 from thud.recordings.load_cells import HINT, add_signals, check_signs, refuse_directions
-from thud.recordings.polarity import POLARITIES, check_peak, find_sign, scan
-from thud.recordings.signal import Signal
+from thud.recordings.polarity import MIN_PEAK_RATIO, POLARITIES, check_peak, find_peaks
+from thud.recordings.signal import Signal, read_scaled
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
     from pathlib import Path
 
-    import numpy as np
-    from numpy.typing import NDArray
+    from thud.recordings.channel import Channel
 
     AnyCalibration = float | str | Calibration
 
@@ -79,9 +77,10 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
             f"channel{'s' * (len(chosen) > 1)}",
             "one calibration, or one for each entry of channels",
         )
+    several = len(channels) > 1
     try:
         signals = [
-            _in_newtons(file, channel, calibration, config, several=len(channels) > 1)
+            _in_newtons(file, channel, calibration, config, several=several)
             for channel, calibration in zip(chosen, calibrations, strict=True)
         ]
         if config.channels is not None:
@@ -93,9 +92,11 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
             raise
         message = f"{error}; if several channels are forces: {HINT}"
         raise InputError(message, error.note) from error
-    if any(calibrations) or (config.channel is None and config.channels is None):
+    is_chosen = config.channel is not None or config.channels is not None
+    if any(calibrations) or not is_chosen or not all(map(_is_force, chosen)):
         return signals
-    return [_with_missing(signals[0], chosen, channels)]
+    others = [entry for entry in channels if entry not in chosen and _is_force(entry)]
+    return [_with_missing(signals[0], file, others)]
 
 
 def _choose(channels: list[Channel], config: Config, name: str) -> list[Channel]:
@@ -107,9 +108,8 @@ def _choose(channels: list[Channel], config: Config, name: str) -> list[Channel]
     if isinstance(config.channels, tuple):
         cells = [choose_channels(channels, channel, name)[0] for channel in config.channels]
         if len({cell.number for cell in cells}) < len(cells):
-            refuse(
-                f"{name}: channels = {shown(config.channels)} names one channel twice", "each once"
-            )
+            text = f"channels = {shown(config.channels)} names one channel twice"
+            refuse(f"{name}: {text}", "each once")
         return cells
     cells = [channel for channel in channels if _is_force(channel)] or channels
     if len(cells) < 2 or len({cell.unit for cell in cells if not _is_force(cell)}) > 1:  # noqa: PLR2004
@@ -122,7 +122,7 @@ def _choose(channels: list[Channel], config: Config, name: str) -> list[Channel]
 
 
 def _is_force(channel: Channel) -> bool:
-    return UNITS.get(find_unit(channel.unit), ("",))[0] == "N"
+    return size_of(channel.unit)[0] == "N"
 
 
 def channel_choices(channels: list[Channel]) -> str:
@@ -180,7 +180,7 @@ def _in_newtons(
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     rate, notes = _rate(channel, config.sample_rate, name)
     unit, unit_notes = _unit(channel, config.unit, calibration, name)
-    notes += unit_notes
+    notes = [replace(note, subject=name) for note in (*channel.notes, *notes, *unit_notes)]
     if channel.unapplied:
         unapplied = shown_text(channel.unapplied)
         if calibration is None:
@@ -190,7 +190,7 @@ def _in_newtons(
                 "calibration = N per stored value, such as 1 if the values are in N",
                 subject="calibration",
             )
-        notes += (Note("factor_not_applied", name, others={"factor": unapplied}),)
+        notes.append(Note("factor_not_applied", name, others={"factor": unapplied}))
     scale, description, uncertainty = newtons_per_unit(unit, calibration, channel.counts, name)
     # Integers are read as fractions of full scale.
     if channel.counts and unit == "counts":
@@ -199,24 +199,24 @@ def _in_newtons(
         # It refers to the recorded values, before the calibration.
         scale = POLARITIES[config.polarity] * abs(scale)
         if scale < 0:
-            notes += (Note("sign_stated", name, others={"polarity": config.polarity}),)
+            notes.append(Note("sign_stated", name, others={"polarity": config.polarity}))
     return Signal(
         name=name,
         path=str(file),
         sample_rate=rate,
         n_sample=channel.n_sample,
-        samples=partial(_read_scaled, channel.samples, scale),
+        samples=partial(read_scaled, channel.samples, scale),
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
         calibration=description,
         calibration_uncertainty=uncertainty,
-        notes=(*(replace(note, subject=name) for note in channel.notes), *notes),
+        notes=tuple(notes),
     )
 
 
-def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, tuple[Note, ...]]:
+def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, list[Note]]:
     """Return the sample rate, Hz, stated or of the file."""
-    rate = channel.sample_rate if stated is None else float(stated)
+    rate = channel.sample_rate if stated is None else stated
     if rate is None:
         coarse = [note for note in channel.notes if note.code == "times_coarse"]
         reason = "".join(f" ({note})" for note in coarse)
@@ -228,14 +228,14 @@ def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, tup
     if not RATES[0] <= rate <= RATES[1]:
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:
-        return rate, ()
+        return rate, []
     of_file = {"of_file": channel.sample_rate or 0.0}
-    return rate, (Note("rate_replaced", name, rate, unit="Hz", others=of_file),)
+    return rate, [Note("rate_replaced", name, rate, unit="Hz", others=of_file)]
 
 
 def _unit(
     channel: Channel, stated: str | None, calibration: AnyCalibration | None, name: str
-) -> tuple[str, tuple[Note, ...]]:
+) -> tuple[str, list[Note]]:
     """Return the unit of a channel: stated, of the file, or from which the calibration leads."""
     of_file = find_unit(channel.unit)
     if stated is not None:
@@ -244,23 +244,22 @@ def _unit(
                 f"{name}: the samples are integers, not values in {stated}",
                 "calibration per full scale, such as '10 V/FS, 4 mV/N' or '5000 N/FS'",
             )
-        if of_file in {"", "FS", stated}:
-            return stated, ()
-        return stated, (Note("unit_replaced", name, unit=stated, others={"of_file": of_file}),)
+        replaced = Note("unit_replaced", name, unit=stated, others={"of_file": of_file})
+        return stated, [] if of_file in {"", "FS", stated} else [replaced]
     if of_file:
-        return of_file, ()
+        return of_file, []
     if channel.unit:
         refuse(
             f"{name}: the values are in {shown_text(channel.unit)!r}", f"unit = one of {ALLOWED}"
         )
     if calibration is None:
-        return ASSUMED, (Note("unit_assumed", name, unit="N"),)
+        return ASSUMED, [Note("unit_assumed", name, unit="N")]
     if not isinstance(calibration, str | Calibration):
-        return "", ()
+        return "", []
     unit = unit_of_chain(calibration)
     if not unit or (unit == "FS" and not channel.may_be_fractions):
         refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
-    return unit, (Note("unit_of_calibration", name, unit=unit),)
+    return unit, [Note("unit_of_calibration", name, unit=unit)]
 
 
 def _oriented(signal: Signal, polarity: str | None) -> Signal:
@@ -268,48 +267,35 @@ def _oriented(signal: Signal, polarity: str | None) -> Signal:
 
     A single load cell may be lifted, so that the sum decides on the sign.
     """
-    extremes = scan(signal.samples, signal.n_sample, signal.name)
-    sign, notes = (1.0, ()) if polarity else find_sign(extremes, signal.name)
-    if sign < 0:
-        signal = _negated(signal)
+    notes: list[Note] = []
+    up, down = find_peaks(signal)
+    if not polarity and max(up, down) < MIN_PEAK_RATIO * min(up, down):
+        refuse(
+            f"{signal.name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
+            "polarity = 'positive' or 'negative', the sign of a compression",
+            subject="polarity",
+        )
+    if not polarity and down > up:
+        notes.append(Note("sign_changed", signal.name, -down, unit="N"))
+        signal, up, down = signal.scaled(-1.0), down, up
     is_assumed = any(note.code == "unit_assumed" for note in signal.notes)
-    notes += check_peak(extremes, sign, signal.name, assumed=is_assumed)
-    if signal.cells:
-        notes += check_signs(signal.cells, extremes.peak(sign))
+    notes += check_peak(up, down, signal.name, assumed=is_assumed)
+    notes += check_signs(signal.cells, up)
     return replace(signal, notes=(*signal.notes, *notes))
 
 
-def _negated(signal: Signal) -> Signal:
-    return replace(
-        signal,
-        samples=partial(_read_scaled, signal.samples, -1.0),
-        cells=tuple(map(_negated, signal.cells)),
-    )
-
-
-def _with_missing(signal: Signal, chosen: list[Channel], channels: list[Channel]) -> Signal:
-    """Return a signal with a warning if channels that were not chosen hold more of the force."""
-    if not all(map(_is_force, chosen)):
-        return signal
-    own = scan(signal.samples, signal.n_sample, signal.name).peak(1.0)
-    peaks = {}
-    for entry in channels:
-        if entry not in chosen and _is_force(entry):
-            scale = UNITS[find_unit(entry.unit)][1]
-            try:
-                extremes = scan(entry.samples, entry.n_sample, signal.name)
-            except InputError:  # it holds no signal
-                continue
-            peaks[entry.title] = max(extremes.peak(scale), extremes.peak(-scale))
+def _with_missing(signal: Signal, file: Path, others: list[Channel]) -> Signal:
+    """Return a signal with a warning if channels of force that were not chosen hold more of it."""
+    own, peaks = find_peaks(signal)[0], {}
+    for entry in others:
+        try:
+            peaks[entry.title] = max(
+                find_peaks(_in_newtons(file, entry, None, Config(), several=True))
+            )
+        except InputError:  # it holds no signal
+            continue
     large = [title for title, peak in peaks.items() if peak > MIN_MISSING * own]
     if not large or abs(sum(peaks.values()) / own - 1) < MAX_SUM_DEVIATION:
         return signal
     note = Note("forces_left_out", signal.name, others={"channels": ", ".join(large)})
     return replace(signal, notes=(*signal.notes, note))
-
-
-def _read_scaled(
-    samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
-) -> NDArray[np.float64]:
-    values = samples(start, stop)
-    return values if factor == 1.0 else values * factor

@@ -375,14 +375,20 @@ def _read_header(above: list[str], layout: _Layout) -> tuple[Pairs, Pairs, bool]
     for title, value in header:
         for i, unit in _header_units(title, value, times, layout):
             stated[i].append(unit)
-    columns = []
-    for i, (name, _) in enumerate(names):
-        known = {find_unit(unit) or unit: unit for unit in stated[i] if unit not in {"", "-", "--"}}
-        if len(known) > 1:
-            text = " and ".join(map(shown_text, known.values()))
-            refuse(f"{layout.name}: column {i + 1}: its unit is stated as {text}", "one unit")
-        columns.append((name, next(iter(known.values()), name if name in UNITS else "")))
+    columns = [
+        (name, _one_unit(name, stated[i], f"{layout.name}: column {i + 1}"))
+        for i, (name, _) in enumerate(names)
+    ]
     return [(name, re.split(r"[\t;]", value)[0]) for name, value in header], columns, bool(rows)
+
+
+def _one_unit(name: str, stated: list[str], label: str) -> str:
+    """Return the unit of a column, of which several statements may hold the same."""
+    known = {find_unit(unit) or unit: unit for unit in stated if unit not in {"", "-", "--"}}
+    if len(known) > 1:
+        text = " and ".join(map(shown_text, known.values()))
+        refuse(f"{label}: its unit is stated as {text}", "one unit")
+    return next(iter(known.values()), name if name in UNITS else "")
 
 
 def _known_pair(text: str) -> tuple[str, str] | None:
