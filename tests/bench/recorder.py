@@ -106,8 +106,7 @@ CONCERNS = (
 REFUSALS = {
     r"is too close to the bands": "a stated resonance below 1001 Hz",
     r"is clipped": "the force is clipped",
-    r"the signal (starts|ends) within the pulse": "within the pulse or less than 1 ms from it",
-    r"two impacts": "two impacts overlap",
+    r"the signal (begins|ends) within the pulse": "within the pulse or less than 1 ms from it",
     r"dropouts of": "dropouts and spikes of more than 1 ms",
     r"is held for": "held over touch or release",
     r"samples each are equal": "samples that are equal in groups",

@@ -169,7 +169,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
 
 def cut_drops(signal: Signal) -> list[Section]:
     """Return the sections of the drops in a signal."""
-    return [cut_section(signal, pulse) for pulse in find_drops(signal).drops]
+    return [cut_section(signal, pulse) for pulse in find_drops(signal)[0]]
 
 
 def with_force(drop: Drop, force: np.ndarray, white: float | None = None) -> Drop:

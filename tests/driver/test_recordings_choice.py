@@ -11,11 +11,13 @@ from conftest import codes, naming, noted
 import thud
 from thud.recordings.config import Config
 from thud.recordings.config_values import parse_numbers
-from thud.recordings.drops import Search, find_drops
+from thud.recordings.drops import Pulse, find_drops
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from thud.base.note import Note
 
 RATE = 8_000.0
 
@@ -45,7 +47,7 @@ def footstep(time: np.ndarray, begin: float, weight: float = 800.0) -> np.ndarra
     return np.asarray(roll + half_sine(time, begin, 0.6 * weight, 0.025))
 
 
-def disturbed(kind: str) -> Search:
+def disturbed(kind: str) -> tuple[list[Pulse], list[Note]]:
     """Return the search in a record with a disturbance before the drops."""
     time, force = three_drops()
     if kind == "footsteps":
@@ -68,16 +70,15 @@ def disturbed(kind: str) -> Search:
     "kind", ["none", "footsteps", "handling", "man steps off", "taps", "tap between bounces"]
 )
 def test_only_drops_are_drops(kind: str) -> None:
-    search = disturbed(kind)
-    assert [len(drop.bounces) for drop in search.drops] == [2, 2, 2]
-    for drop, begin in zip(search.drops, (5.0, 8.5, 12.0), strict=True):
+    drops, ignored = disturbed(kind)
+    assert [len(drop.bounces) for drop in drops] == [2, 2, 2]
+    for drop, begin in zip(drops, (5.0, 8.5, 12.0), strict=True):
         touch = drop.contact[0] / RATE
         assert touch == pytest.approx(begin, abs=0.004)
         landing = drop.bounces[0].contact[0] / RATE
         assert landing == pytest.approx(begin + 0.72, abs=0.004)
     if kind in {"taps", "tap between bounces"}:
-        assert {*codes(search.ignored)} == {"pulse_ignored"}
-        assert search.ignored
+        assert {*codes(ignored)} == {"pulse_ignored"}
 
 
 def measured(**choice: Any) -> thud.Recording:  # noqa: ANN401
@@ -139,7 +140,7 @@ def test_bounce_is_no_drop_of_a_section_that_begins_before_it() -> None:
 def test_spike_of_one_sample_hides_no_drop(instant: float) -> None:
     _, force = three_drops()
     force[int(instant * RATE)] += 1e6
-    found = find_drops(Signal.from_array(force, RATE, "record")).drops
+    found, _ = find_drops(Signal.from_array(force, RATE, "record"))
     assert [len(drop.bounces) for drop in found] == [2, 2, 2]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import codes, noted
 from scipy import stats
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 from synthetic import cut_drops, half_sine, make_drop
 
 from thud.impact.contact_time import contact_span
@@ -364,28 +364,32 @@ def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
 
 
 @pytest.mark.parametrize("ahead", ["pulse", "step"])
-def test_peak_of_a_pulse_is_above_the_line_between_the_quiet_beside_it(ahead: str) -> None:
+def test_peak_of_a_pulse_is_above_the_higher_background_beside_it(ahead: str) -> None:
     cells = np.zeros(300)
-    rise = np.arange(24)
-    pulse = np.sin(np.pi * rise / 24) ** 2 * (1 + 0.3 * np.cos(np.pi * rise / 24))
-    cells[100:124] += 1000 * pulse
-    # The quiet behind lies 60 N higher; what is before another pulse, or 20 ms away, is not beside.
+    phase = np.arange(24) / 24
+    cells[100:124] += 1000 * np.sin(np.pi * phase) ** 2 * (1 + 0.3 * np.cos(np.pi * phase))
     cells += np.interp(np.arange(300), [105, 117], [0, 60])
     cells[:70] -= 50
     if ahead == "pulse":
         cells[60:80] += 800 * np.sin(np.pi * np.arange(20) / 20)
-    *_, found = drops._pulses(cells, 0, 1000.0)  # noqa: SLF001
-    smooth = uniform_filter1d(cells, 3)
-    top = np.argmax(smooth)
-    half = np.flatnonzero(smooth > smooth[top] / 2)
-    half = half[half > 95]
-    line = 60 * (top - half[0]) / (half[-1] - half[0])
-    assert found.peak == pytest.approx(smooth[top] - line, abs=0.5)
+    *_, found = drops._find_pulses(cells, 0, 300, 1000.0)  # noqa: SLF001
+    smooth = uniform_filter1d(median_filter(cells, 3), 3) - 60
+    assert found.peak == pytest.approx(smooth.max(), abs=0.5)
     # Its edges lie two cells outside of a fifth of it, and cells are samples here.
-    local = smooth - 60 * np.clip((np.arange(300) - half[0]) / (half[-1] - half[0]), 0, 1)
-    above = np.flatnonzero(local > found.peak / 5)
-    above = above[above > 95]
-    assert (found.start, found.stop) == (above[0] - 2, above[-1] + 3)
+    above = 95 + np.flatnonzero(smooth[95:] > found.peak / 5)
+    assert found.contact == (above[0] - 2, above[-1] + 3)
+    before = 0 if ahead == "step" else 78
+    assert found.section == (pytest.approx(before, abs=6), 300)
+
+
+@pytest.mark.parametrize(
+    ("valley", "after", "expected"), [(0.1, 0.0, 2), (0.4, 0.0, 1), (1.0, 0.2, 1), (1.0, 0.5, 0)]
+)
+def test_pulses_return_to_thirty_percent(valley: float, after: float, expected: int) -> None:
+    cells = np.zeros(1000)
+    instants, forces = [500, 510, 514, 518, 522, 532], [0, 1, valley, valley, 1, after]
+    cells += 1000 * np.interp(np.arange(1000), instants, forces)
+    assert len(drops._find_pulses(cells, 0, 1000, 1000.0)) == expected  # noqa: SLF001
 
 
 def test_pulses_rise_above_six_deviations_of_the_cells() -> None:
@@ -397,4 +401,4 @@ def test_pulses_rise_above_six_deviations_of_the_cells() -> None:
         cells = rng.normal(scale=10, size=4000)
         cells[1000:1020] += 1000 * pulse
         cells[2000:2020] += height * level * pulse
-        assert len(drops._pulses(cells, 0, 1000.0)) == expected  # noqa: SLF001
+        assert len(drops._find_pulses(cells, 0, 4000, 1000.0)) == expected  # noqa: SLF001

@@ -660,7 +660,7 @@ def test_search_of_many_drops_is_small() -> None:
     # A quarter of an hour, 350 MB as it is read: memory does not grow with the number of drops.
     hour = Hour(part.astype(np.float32), 125 * len(part))
     tracemalloc.start()
-    found = find_drops(hour).drops  # type: ignore[arg-type]
+    found, _ = find_drops(hour)  # type: ignore[arg-type]
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(found) == 125

@@ -1,87 +1,74 @@
-"""Search of drops in a signal, and assignment of bounces to them."""
+"""Search of drops in a signal, assignment of bounces to them, and choice of those to measure."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.signal import find_peaks, peak_widths
 from tqdm import tqdm
 
 from thud.base.checks import refuse
 from thud.base.note import Note
+from thud.recordings.config_values import parse_numbers
 from thud.recordings.differences import robust_deviation
 from thud.recordings.quantization import Quantization
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Sequence
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.recordings.config import Config
     from thud.recordings.response import Chain
     from thud.recordings.signal import Signal
 
 # Pulses are searched in means over cells, each CELL seconds long; BLOCK cells are read at a time.
 CELL = 1e-3
 BLOCK = 4_096
-# Number of cells in a segment; the baseline is interpolated between the medians of the segments.
+# Number of cells in a segment, whose median is the baseline, and of cells in a contact at most.
 SEGMENT = 1_000
+CONTACT = 25
 # A pulse must rise above RISE standard deviations of the noise or RISE_FRACTION of the maximum,
-# whichever is less; the maximum must exceed MIN_DEVIATIONS standard deviations of the noise.
+# whichever is less, and above MIN_HEIGHT times the maximum, which must exceed MIN_DEVIATIONS
+# standard deviations of the noise.
 RISE = 6.0
 RISE_FRACTION = 0.4
+MIN_HEIGHT = 0.03
 MIN_DEVIATIONS = 4.0
-# A pulse starts and ends MARGIN cells beyond the points where it falls below FOOT times its peak.
+# The height of a pulse is that above the higher one of the lowest forces before and after it,
+# within WINDOW cells in all. It is at least MIN_PROMINENCE times that above the lower one, and that
+# above the baseline: else the force does not return, or stays above 30 % between two peaks.
+WINDOW = 400
+MIN_PROMINENCE = 0.7
+# A pulse starts and ends MARGIN cells beyond the points where it falls below FOOT times its height.
 FOOT = 0.2
 MARGIN = 2
-# Background next to a pulse, in cells from the points at half its height. DISTANCE: the nearest
-# distance. LENGTH: the farthest distance on the left, the length on the right.
-DISTANCE = 6
-LENGTH = 20
-# A cell is a spike if it is higher than its neighbors by this factor: contacts are longer.
-SPIKE = 3.0
-# Maximum gap within one pulse, in cells.
-MAX_GAP = 4
-# Minimum height of a pulse as a fraction of the highest one of a signal.
-MIN_HEIGHT = 0.03
-# Duration of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
-DURATIONS = (0.003, 0.06)
+# Maximum duration above half the height, cells: contacts of balls and tyres last 12 to 40 ms.
+MAX_DURATION = 60
 # The search begins this long before a section, s, so that a bounce in it is not taken for a drop.
 LOOK_BACK = 1.5
 # A drop is measured only if it is chosen, as it may be a tap or a knock, if its peak is below this
 # fraction of that of the highest.
 MIN_DROP = 0.25
 # A pulse is neither a drop nor its bounce if its peak is below this fraction of that of the contact
-# from which it would bounce, or of the highest (a drop from a fortieth of the height); or if the
-# medians of the forces before and after it, over STEP cells each, differ by this fraction of it.
+# from which it would bounce, or of the highest (a drop from a fortieth of the height).
 MIN_BOUNCE = 0.15
-MAX_CHANGE = 0.3
-STEP = 100
-# Two peaks are two impacts if the force between them falls below this fraction of the lower peak.
-VALLEY = 0.3
 # A pulse whose peak reaches this fraction of the previous peak is a new drop. The limits of the
 # standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
 NEW_DROP = 0.93
-# Longest and shortest flight, s: 2 v0/g for drop heights of 2 m and of 0.5 mm.
+# Longest flight, s: 2 v0/g for a drop height of 2 m.
 MAX_FLIGHT = 1.3
-MIN_FLIGHT = 0.02
-# Length of a window before and after a pulse, s.
+# Length of the signal before and after a pulse, and distance to the pulses next to it, s.
 BEFORE = 0.25
 AFTER = 0.5
+GUARD = 2e-3
 # Minimum rate, Hz: twice the upper edge of the octave of 500 Hz, with a margin for a filter.
 MIN_RATE = 2_000.0
-
-
-@dataclass(frozen=True)
-class SecondPeak:
-    """A second peak in a pulse, N, the force between both, N, and the time of the first one, s."""
-
-    peak: float
-    valley: float
-    time: float
 
 
 @dataclass(frozen=True)
@@ -90,27 +77,27 @@ class Pulse:
 
     Attributes
     ----------
-    name : str
-        Name of the drop, as ``"file.wav, drop 3"``.
     section : tuple of int
         First and stop index of the pulse and its background, up to the pulses next to it.
     contact : tuple of int
         First and stop index of the contact, accurate to about 1 ms.
+    peak : float
+        Height above the background, N.
+    name : str
+        Name of the drop, as ``"file.wav, drop 3"``.
     bounces : tuple of Pulse
         Bounces after the drop.
-    second_peak : SecondPeak or None
-        A second impact in the pulse.
     left_out : Note or None
         Why the drop is measured only if it is chosen.
     notes : tuple of Note
         Possible faults of the pulse as a whole.
     """
 
-    name: str
     section: tuple[int, int]
     contact: tuple[int, int]
+    peak: float
+    name: str = ""
     bounces: tuple[Pulse, ...] = ()
-    second_peak: SecondPeak | None = None
     left_out: Note | None = None
     notes: tuple[Note, ...] = ()
 
@@ -124,8 +111,8 @@ class Section:
 
     Attributes
     ----------
-    name, second_peak
-        As in `Pulse`.
+    name : str
+        Name of the drop.
     force : ndarray, shape (n_sample,)
         Force, N.
     sample_rate : float
@@ -155,7 +142,6 @@ class Section:
     contact: tuple[int, int]
     bounces: tuple[Section, ...] = ()
     cells: tuple[Section, ...] = ()
-    second_peak: SecondPeak | None = None
     full_scale: float | None = None
     quantization: Quantization = field(default_factory=Quantization)
     chain: Chain | None = None
@@ -173,276 +159,194 @@ class Section:
         return draw_section(self)
 
 
-@dataclass
-class _Candidate:
-    """A pulse: first and stop index in the signal, its height, N, and whether the force stays."""
-
-    start: int
-    stop: int
-    peak: float
-    is_step: bool
-    second_peak: SecondPeak | None
-    bounces: list[_Candidate] = field(default_factory=list)
-    notes: list[Note] = field(default_factory=list)
-    left_out: Note | None = None
-
-
-@dataclass(frozen=True)
-class Search:
-    """The drops in a signal, in order, and notes on the pulses that are no drops."""
-
-    drops: tuple[Pulse, ...]
-    ignored: tuple[Note, ...]
-
-
 def find_drops(
     signal: Signal, begin: float = 0.0, end: float = math.inf, *, progress: bool = False
-) -> Search:
-    """Return the drops in a signal that begin between two times, s.
+) -> tuple[list[Pulse], list[Note]]:
+    """Return the drops in a signal that begin between two times, s, and notes on other pulses.
 
     The signal is read in blocks, of which the means over cells are kept. Raise InputError if there
     is no impact, the section is empty, or the rate is too low.
     """
     rate, name = signal.sample_rate, signal.name
     section = min(int(begin * rate), signal.n_sample)
-    first_sample = max(0, section - round(LOOK_BACK * rate))
-    stop_sample = int(min(end * rate, signal.n_sample))
-    if not section < stop_sample:
+    first, stop = max(0, section - round(LOOK_BACK * rate)), int(min(end * rate, signal.n_sample))
+    if not section < stop:
         refuse(
             f"{name}: there are no samples from {begin:g} to {end:g} s",
             f"times from 0 to {signal.n_sample / rate:.4g} s, the first one below the second",
         )
     if not rate >= MIN_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
-    cells = _cell_means(signal, first_sample, stop_sample, progress=progress)
-    pulses = _pulses(cells, first_sample, rate)
-    highest = max((p.peak for p in pulses), default=0.0)
-    pulses = [pulse for pulse in pulses if pulse.peak > MIN_HEIGHT * highest]
+    cells = _cell_means(signal, first, stop, progress=progress)
+    pulses = _find_pulses(cells, first, stop, rate)
     drops, ignored = _assign_bounces(pulses, section, rate)
-    before = [pulse for drop in drops if drop.start < section for pulse in (drop, *drop.bounces)]
-    ignored += [
-        Note("bounce_ignored", others={"time": pulse.start / rate})
-        for pulse in before
-        if section <= pulse.start
-    ]
-    drops = [drop for drop in drops if section <= drop.start]
     if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
-    located = tuple(_locate(name, rate, drops, pulses, (section, stop_sample)))
-    return Search(located, tuple(ignored))
+    names = [f"{name}, drop {k}" if len(drops) > 1 else name for k in range(1, len(drops) + 1)]
+    return [replace(drop, name=own) for drop, own in zip(drops, names, strict=True)], ignored
 
 
 def cut_section(signal: Signal, pulse: Pulse) -> Section:
     """Return the samples around a drop and around its bounces."""
     first, stop = pulse.section
     contact = pulse.contact[0] - first, pulse.contact[1] - first
-    parts = [
-        Section(part.name, part.read(first, stop), signal.sample_rate, first, contact,
-                full_scale=part.full_scale)
-        for part in signal.cells or (signal,)
-    ]  # fmt: skip
-    force = parts[0].force
-    for part in parts[1:]:
-        force = force + part.force
+    rate = signal.sample_rate
+    cells = tuple(
+        Section(cell.name, cell.read(first, stop), rate, first, contact, full_scale=cell.full_scale)
+        for cell in signal.cells
+    )
     return Section(
         pulse.name,
-        force,
-        signal.sample_rate,
+        np.sum([cell.force for cell in cells], axis=0) if cells else signal.read(first, stop),
+        rate,
         first,
         contact,
-        tuple(cut_section(signal, bounce) for bounce in pulse.bounces),
-        tuple(parts) if signal.cells else (),
-        pulse.second_peak,
+        tuple(
+            cut_section(signal, replace(bounce, name=f"{pulse.name}, bounce {k}"))
+            for k, bounce in enumerate(pulse.bounces, start=1)
+        ),
+        cells,
         signal.full_scale,
         notes=pulse.notes,
     )
 
 
-def _cell_means(
-    signal: Signal, first_sample: int, stop_sample: int, *, progress: bool
-) -> NDArray[np.float64]:
+def choose(
+    drops: Sequence[Pulse], first: int, rate: float, config: Config
+) -> tuple[list[Pulse], list[Note]]:
+    """Return the drops to be measured, and notes on those that are left out.
+
+    The drops of a signal of a sample rate, Hz, have the numbers from `first` on. Without chosen
+    numbers all are measured but those that say why not.
+    """
+    chosen: list[Pulse] = []
+    notes: list[Note] = []
+    for number, drop in enumerate(drops, start=first):
+        reason = next((why for key, why in config.leave_out.items() if _holds(key, number)), None)
+        if reason is not None:
+            note = Note("drop_left_out", others={"reason": reason})
+        elif config.drops and not _holds(config.drops, number):
+            note = Note("drop_not_chosen", others={"chosen": config.drops})
+        elif drop.left_out and not config.drops:
+            note = drop.left_out
+        else:
+            chosen.append(drop)
+            continue
+        others = {**note.others, "time": drop.contact[0] / rate}
+        notes.append(replace(note, value=number, others=others))
+    return chosen, notes
+
+
+def _holds(text: str, number: int) -> bool:
+    return any(number in numbers for numbers in parse_numbers(text, "drops"))
+
+
+def require_chosen(count: int, chosen: int, config: Config) -> None:
+    """Raise InputError if a number exceeds that of the drops, or none of the drops is chosen."""
+    for key, text in (("leave_out", ",".join(config.leave_out)), ("drops", config.drops)):
+        highest = max(numbers.stop - 1 for numbers in parse_numbers(text, key)) if text else 0
+        if highest > count:
+            refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}", subject=key)
+    if not chosen:
+        refuse("every drop is left out", "at least one drop")
+
+
+def _cell_means(signal: Signal, first: int, stop: int, *, progress: bool) -> NDArray[np.float64]:
     """Return the means of a signal over cells, N; the last cell may be shorter."""
     width = max(1, round(signal.sample_rate * CELL))
-    starts = range(first_sample, stop_sample, BLOCK * width)
+    starts = range(first, stop, BLOCK * width)
     means = []
     for start in tqdm(starts, unit="block", desc=signal.name, disable=not progress, leave=False):
-        force = signal.read(start, min(start + BLOCK * width, stop_sample))
-        whole = len(force) // width * width
-        means.append(force[:whole].reshape(-1, width).mean(axis=1))
-        if whole < len(force):
-            means.append(force[whole:].mean(keepdims=True))
+        force = signal.read(start, min(start + BLOCK * width, stop))
+        bounds = np.arange(0, len(force), width)
+        means.append(np.add.reduceat(force, bounds) / np.diff(bounds, append=len(force)))
     return np.concatenate(means)
 
 
 def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the force between the pulses, N, from medians, or a low quantile of few cells."""
-    n = len(cells)
-    if n < 2 * SEGMENT:
-        # The quantile excludes a contact of up to 25 cells.
-        fraction = np.clip(0.5 * (n - 25) / n, 0.08, 0.5)
-        return np.full(n, np.quantile(cells, fraction))
-    count = n // SEGMENT
-    segments = cells[: count * SEGMENT].reshape(count, SEGMENT)
-    middle = (np.arange(count) + 0.5) * SEGMENT
-    return np.interp(np.arange(n), middle, np.median(segments, axis=1))
+    count = max(len(cells) // SEGMENT, 1)
+    size = len(cells) // count
+    # Half of the cells outside a contact.
+    fraction = max(0.5 * (size - CONTACT) / size, 0.08) if count == 1 else 0.5
+    segments = cells[: count * size].reshape(count, size)
+    middle = (np.arange(count) + 0.5) * size
+    return np.interp(np.arange(len(cells)), middle, np.quantile(segments, fraction, axis=1))
 
 
-def _without_spikes(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return cells of which single ones that are far above their neighbors have the median."""
-    middle = np.median(cells)
-    neighbors = median_filter(cells, 3, mode="nearest")
-    height = cells - middle
-    is_spike = (height > SPIKE * (neighbors - middle)) & (height > height.max() / 2)
-    return np.where(is_spike, neighbors, cells)
-
-
-def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Candidate]:
-    """Return the pulses in cells; `first` is the first sample of the cells."""
-    width = max(1, round(rate * CELL))
-    level = uniform_filter1d(_without_spikes(cells), 3, mode="nearest") - _baseline(cells)
+def _find_pulses(cells: NDArray[np.float64], first: int, stop: int, rate: float) -> list[Pulse]:
+    """Return the pulses in the cells of a signal from a first to before a stop sample."""
+    # The median removes spikes, which are shorter than contacts.
+    level = uniform_filter1d(median_filter(cells, 3, mode="nearest"), 3, mode="nearest")
+    level -= _baseline(cells)
     below = -level[level < 0]
     deviation = robust_deviation(below) if below.size else 0.0
-    highest = float(level.max(initial=0.0))
-    threshold = min(RISE * deviation, RISE_FRACTION * highest)
+    highest = float(level.max())
     if highest <= max(MIN_DEVIATIONS * deviation, 1e-9):
         return []
-    above = np.flatnonzero(level > max(threshold, 0.01 * highest))
-    groups = np.split(above, np.flatnonzero(np.diff(above) > MAX_GAP) + 1)
-    pulses: list[_Candidate] = []
-    for group in groups:
-        top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
-        earliest = -(-(pulses[-1].stop - first) // width) if pulses else 0
-        if top < earliest:
-            continue
-        low, high = (_find_edge(level, top, step, level[top] / 2) for step in (-1, 1))
-        # A maximum on the flank of a higher pulse is noise.
-        if level[low : high + 1].max() > level[top]:
-            continue
-        if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
-            continue
-        # Slow noise moves the background next to the pulse away from the baseline.
-        left, right = (
-            level[max(earliest, low - LENGTH) : low - DISTANCE],
-            level[high + DISTANCE :][:LENGTH],
+    least = max(min(RISE * deviation, RISE_FRACTION * highest), MIN_HEIGHT * highest)
+    # The first and the last cell may be peaks, and the first of equal ones is the peak.
+    level -= 1e-12 * highest * np.arange(len(level))
+    level = np.pad(level, 1)
+    tops, found = find_peaks(level, height=least, prominence=least, wlen=WINDOW)
+    heights = found["prominences"]
+    bases = heights, found["left_bases"], found["right_bases"]
+    duration, *_ = peak_widths(level, tops, 0.5, bases)
+    *_, low, high = peak_widths(level, tops, 1 - FOOT, bases)
+    # A force that stays at a step has another base on either side.
+    rise = level[tops] - np.minimum(0.0, level[np.array(bases[1:])].min(axis=0))
+    is_pulse = (heights > MIN_PROMINENCE * rise) & (duration < MAX_DURATION)
+    # The first cell of the level is before the signal.
+    width, guard = max(1, round(rate * CELL)), round(GUARD * rate)
+    starts = np.maximum(np.ceil(low[is_pulse]) - 1 - MARGIN, 0).astype(int) * width + first
+    stops = (np.floor(high[is_pulse]) + MARGIN).astype(int) * width + first
+    stops = np.minimum(stops, stop)
+    # A section ends before the pulses next to it.
+    begins = np.maximum(starts - round(BEFORE * rate), np.append(first, stops + guard)[:-1])
+    ends = np.minimum(stops + round(AFTER * rate), np.append(starts - guard, stop)[1:])
+    bounds = np.minimum(begins, starts), np.maximum(ends, stops), starts, stops
+    return [
+        Pulse((begin, end), (start, after), peak)
+        for peak, begin, end, start, after in zip(
+            *(values.tolist() for values in (heights[is_pulse], *bounds)), strict=True
         )
-        backgrounds = [np.quantile(side, 0.4) if side.size else 0.0 for side in (left, right)]
-        begin = max(low - SEGMENT, 0)
-        fraction = (np.arange(begin, min(high + SEGMENT, len(level))) - low) / max(high - low, 1)
-        line = np.interp(fraction, (0, 1), backgrounds)
-        corrected = level[begin : begin + len(line)] - line
-        peak = float(corrected[top - begin])
-        edges = (
-            begin + _find_edge(corrected, side - begin, step, FOOT * peak)
-            for side, step in ((low, -1), (high, 1))
-        )
-        start, stop = (edge + step for edge, step in zip(edges, (-MARGIN, 1 + MARGIN), strict=True))
-        start = max(start, earliest)
-        group_start = max(group[0], earliest, begin) - begin
-        second_peak = _second_peak(
-            corrected[group_start : group[-1] + 1 - begin], (first + top * width) / rate
-        )
-        span = first + start * width, first + stop * width
-        # A second impact next to this one is shorter than half of STEP.
-        sides = (
-            level[max(low - DISTANCE - STEP, 0) : low - DISTANCE],
-            level[high + DISTANCE :][:STEP],
-        )
-        change = [float(np.median(side)) if side.size else 0.0 for side in sides]
-        is_step = abs(change[1] - change[0]) > MAX_CHANGE * peak
-        pulses.append(_Candidate(*span, peak, is_step, second_peak))
-    return pulses
-
-
-def _find_edge(envelope: NDArray[np.float64], start: int, direction: int, threshold: float) -> int:
-    """Return the last cell above the threshold; two successive cells below it end the pulse."""
-    edge = start
-    while 0 <= edge + direction < len(envelope) and (
-        envelope[edge + direction] > threshold
-        or (
-            0 <= edge + 2 * direction < len(envelope) and envelope[edge + 2 * direction] > threshold
-        )
-    ):
-        edge += direction
-    return edge
-
-
-def _second_peak(envelope: NDArray[np.float64], time: float) -> SecondPeak | None:
-    """Return the second of two peaks of a pulse that a deep valley separates, if there is one."""
-    top = int(np.argmax(envelope))
-    for side in (envelope[top:], envelope[: top + 1][::-1]):
-        lowest = np.minimum.accumulate(side)
-        k = int(np.argmax(side - lowest))
-        if lowest[k] < VALLEY * side[k] and side[k] > VALLEY * envelope[top]:
-            return SecondPeak(float(side[k]), float(lowest[k]), time)
-    return None
+    ]
 
 
 def _assign_bounces(
-    pulses: list[_Candidate], section: int, rate: float
-) -> tuple[list[_Candidate], list[Note]]:
-    """Return the drops with their bounces, and the pulses that are neither.
+    pulses: Sequence[Pulse], section: int, rate: float
+) -> tuple[list[Pulse], list[Note]]:
+    """Return the drops from a sample on with their bounces, and notes on the other pulses there.
 
-    Drops below MIN_DROP times the highest pulse from the sample `section` on are left out, with
-    their numbers.
+    Drops below MIN_DROP times the highest pulse are left out, with their numbers.
     """
-    drops: list[_Candidate] = []
+    groups: list[list[Pulse]] = []
     ignored: list[Note] = []
     flight = MAX_FLIGHT
-    before: _Candidate | None = None
-    highest = max((p.peak for p in pulses if not p.is_step and p.start >= section), default=0.0)
+    highest = max((p.peak for p in pulses if p.contact[0] >= section), default=0.0)
     for pulse in pulses:
-        gap = np.inf if before is None else (pulse.start - before.stop) / rate
-        in_flight = before is not None and MIN_FLIGHT < gap < 1.02 * flight
-        ratio = pulse.peak / before.peak if before else np.inf
+        gap = ratio = math.inf
+        if groups:
+            last = groups[-1][-1]
+            gap, ratio = (pulse.contact[0] - last.contact[1]) / rate, pulse.peak / last.peak
+        in_flight = gap < 1.02 * flight
         bounced = in_flight and ratio < NEW_DROP
-        lowest = MIN_BOUNCE * (before.peak if bounced and before else highest)
-        if pulse.is_step or pulse.peak < lowest:
-            time = {"time": pulse.start / rate}
+        time = {"time": pulse.contact[0] / rate}
+        if pulse.peak < MIN_BOUNCE * (last.peak if bounced else highest):
             ignored.append(Note("pulse_ignored", value=pulse.peak, unit="N", others=time))
-            continue
-        if bounced:
-            drops[-1].bounces.append(pulse)
+        elif bounced:
+            groups[-1].append(pulse)
             flight = gap
+            if groups[-1][0].contact[0] < section <= pulse.contact[0]:
+                ignored.append(Note("bounce_ignored", others=time))
         else:
+            left_out, notes = None, pulse.notes
             if pulse.peak < MIN_DROP * highest:
                 size = {"peak": pulse.peak, "fraction": MIN_DROP}
-                pulse.left_out = Note("drop_too_small", others=size)
-            elif before is not None and in_flight and not before.left_out:
-                others = {"ratio": float(ratio)}
-                pulse.notes.append(
-                    Note("drop_like_bounce", value=float(gap), unit="s", others=others)
-                )
-            drops.append(pulse)
+                left_out = Note("drop_too_small", others=size)
+            elif in_flight and not groups[-1][0].left_out:
+                notes = (Note("drop_like_bounce", value=gap, unit="s", others={"ratio": ratio}),)
+            groups.append([replace(pulse, left_out=left_out, notes=notes)])
             flight = MAX_FLIGHT
-        before = pulse
-    return drops, ignored
-
-
-def _locate(
-    name: str,
-    rate: float,
-    drops: list[_Candidate],
-    pulses: list[_Candidate],
-    limits: tuple[int, int],
-) -> Iterator[Pulse]:
-    """Yield the drops with their sections, which end before the pulses next to them."""
-    indices = {id(p): k for k, p in enumerate(pulses)}
-    guard, (first_sample, stop_sample) = round(2 * CELL * rate), limits
-
-    def locate(pulse: _Candidate, title: str) -> Pulse:
-        k = indices[id(pulse)]
-        low = pulses[k - 1].stop + guard if k else first_sample
-        high = pulses[k + 1].start - guard if k + 1 < len(pulses) else stop_sample
-        low = max(low, pulse.start - round(BEFORE * rate))
-        high = min(high, pulse.stop + round(AFTER * rate), stop_sample)
-        stop = min(pulse.stop, stop_sample)
-        bounces = tuple(
-            locate(bounce, f"{title}, bounce {j}") for j, bounce in enumerate(pulse.bounces, 1)
-        )
-        return Pulse(
-            title, (min(low, pulse.start), max(high, stop)), (pulse.start, stop), bounces,
-            pulse.second_peak, pulse.left_out, tuple(pulse.notes),
-        )  # fmt: skip
-
-    for k, drop in enumerate(drops, start=1):
-        yield locate(drop, name if len(drops) == 1 else f"{name}, drop {k}")
+    drops = [replace(drop, bounces=tuple(bounces)) for drop, *bounces in groups]
+    return [drop for drop in drops if drop.contact[0] >= section], ignored

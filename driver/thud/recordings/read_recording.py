@@ -23,10 +23,9 @@ from thud.recordings.checks.copies import (
     refuse_same_drops,
     refuse_simultaneous_channels,
 )
-from thud.recordings.choice import choose, require_chosen
 from thud.recordings.config import Config, read_config
 from thud.recordings.contact import find_contact
-from thud.recordings.drops import Section, cut_section, find_drops
+from thud.recordings.drops import Section, choose, cut_section, find_drops, require_chosen
 from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.recording import Origin, Recording
@@ -146,14 +145,14 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     with threadpool_limits(1, "blas"):
         for signal in _open(paths, config):
             refuse_copy(signal, origins)
-            search = find_drops(
+            found, ignored = find_drops(
                 signal, config.begin or 0.0, config.end or math.inf, progress=progress
             )
             # Small pulses may be what a channel picks up of another one.
-            own = [drop for drop in search.drops if not drop.left_out]
+            own = [drop for drop in found if not drop.left_out]
             refuse_simultaneous_channels(signal, own, searched)
-            chosen, left_out = choose(search.drops, count + 1, signal.sample_rate, config)
-            count += len(search.drops)
+            chosen, left_out = choose(found, count + 1, signal.sample_rate, config)
+            count += len(found)
             stated = config.calibration_uncertainty
             uncertainty = signal.calibration_uncertainty if stated is None else stated
             uncertainties.append(uncertainty)
@@ -163,7 +162,7 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
                 for pulse in bar
             )
             measured.append(drops)
-            notes = (*_section(signal, config), *search.ignored, *left_out)
+            notes = (*_section(signal, config), *ignored, *left_out)
             origins.append(Origin.of(signal, len(drops), notes))
     if not origins:
         refuse("there are no recordings", "one file or more")
@@ -178,7 +177,7 @@ def first_stages(paths: Source | Iterable[Source], config: Config) -> Stages:  #
     """Return the stages of the first measured drop; the arguments are those of `read_recording`."""
     count = 0
     for signal in _open(paths, config):
-        found = find_drops(signal, config.begin or 0.0, config.end or math.inf).drops
+        found, _ = find_drops(signal, config.begin or 0.0, config.end or math.inf)
         chosen, _ = choose(found, count + 1, signal.sample_rate, config)
         count += len(found)
         if chosen:

@@ -75,23 +75,18 @@ def min_background(rate: float) -> int:
 
 
 def _refuse_incomplete(section: Section) -> None:
-    """Raise InputError if the pulse is cut off or doubled."""
-    first, after, name = section.contact[0], len(section.force) - section.contact[1], section.name
-    minimum = min_background(section.sample_rate)
-    for length, edge, side in ((first, "starts", "before"), (after, "ends", "after")):
-        if length < minimum:
+    """Raise InputError if the pulse is cut off or meets another one."""
+    rate, (first, stop) = section.sample_rate, section.contact
+    lengths = first, len(section.force) - stop
+    for length, edge, side in zip(lengths, ("begins", "ends"), ("before", "after"), strict=True):
+        if length < min_background(rate):
             refuse(
-                f"{name}: the signal {edge} within the pulse or less than 1 ms {side} it",
-                "background of 1 ms or more, better 100 ms, before and after the contact",
+                f"{section.name}: {1e3 * length / rate:.2g} ms of background {side} the pulse at "
+                f"{(section.start + first) / rate:.2f} s: the signal {edge} within the pulse or "
+                "less than 1 ms from it, or two impacts overlap",
+                "1 ms or more, better 100 ms, on both sides of one impact; --leave-out (leave_out) "
+                "with the number of this drop, or --from and --to (begin, end), without it",
             )
-    if second := section.second_peak:
-        refuse(
-            f"{name}: two impacts overlap: a second peak of {second.peak:.0f} N rises from "
-            f"{second.valley:.0f} N; the force does not return to the background between them, at "
-            f"{second.time:.2f} s",
-            "one impact, with background before and after it; --leave-out (leave_out) with the "
-            "number of this drop, or --from and --to (begin, end) without it",
-        )
 
 
 def _repair_cells(section: Section) -> Section:
