@@ -387,7 +387,8 @@ def test_calibration_of_a_file_with_a_factor_names_it(tmp_path: Path) -> None:
     entries = [("array", "Fs", RATE), ("array", "unit", "V"), ("array", "gain", 10.0)]
     write_hdf5(tmp_path / "a.h5", level, entries)
     found = calibrate(tmp_path / "a.h5", force=500.0)
-    assert any("gain = 10.0" in text for text in found.warnings)
+    (note,) = found.notes
+    assert (note.code, note.others) == ("stored_values_calibrated", {"factor": "gain = 10.0"})
 
 
 def test_every_writer_of_the_tests_is_read_without_a_note_on_factors(tmp_path: Path) -> None:

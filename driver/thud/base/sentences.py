@@ -223,6 +223,22 @@ WARNINGS = {
         "are upper bounds"
     ),
     "not_standardized": "not standardized: {missing} not stated",
+    # Calibrations.
+    "steps_in_one_direction": (
+        "the record has steps in the same direction one after the other: each is taken to be the "
+        "whole known force, {value:.6g} {unit}, not a part of it"
+    ),
+    "stored_values_calibrated": (
+        "the file states {factor}, which is not applied: the calibration is that of stored values, "
+        "for files with the same value"
+    ),
+    "known_force_uncertain": (
+        "uncertainty of the known force not stated: not included (--uncertainty)"
+    ),
+    "gravity_assumed": (
+        "local gravity not stated (gravity, --gravity): {value:.6g} {unit} is used, and the "
+        "uncertainty includes {spread:.2%} for {low:.3f} to {high:.3f} {unit} at sea level"
+    ),
     # Fits of mobilities.
     "mobility_implausible": (
         "the mean mobility, {value:.2g} {unit}, is not that of a floor ({low:g} to {high:g} "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.display import draw_all
+from thud.base.note import Note
 from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
@@ -156,8 +156,6 @@ OF_A_FORCE = (
     "gravity",
     "uncertainty",
     "unit",
-    "time_constant",
-    "time_constant_uncertainty",
 )
 
 
@@ -184,8 +182,6 @@ def run_calibrate(options: argparse.Namespace) -> int:
         channel=channel_of(options.channel),
         unit=options.unit,
         uncertainty=options.uncertainty or 0.0,
-        time_constant=options.time_constant,
-        time_constant_uncertainty=options.time_constant_uncertainty or 0.0,
     )
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
@@ -193,12 +189,9 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print_results(f"# {result.origin}")
         if result.time_constant:
             print_results(f"# {result.time_constant}")
-    print_notes(result.warnings)
-    unknown = "uncertainty of the {} not stated: not included ({})"
-    if options.time_constant not in {None, math.inf} and not options.time_constant_uncertainty:
-        print_notes([unknown.format("time constant", "--time-constant-uncertainty")])
+    print_notes(result.notes)
     if not options.uncertainty:
-        print_notes([unknown.format("known force", "--uncertainty")])
+        print_notes([Note("known_force_uncertain")])
     return 0
 
 
@@ -229,18 +222,6 @@ CALIBRATE = Command(
             type=number,
             metavar="FRACTION",
             help="relative standard uncertainty of the mass or force, such as 0.001",
-        ),
-        argument(
-            "--time-constant",
-            type=number,
-            metavar="S",
-            help="time constant of the amplifier, inf without droop (default: fitted)",
-        ),
-        argument(
-            "--time-constant-uncertainty",
-            type=number,
-            metavar="FRACTION",
-            help="relative standard uncertainty of a stated time constant, such as 0.02",
         ),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, if the file does not state it"),

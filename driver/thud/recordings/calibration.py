@@ -1,14 +1,18 @@
-"""Calibration, N per unit, from a record of a known force."""
+"""Calibration, N per unit, from a record of a known force, also behind an amplifier that droops."""
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.linalg import block_diag
+from scipy.special import fdtrc
 
 from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_number
+from thud.base.note import Note
 from thud.recordings.channel import regular_file, shown_path, shown_text
 from thud.recordings.force_units import (
     ALLOWED,
@@ -18,31 +22,54 @@ from thud.recordings.force_units import (
     require_unit,
 )
 from thud.recordings.formats import read_channels
-from thud.recordings.load_steps import Level, Rate, Steps, measure_steps
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import channel_choices, choose_channels
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-# A record is reduced to about this many means.
-MEANS = 4096
-# Number of samples per read.
-BLOCK = 2**20
 # Standard gravity, m/s2, with which a mass is weighed if the local gravity is not stated; its range
 # at sea level, from the equator to the poles; and that of stated values, also on high mountains.
 STANDARD_GRAVITY = 9.80665
 SEA_LEVEL = (9.780, 9.833)
 ALLOWED_GRAVITY = (9.76, 9.84)
-# Maximum relative uncertainty of the step, and of a stated time constant.
-MAX_UNCERTAINTY = 0.1
-MAX_STATED = 0.5
-# Standard deviations from zero at which a droop is stated, and those of a bound with 95 %.
+# A record is reduced to about this many means, read by blocks of this many samples.
+MEANS = 4096
+BLOCK = 2**20
+# Time within which a step changes the level, s, and its maximum as a fraction of the record; the
+# fraction of the largest change within it that is a step; means in the running median that ignores
+# knocks.
+LAG = 0.7
+MAX_LAG = 1 / 12
+STEP = 0.5
+MEDIAN = 5
+# Fraction of a plateau that is ignored at either end, and minimum number of means of the rest. The
+# rest is reduced to this many means, between which noise is hardly correlated.
+SETTLING = 0.15
+MIN_PLATEAU = 6
+N_MEAN = 24
+# A plateau is clipped if more than CUT of its sections reach CLIPPED of full scale, or the extreme
+# of the record while another plateau has noise of more than MIN_NOISE steps of quantization.
+CUT = 0.2
+CLIPPED = 0.999
+MIN_NOISE = 3.0
+# Standard deviations from zero at which a droop, or a further term, is significant, and those of a
+# bound with 95 %.
 SIGNIFICANT = 3.0
 BOUND = 1.645
+# Degree of the polynomials that search for other curvature of a plateau, and the probability of
+# noise below which it is significant. Its root mean square affects the step by up to MISFIT_WEIGHT
+# times as much; more than MAX_MISFIT of the step is refused.
+DEGREE = 3
+NOISE_PROBABILITY = 1e-4
+MISFIT_WEIGHT = 30.0
+MAX_MISFIT = 1e-2
+# Maximum decay within the lag, in time constants: a faster one is hardly distinguished from a step.
+MAX_DECAY = 0.5
+# Maximum relative uncertainty of the step.
+MAX_UNCERTAINTY = 0.1
 
 
 @check_arguments
@@ -55,8 +82,6 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     unit: str | None = None,
     gravity: float | None = None,
     uncertainty: float = 0.0,
-    time_constant: float | None = None,
-    time_constant_uncertainty: float = 0.0,
 ) -> Calibration:
     """Return N per unit from a record of a known force put on or taken off the plate.
 
@@ -78,17 +103,12 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
         uncertainty includes its range at sea level.
     uncertainty
         Relative standard uncertainty of the known force.
-    time_constant
-        Time constant of the amplifier, s, infinite if it does not droop; by default it is fitted.
-    time_constant_uncertainty
-        Relative standard uncertainty of the stated time constant. If it is not zero, the fit
-        combines what is stated with what the record shows.
 
     Returns
     -------
     Calibration
         The uncertainty includes that of the step: from the residuals and the time constant, or
-        from the scatter of several steps, whichever is larger. Warnings name what was assumed.
+        from the scatter of several steps, whichever is larger. Notes name what was assumed.
 
     Raises
     ------
@@ -106,47 +126,35 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
             "a positive force, 0 <= uncertainty < 1",
         )
-    source = open_source(record, channel, unit)
-    name, symbol, samples, count, sample_rate, full_scale, unapplied = source
+    signal, symbol, unapplied = open_source(record, channel, unit)
     if not symbol:
-        refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
-    level = _means(samples, count)
-    # Seconds per mean.
-    interval = None if sample_rate is None else max(1, count // MEANS) / sample_rate
-    stated = None
-    if time_constant is not None:
-        stated = _stated_rate(time_constant, time_constant_uncertainty, interval, name)
-    steps = measure_steps(level, interval, name, stated, full_scale)
-    size, deviation = float(steps.sizes.mean()), steps.uncertainty
-    if deviation > MAX_UNCERTAINTY * size:
+        refuse(f"{signal.name}: the values are without a unit", f"unit = one of {ALLOWED}")
+    steps, time_constant = _measure_steps(signal)
+    size, number = float(steps.sizes.mean()), len(steps.sizes)
+    if steps.uncertainty > MAX_UNCERTAINTY * size:
         refuse(
-            f"{name}: the step is {size:.4g} {symbol} with an uncertainty of {deviation:.2g} "
-            f"{symbol}",
+            f"{signal.name}: the step is {size:.4g} {symbol} with an uncertainty of "
+            f"{steps.uncertainty:.2g} {symbol}",
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
-    load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg (g = {local:g} m/s2)"
-    number = len(steps.sizes)
-    warnings = _step_warnings(steps, stated, interval, load)
+    notes, spread = [], 0.0
+    if (steps.signs[1:] == steps.signs[:-1]).any():
+        notes.append(Note("steps_in_one_direction", value=newtons, unit="N"))
     if unapplied:
-        warnings.append(
-            f"the file states {unapplied}, which is not applied: the calibration is that of stored "
-            "values, for files with the same value"
-        )
-    spread = 0.0
+        notes.append(Note("stored_values_calibrated", others={"factor": unapplied}))
     if mass is not None and gravity is None:
+        low, high = SEA_LEVEL
         # The standard deviation of a rectangular distribution.
-        spread = (SEA_LEVEL[1] - SEA_LEVEL[0]) / math.sqrt(12) / STANDARD_GRAVITY
-        warnings.append(
-            f"local gravity not stated (gravity, --gravity): {STANDARD_GRAVITY} m/s2 is used, and "
-            f"the uncertainty includes {100 * spread:.2g} % for {SEA_LEVEL[0]:.3f} to "
-            f"{SEA_LEVEL[1]:.3f} m/s2 at sea level"
-        )
+        spread = (high - low) / math.sqrt(12) / STANDARD_GRAVITY
+        others = {"spread": spread}
+        notes.append(Note("gravity_assumed", "", local, low, high, "m/s2", others=others))
+    load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg (g = {local:g} m/s2)"
     return Calibration(
         f"{newtons / size!r} N/{symbol}",
-        math.hypot(deviation / size, uncertainty, spread),
-        f"{number} step{'s' * (number > 1)} of {load} in {name}",
-        _time_constant(steps.rate, interval),
-        tuple(warnings),
+        math.hypot(steps.uncertainty / size, uncertainty, spread),
+        f"{number} step{'s' * (number > 1)} of {load} in {signal.name}",
+        time_constant,
+        tuple(notes),
     )
 
 
@@ -163,80 +171,16 @@ def _require_gravity(gravity: float | None, mass: float | None) -> float:
     return gravity
 
 
-def _step_warnings(
-    steps: Steps, stated: Rate | None, interval: float | None, load: str
-) -> list[str]:
-    """Return warnings on steps in one direction, and on a stated time constant that differs."""
-    warnings = []
-    if (steps.signs[1:] == steps.signs[:-1]).any():
-        warnings.append(
-            "the record has steps in the same direction one after the other: each is taken to be "
-            f"the whole known force, {load}, not a part of it"
-        )
-    if stated and interval and steps.shown:
-        difference = abs(stated.value - steps.shown.value)
-        if difference > SIGNIFICANT * math.hypot(stated.uncertainty, steps.shown.uncertainty):
-            stated_time, shown_time = (
-                f"{interval / rate.value:.4g} s" if rate.value else "no droop"
-                for rate in (stated, steps.shown)
-            )
-            warnings.append(
-                f"the stated time constant, {stated_time}, differs from the one that the record "
-                f"shows, {shown_time}, by more than their uncertainties"
-            )
-    return warnings
-
-
-def _stated_rate(value: float, uncertainty: float, interval: float | None, name: str) -> Rate:
-    """Return the rate per mean of a time constant, s, with a relative standard uncertainty."""
-    if value != math.inf:
-        require_number("calibrate(): time_constant", value)
-    require_number("calibrate(): time_constant_uncertainty", uncertainty)
-    if not value > 0 or not 0 <= uncertainty <= MAX_STATED:
-        refuse(
-            f"calibrate(): time_constant = {value:g} s, uncertainty = {uncertainty:g}",
-            f"a positive time, 0 <= uncertainty <= {MAX_STATED:g}",
-        )
-    if interval is None:
-        refuse(f"{name}: the sample rate is not known", "a column of times, or no time constant")
-    return Rate(interval / value, interval / value * uncertainty)
-
-
-def _time_constant(rate: Rate, interval: float | None) -> TimeConstant | None:
-    """Return the time constant of a rate per mean; None if the interval is unknown."""
-    if interval is None:
-        return None
-    highest = rate.value + BOUND * rate.uncertainty
-    minimum = interval / highest if highest > 0 else math.inf
-    if rate.value <= SIGNIFICANT * rate.uncertainty:
-        return TimeConstant(math.inf, 0.0, minimum)
-    return TimeConstant(interval / rate.value, rate.uncertainty / rate.value, minimum)
-
-
-class Source(NamedTuple):
-    """Values of one channel: name for messages, unit or "", samples, and their number and rate.
-
-    The full scale is the largest value that the format can hold, None if it is not known.
-    """
-
-    name: str
-    unit: str
-    samples: Callable[[int, int], NDArray[np.float64]]
-    n_sample: int
-    sample_rate: float | None
-    full_scale: float | None
-    unapplied: str = ""
-
-
 def open_source(
     record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None = None
-) -> Source:
-    """Return the values of a channel of a file, or of a signal, in their own unit."""
+) -> tuple[Signal, str, str]:
+    """Return one channel of a file, or a signal, in its own unit.
+
+    The sample rate is NaN if it is unknown. Then follow the unit, or an empty text, and a factor of
+    the file that is not applied.
+    """
     if isinstance(record, Signal):
-        symbol = "" if unit is None else require_unit(unit, record.name)
-        return Source(
-            record.name, symbol, record.read, record.n_sample, record.sample_rate, record.full_scale
-        )
+        return record, "" if unit is None else require_unit(unit, record.name), ""
     path = regular_file(record)
     name = shown_path(path)
     channels = choose_channels(read_channels(path), channel, name)
@@ -245,28 +189,207 @@ def open_source(
             f"{name}: has {len(channels)} channels of force",
             f"channel (--channel) = one of {channel_choices(channels)}",
         )
-    (selected,) = channels
-    symbol = find_unit(selected.unit) if unit is None else require_unit(unit, path.name)
+    (source,) = channels
+    symbol = find_unit(source.unit) if unit is None else require_unit(unit, path.name)
+    rate = math.nan if source.sample_rate is None else source.sample_rate
     # Integers are read as fractions of full scale.
-    full_scale = 1.0 if selected.counts else None
-    return Source(
-        name,
-        symbol,
-        selected.samples,
-        selected.n_sample,
-        selected.sample_rate,
-        full_scale,
-        shown_text(selected.unapplied),
-    )
+    full_scale = 1.0 if source.counts else None
+    signal = Signal(name, str(path), rate, source.n_sample, source.samples, full_scale)
+    return signal, symbol, shown_text(source.unapplied)
 
 
-def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> Level:
-    """Return the means, minima and maxima of the sections of a record."""
-    width = max(1, count // MEANS)
+class _Steps(NamedTuple):
+    """Magnitudes and signs of steps, and the standard uncertainty of their mean.
+
+    Then the rate of the droop, the reciprocal of its time constant, and its standard uncertainty,
+    per mean, and other curvature of the plateaus.
+    """
+
+    sizes: NDArray[np.float64]
+    signs: NDArray[np.float64]
+    uncertainty: float
+    rate: float
+    rate_uncertainty: float
+    misfit: float
+
+
+def _measure_steps(signal: Signal) -> tuple[_Steps, TimeConstant | None]:
+    """Return the steps of a record and the time constant of its amplifier, None without times.
+
+    Raise InputError if there is no clear step, if a plateau is clipped, or if the level between the
+    steps fits no exponential decay.
+    """
+    name, width = signal.name, max(1, signal.n_sample // MEANS)
+    # NaN if it is unknown.
+    interval = width / signal.sample_rate
+    level, low, high = _means(signal, width)
+    longest = max(1, int(MAX_LAG * len(level)))
+    lag = longest if math.isnan(interval) else min(longest, max(1, round(LAG / interval)))
+    plateaus = _find_plateaus(level, lag)
+    if len(plateaus) < 2 or min(len(plateau) for plateau in plateaus) < MIN_PLATEAU:  # noqa: PLR2004
+        refuse(
+            f"{name}: has no clear step", "a record in which a known force is put on or taken off"
+        )
+    _refuse_clipped(signal, high, plateaus, "maximum")
+    _refuse_clipped(signal, -low, plateaus, "minimum")
+    steps = _fit_steps(level, plateaus)
+    misfit = steps.misfit / float(steps.sizes.mean())
+    if MISFIT_WEIGHT * misfit > MAX_MISFIT:
+        refuse(
+            f"{name}: the level between the steps deviates by {misfit:.2g} of the step from any "
+            "exponential decay with a drift",
+            "an amplifier with one time constant, a force and a temperature that are constant",
+        )
+    if steps.rate * lag > MAX_DECAY:
+        refuse(
+            f"{name}: the level decays to 1/e within {1 / steps.rate / len(level):.2g} of the "
+            "record, too fast for a step to be distinguished from the decay",
+            f"a time constant of {lag / MAX_DECAY / len(level):.2g} of the record or more",
+        )
+    if math.isnan(interval):
+        return steps, None
+    minimum = interval / (steps.rate + BOUND * steps.rate_uncertainty)
+    if steps.rate <= SIGNIFICANT * steps.rate_uncertainty:
+        return steps, TimeConstant(math.inf, 0.0, minimum)
+    relative = steps.rate_uncertainty / steps.rate
+    return steps, TimeConstant(interval / steps.rate, relative, minimum)
+
+
+def _means(signal: Signal, width: int) -> NDArray[np.float64]:
+    """Return mean, minimum and maximum of each section of a record, shape (3, n_section)."""
+    stop = signal.n_sample - signal.n_sample % width
     # Blocks of complete sections, few because each read opens the file.
     step = width * max(1, BLOCK // width)
-    stop = count - count % width
-    blocks = (samples(start, min(start + step, stop)) for start in range(0, stop, step))
-    sections = [block.reshape(-1, width) for block in blocks]
-    reduced = [(part.mean(axis=1), part.min(axis=1), part.max(axis=1)) for part in sections]
-    return Level(*np.concatenate([np.zeros((3, 0)), *map(np.stack, reduced)], axis=1))
+    means = [np.zeros((3, 0))]
+    for start in range(0, stop, step):
+        sections = signal.read(start, min(start + step, stop)).reshape(-1, width)
+        means.append(np.stack([sections.mean(1), sections.min(1), sections.max(1)]))
+    return np.concatenate(means, axis=1)
+
+
+def _find_plateaus(level: NDArray[np.float64], lag: int) -> list[NDArray[np.int64]]:
+    """Return the indices of the means between steps that change the level within a lag."""
+    if len(level) <= MEDIAN + lag:
+        return []
+    smooth = np.median(np.lib.stride_tricks.sliding_window_view(level, MEDIAN), axis=1)
+    change = smooth[lag:] - smooth[:-lag]
+    index = np.flatnonzero(np.abs(change) > STEP * np.abs(change).max())
+    breaks = (np.diff(index) > lag) | (np.diff(np.sign(change[index])) != 0)
+    steps = [run for run in np.split(index, np.flatnonzero(breaks) + 1) if run.size]
+    # From the first mean of a median and a change to their middle.
+    middle = MEDIAN // 2 + (lag + 1) / 2
+    begins = [0, *(math.ceil(run[-1] + middle) for run in steps)]
+    stops = [*(int(run[0] + middle) for run in steps), len(level)]
+    plateaus = []
+    for begin, stop in zip(begins, stops, strict=True):
+        ignored = max(1, int(SETTLING * (stop - begin)))
+        plateaus.append(np.arange(begin + ignored, stop - ignored))
+    return plateaus
+
+
+def _refuse_clipped(
+    signal: Signal, values: NDArray[np.float64], plateaus: list[NDArray[np.int64]], side: str
+) -> None:
+    """Raise InputError if a plateau is at full scale, or at one value while another has noise."""
+    parts = [values[plateau] for plateau in plateaus]
+    # The quantization of a record is no noise.
+    step = float(np.diff(np.unique(np.concatenate(parts))).min(initial=math.inf))
+    is_noisy = any(np.median(np.abs(np.diff(part))) > MIN_NOISE * step for part in parts)
+    limit = float(values.max()) if is_noisy else math.inf
+    if signal.full_scale is not None:
+        limit = min(limit, CLIPPED * signal.full_scale)
+    for plateau, part in zip(plateaus, parts, strict=True):
+        if np.mean(part >= limit) > CUT:
+            refuse(
+                f"{signal.name}: the plateau from {plateau[0] / len(values):.0%} to "
+                f"{plateau[-1] / len(values):.0%} of the record is clipped at the {side} of the "
+                f"record, {part.max() if side == 'maximum' else -part.max():.5g}",
+                "a measuring range that includes the known force",
+            )
+
+
+def _fit_steps(level: NDArray[np.float64], plateaus: list[NDArray[np.int64]]) -> _Steps:
+    """Return the steps between plateaus by linear least squares.
+
+    A first-order high-pass of rate r changes a force f to a level v with v' = f' - r (v - b), where
+    b is the level without a force: on plateau k, v + r (integral of v) = f_k + a drift. This is
+    linear in f_k, the drift and r, however the force was put on, and whatever decays when the
+    record begins.
+    """
+    parts = [np.array_split(plateau, min(len(plateau), N_MEAN)) for plateau in plateaus]
+    blocks = list(itertools.chain(*parts))
+    counts = [len(part) for part in parts]
+    # The mean of the level is a linear drift of the integral.
+    integral = _integral(level - level.mean())
+    index = np.arange(len(level)) / len(level)
+    values, position, once, twice = (
+        np.array([series[block].mean() for block in blocks])
+        for series in (level, index, integral, _integral(integral))
+    )
+    levels = block_diag(*[np.ones((count, 1)) for count in counts])
+    steady = np.column_stack([levels, position, position**2])
+    columns = np.column_stack([steady, -once])
+    parameters, covariance, residual = _least_squares(columns, values)
+    rate, u_rate = max(float(parameters[-1]), 0.0), math.sqrt(covariance[-1, -1])
+    if rate:
+        # A second high-pass in series takes away the integral of the integral, too.
+        models = columns, np.column_stack([columns, twice])
+    else:
+        # It fits nothing, but is uncertain. A bend of the drift may be a curvature of other cause.
+        columns, models = steady, (steady[:, :-1], steady)
+        parameters, _, residual = _least_squares(columns, values)
+    misfit = _misfit(columns, residual, counts)
+
+    count = len(plateaus)
+    steps = np.diff(parameters[:count])
+    sizes, signs = np.abs(steps), np.sign(steps)
+    weights = -np.diff(signs, prepend=0, append=0) / len(steps)
+    variance = weights @ covariance[:count, :count] @ weights + (MISFIT_WEIGHT * misfit) ** 2
+    # The integral of the noise between the plateaus, at random from one mean to the next.
+    between = sum(after[0] - before[-1] for before, after in itertools.pairwise(plateaus))
+    noise = residual @ residual / (len(values) - columns.shape[1])
+    variance += (rate / len(steps)) ** 2 * noise * between * max(len(block) for block in blocks)
+    (smaller, *_), (larger, u_larger, _) = (_least_squares(model, values) for model in models)
+    if abs(larger[-1]) > SIGNIFICANT * math.sqrt(u_larger[-1, -1]):
+        variance += float(weights @ (larger[:count] - smaller[:count])) ** 2
+    if len(steps) > 1:
+        variance = max(variance, sizes.var(ddof=1) / len(steps))
+    return _Steps(sizes, signs, math.sqrt(variance), rate, u_rate, misfit)
+
+
+def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the integral of values from the first to the middle of each."""
+    return np.asarray(np.cumsum(values) - values / 2)
+
+
+def _least_squares(
+    columns: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the parameters of least squares, their covariance, and the residual."""
+    scale = np.linalg.norm(columns, axis=0)
+    inverse = np.linalg.pinv(columns / scale) / scale[:, None]
+    parameters = inverse @ values
+    residual = values - columns @ parameters
+    variance = residual @ residual / max(len(values) - len(parameters), 1)
+    variance = max(float(variance), (1e-12 * float(np.ptp(values))) ** 2)
+    return parameters, variance * inverse @ inverse.T, residual
+
+
+def _misfit(
+    columns: NDArray[np.float64], residual: NDArray[np.float64], counts: list[int]
+) -> float:
+    """Return the root mean square of a residual that curves the plateaus, 0 if it may be noise."""
+    curves = [
+        np.polynomial.legendre.legvander(np.linspace(-1, 1, count), DEGREE)[:, 1:]
+        for count in counts
+    ]
+    design = np.hstack([columns, block_diag(*curves)])
+    design /= np.linalg.norm(design, axis=0)
+    parameters, _, rank, _ = np.linalg.lstsq(design, residual, rcond=1e-6)
+    rest = float(np.sum((residual - design @ parameters) ** 2))
+    explained = float(residual @ residual) - rest
+    added, freedom = rank - columns.shape[1], len(residual) - rank
+    if freedom < 1 or not rest > 0:
+        return 0.0
+    probability = fdtrc(added, freedom, explained / added / (rest / freedom))
+    return math.sqrt(explained / len(residual)) if probability < NOISE_PROBABILITY else 0.0

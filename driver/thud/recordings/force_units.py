@@ -7,12 +7,15 @@ import math
 import re
 from collections import Counter
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from thud.base import units
 from thud.base.checks import refuse, refuse_value, shown
+
+if TYPE_CHECKING:
+    from thud.base.note import Note
 
 # By unit: base unit, and base units per unit.
 UNITS = {
@@ -62,8 +65,10 @@ class TimeConstant(NamedTuple):
         """Return a sentence for reports."""
         if math.isinf(self.value):
             return f"no droop: a time constant above {self.minimum:.2g} s"
-        exact = f", standard uncertainty {100 * self.uncertainty:.2g} %" * (self.uncertainty > 0)
-        return f"droop with a time constant of {self.value:.4g} s{exact}, taken off"
+        return (
+            f"droop with a time constant of {self.value:.4g} s, standard uncertainty "
+            f"{100 * self.uncertainty:.2g} %, taken off"
+        )
 
 
 @dataclass(frozen=True)
@@ -81,15 +86,15 @@ class Calibration:
         Where the calibration comes from, for reports.
     time_constant : TimeConstant or None
         Time constant of the amplifier, if the calibration comes from a record of a known force.
-    warnings : tuple of str
-        What was assumed, and possible faults of the record, a sentence each.
+    notes : tuple of Note
+        What was assumed, and possible faults of the record.
     """
 
     chain: str
     uncertainty: float | None = None
     origin: str = ""
     time_constant: TimeConstant | None = None
-    warnings: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise InputError if the chain or the uncertainty are not allowed."""

@@ -173,14 +173,12 @@ def calibrate_tap(
     InputError
         If the record has no tap, or no resonance stands out.
     """
-    source = open_source(record, channel)
-    if source.sample_rate is None or not source.sample_rate >= MIN_RATE:
+    source, _, _ = open_source(record, channel)
+    if not source.sample_rate >= MIN_RATE:
         refuse(f"{source.name}: the sample rate is unknown or low", f"{MIN_RATE:g} Hz or more")
     if source.n_sample > MAX_SAMPLES:
         refuse(f"{source.name}: {source.n_sample} samples", f"up to {MAX_SAMPLES} samples")
-    level, rate = source.samples(0, source.n_sample), source.sample_rate
-    if not np.isfinite(level).all():
-        refuse(f"{source.name}: a value is not finite", "real numbers")
+    level, rate = source.read(0, source.n_sample), source.sample_rate
     taps = _find_taps(level, rate, source.name)
     fits = [(tap, fit) for tap in taps if (fit := _fit_tap(level, tap, rate))]
     if not fits:
