@@ -23,8 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
-from thud.base.key import Group, Key
-from thud.base.quantity import Quantity
+from thud.base.key import Group, Key, Quantity
 
 if TYPE_CHECKING:
     import numpy as np
@@ -173,7 +172,7 @@ def python_class(
         members.append(f"    {key['name']}: {type_name} = {default}")
     # The keys of a base follow those of a class.
     options = ", kw_only=True" if group == RECTANGULAR else ""
-    head = f"\n\n@dataclass(frozen=True, eq=False{options})\nclass {class_name(group)}({base}):\n"
+    head = f"\n\n@dataclass(frozen=True{options})\nclass {class_name(group)}({base}):\n"
     head += f'    """{title}'
     if not keys:
         return "\n".join([f'{head}"""', "", *members, ""])

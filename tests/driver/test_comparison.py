@@ -15,7 +15,7 @@ import thud
 from thud import cli
 from thud.base._schema import QUANTITIES
 from thud.base.errors import PlausibilityWarning
-from thud.base.quantity import Quantity
+from thud.base.key import Quantity
 from thud.comparison.comparison import _cell, read_all
 from thud.level.assessment import Criterion
 from thud.recordings.config import Config

@@ -1,15 +1,12 @@
-"""Every public type: its arrays do not change, and it is compared by value."""
+"""Every public type: its arrays do not change; inputs are compared by value."""
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import inspect
-import pickle
 import runpy
 import tempfile
 import warnings
-from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,12 +78,6 @@ def examples(held: dict[str, object]) -> dict[type, Any]:
     }
 
 
-def has_array(value: object) -> bool:
-    """Return whether a value holds an array or a dictionary, or what has one."""
-    kinds = np.ndarray | dict | xr.Dataset
-    return any(isinstance(part, kinds) for _, part in walk(value, "", {}))
-
-
 @pytest.mark.slow
 def test_no_array_of_a_public_object_is_writeable(held: dict[str, object]) -> None:
     arrays = {place: one for place, one in held.items() if isinstance(one, np.ndarray)}
@@ -135,35 +126,6 @@ def test_no_public_object_shares_memory_with_its_caller(examples: dict[type, Any
     assert checked > 50
 
 
-def test_public_objects_are_compared_by_value(examples: dict[type, Any]) -> None:
-    for kind, one in examples.items():
-        for other in (copy.deepcopy(one), copy.copy(one), pickle.loads(pickle.dumps(one))):  # noqa: S301
-            assert (one == other) is True, kind
-            assert (one != other) is False, kind
-            for place, part in walk(other, "", {}):
-                # What a fit compares with is no value, and is not compared.
-                if isinstance(part, np.ndarray) and ".misfit" not in place:
-                    assert not part.flags.writeable, (kind, place)
-        for field in dataclasses.fields(one):
-            value = getattr(one, field.name)
-            if isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.size:
-                changed = dataclasses.replace(one, **{field.name: value + 1})
-                assert (one == changed) is not bool(np.isfinite(value).any()), (kind, field.name)
-    for one, other in combinations(examples.values(), 2):
-        assert (one == other) is False
-
-
-def test_objects_without_arrays_have_the_hash_of_their_values(examples: dict[type, Any]) -> None:
-    for kind, one in examples.items():
-        if has_array(one):
-            with pytest.raises(TypeError, match="unhashable"):
-                hash(one)
-        else:
-            assert hash(one) == hash(copy.deepcopy(one)), kind
-    assert {kind for kind, one in examples.items() if has_array(one)} >= {thud.Impact, thud.Bands}
-    assert hash(examples[thud.Case]) == hash(copy.deepcopy(examples[thud.Case]))
-
-
 def test_case_says_the_modes_that_were_computed() -> None:
     others = {"damping_ratio": (0.05, 0.05), "effective_mass": (1.5, 1.0)}
     frequency = np.array([60.0, 110.0])
@@ -171,7 +133,7 @@ def test_case_says_the_modes_that_were_computed() -> None:
     impact = thud.solve(model=model)
     frequency *= 1.1
     assert impact.case.model == thud.MeasuredModes(frequency=[60.0, 110.0], **others)
-    assert thud.solve(impact.case) == impact
+    assert (thud.solve(impact.case).floor_force == impact.floor_force).all()
     assert hash(model) == hash(thud.MeasuredModes(frequency=(60, 110), **others))
 
 
@@ -180,17 +142,6 @@ def test_changed_list_changes_no_case() -> None:
     case = thud.Case(floor=thud.Plate(point_x=points, point_y=points))
     points[0] = 3.0
     assert case == thud.Case(floor=thud.Plate(point_x=(1.0, 2.0), point_y=(1.0, 2.0)))
-
-
-@pytest.mark.parametrize("given", ["array", "read-only view", "column of a table"])
-def test_array_of_a_caller_that_can_be_changed_is_copied(given: str) -> None:
-    time = np.arange(3.0)
-    center = {"read-only view": time[:], "column of a table": xr.DataArray(time)}.get(given, time)
-    if given == "read-only view":
-        center.setflags(write=False)
-    bands = dataclasses.replace(thud.get_bands(), center=center)
-    time += 1
-    assert bands.center.tolist() == [0.0, 1.0, 2.0]
 
 
 def test_arrays_of_results_are_copied_once() -> None:
@@ -203,60 +154,16 @@ def test_arrays_of_results_are_copied_once() -> None:
     )
 
 
-def test_unlocked_array_of_a_result_is_copied() -> None:
-    impact = thud.solve()
-    impact.floor_force.setflags(write=True)
-    other = dataclasses.replace(impact)
-    assert not np.shares_memory(other.floor_force, impact.floor_force)
-
-
-def test_nan_equals_nan() -> None:
-    criteria = [
-        thud.assess_levels([39, 31, 23, 17, 12], 0.02, float("nan"), 1, 2.5, 1.0) for _ in range(2)
-    ]
-    assert criteria[0] == criteria[1]
-    assert hash(criteria[0]) == hash(criteria[1])
-    with warnings.catch_warnings(action="ignore"):
-        many = [thud.solve_many({"mass": [2.5, -1.0]}) for _ in range(2)]
-    assert np.isnan(many[0].peak_force[1])
-    assert many[0] == many[1]
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Holder(immutable.Immutable):
-    """Holds anything."""
-
-    value: Any
-
-
-def test_nan_equals_nan_of_other_types_of_numbers() -> None:
-    kinds = (float, np.float64, np.float32, complex)
-    for one, other in combinations([Holder(kind("nan")) for kind in kinds], 2):
-        assert one == other
-        assert hash(one) == hash(other)
-    assert Holder(np.nan) != Holder(1.0)
-    assert Holder(2) == Holder(np.float64(2))
-    assert Holder((1, np.nan)) == Holder((1.0, np.float32("nan")))
-
-
-def test_values_of_different_kinds_are_not_equal() -> None:
-    values = [1.0, None, "1", np.ones(1), np.ones(2), (1.0,), (1.0, 1.0), {1.0: 1.0}]
-    values += [xr.Dataset({"x": ("y", [1.0])}), thud.Drop(height=1.0)]
-    for one, other in combinations(map(Holder, values), 2):
-        assert (one == other) is False
-        assert (other == one) is False
-
-
 def test_changed_levels_change_no_verdict() -> None:
     recording = recorded(thud.solve(), height=1.0, mass=2.5)
-    before = recording.assess()
+    before = repr(recording.assess())
     levels = recording.levels()
     levels -= 1
     drop = recording.drops[0].force
     for array in (recording.average().level, drop, recording.drop_force().force):
         with pytest.raises(ValueError, match="read-only"):
             np.subtract(array, 1, out=array)
-    assert recording.assess() == before
+    assert repr(recording.assess()) == before
 
 
 def test_changed_dataset_changes_no_impact() -> None:

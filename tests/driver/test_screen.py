@@ -278,5 +278,5 @@ def test_words_wider_than_a_column_are_cut() -> None:
 
 
 def test_zero_has_no_sign() -> None:
-    quantity = thud.base.quantity.Quantity("q", "q", "", "", "", 1.0, 2, "")
+    quantity = thud.base.key.Quantity("q", "q", "", "", "", 1.0, 2, "")
     assert [quantity.show(value) for value in (-0.0, 0.0, -1.0)] == ["0", "0", "-1.00"]

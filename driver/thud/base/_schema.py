@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
-from thud.base.key import Group, Key
-from thud.base.quantity import Quantity
+from thud.base.key import Group, Key, Quantity
 
 if TYPE_CHECKING:
     import numpy as np
@@ -88,7 +87,7 @@ RectangularFloorSupport = Literal["unknown", "simple", "clamped", "free", "elast
 BandSet = Literal["octave", "third"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Ball(Group):
     """Group ``&ball``.
 
@@ -128,7 +127,7 @@ class Ball(Group):
         return cls()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Drop(Group):
     """Group ``&drop``.
 
@@ -144,7 +143,7 @@ class Drop(Group):
     gravity: float = 9.81
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Sampling(Group):
     """Group ``&sampling``.
 
@@ -166,7 +165,7 @@ class Sampling(Group):
     verify: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Levels(Group):
     """Group ``&levels``.
 
@@ -185,7 +184,7 @@ class Levels(Group):
     force: LevelsForce = "floor"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Limits(Group):
     """Group ``&limits``.
 
@@ -198,7 +197,7 @@ class Limits(Group):
     source: LimitsSource = "rubber_ball"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Modes(Group):
     """Free modes that are requested.
 
@@ -211,7 +210,7 @@ class Modes(Group):
     count: int = 6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Compression(Group):
     """Quasi-static compression that is requested.
 
@@ -231,7 +230,7 @@ class Compression(Group):
     gas: CompressionGas = "vented"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Unknowns(Group):
     """What is not known of the source: keys, and the distributions of their values.
 
@@ -257,7 +256,7 @@ class Unknowns(Group):
     reason: Sequence[str] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Room(Group):
     """Room below the floor.
 
@@ -351,7 +350,7 @@ class Room(Group):
     required: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ModalBall(Group):
     """Options of the source model ``modal_ball``.
 
@@ -396,7 +395,7 @@ class ModalBall(Group):
     static_families: Sequence[int] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class FiniteElement(Group):
     """Options of the source model ``finite_element``.
 
@@ -475,7 +474,7 @@ class FiniteElement(Group):
     snapshot_interval: float = field(default=0.0, metadata={"group": "output"})
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class HollowSphere(Group):
     """Options of the source model ``hollow_sphere``.
 
@@ -490,7 +489,7 @@ class HollowSphere(Group):
     momentum_flux: HollowSphereMomentumFlux = "momentum_balance"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class MeasuredModes(Group):
     """Options of the source model ``measured_modes``.
 
@@ -513,7 +512,7 @@ class MeasuredModes(Group):
     allow_mass_mismatch: bool = False
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class HuntCrossley(Group):
     """Options of the source model ``hunt_crossley``.
 
@@ -539,7 +538,7 @@ class HuntCrossley(Group):
     restitution: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class TwoMass(Group):
     """Options of the source model ``two_mass``.
 
@@ -577,7 +576,7 @@ class TwoMass(Group):
     belt_damping: float = 0.2
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class RectangularFloor(Group):
     """What all floors of rectangular plates have.
 
@@ -673,14 +672,14 @@ class RectangularFloor(Group):
     point_y: Sequence[float] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Rigid(Group):
     """Floor ``rigid``."""
 
     name: ClassVar[FloorName] = "rigid"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class InfinitePlate(Group):
     """Floor ``infinite_plate``.
 
@@ -694,7 +693,7 @@ class InfinitePlate(Group):
     resistance: float = 1600.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Oscillator(Group):
     """Floor ``oscillator``.
 
@@ -714,7 +713,7 @@ class Oscillator(Group):
     damping: float = 785.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Plate(RectangularFloor):
     """Floor ``plate``, with all keys of `RectangularFloor`.
 
@@ -762,7 +761,7 @@ class Plate(RectangularFloor):
     channel_spacing: float = 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class LaminateFloor(RectangularFloor):
     """Floor ``laminate_floor``, with all keys of `RectangularFloor`.
 
@@ -812,7 +811,7 @@ class LaminateFloor(RectangularFloor):
     channel_spacing: float = 0.5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class JoistFloor(RectangularFloor):
     """Floor ``joist_floor``, with all keys of `RectangularFloor`.
 
@@ -864,7 +863,7 @@ class JoistFloor(RectangularFloor):
     source_on: JoistFloorSourceOn = "sheathing"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class MeasuredMobility(Group):
     """Floor ``measured_mobility``.
 
@@ -931,7 +930,7 @@ class MeasuredMobility(Group):
     edge_absorption: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ModalFloor(Group):
     """Floor ``modal_floor``.
 

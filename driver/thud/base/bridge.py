@@ -1,14 +1,10 @@
-"""All calls of the Fortran library.
-
-Bundles of the library become dictionaries, and its status codes become exceptions.
-"""
+"""All calls of the Fortran library: its bundles become dictionaries, its statuses exceptions."""
 
 from __future__ import annotations
 
 import math
 import re
 import threading
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,10 +33,11 @@ _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) -> Bundle:
     """Ask the library a question of `thud_answer`; return its answer.
 
-    The answer holds texts, numbers and arrays by name; items named ``group.name`` are in a
-    dictionary for each group. An interrupt ends the computation early: the main thread runs the
-    signal handlers and asks again if they raise nothing; other threads raise KeyboardInterrupt.
-    Raise InputError or NumericalError with the message of the library.
+    The answer has texts, numbers and arrays by name; items named ``group.name`` are in a
+    dictionary for each group. Bytes of texts that are not UTF-8 become surrogate escapes. An
+    interrupt ends the computation early: the main thread runs the signal handlers and asks again if
+    they raise nothing; other threads raise KeyboardInterrupt. Raise InputError or NumericalError
+    with the message of the library.
     """
     packed = _packed(request)
     while (answer := api.ask(question, *packed))[0] > _INTERRUPTED:
@@ -54,24 +51,20 @@ def _packed(
     request: Mapping[str, str | bytes | float | NDArray[np.float64]],
 ) -> tuple[str, bytes, NDArray[np.float64]]:
     """Return header, texts and values of a request; arrays are flattened in Fortran order."""
-    header = ""
-    texts = b""
-    arrays = []
-    count = 0
+    header, texts = "", b""
+    count, arrays = 0, [np.zeros(0)]
     for name, value in request.items():
         if isinstance(value, str | bytes):
-            encoded = value.encode(errors="surrogateescape") if isinstance(value, str) else value
-            header += f"{name}\t{len(texts) + 1} {len(encoded)}\n"
-            texts += encoded
+            content = value.encode(errors="surrogateescape") if isinstance(value, str) else value
+            header += f"{name}\t{len(texts) + 1} {len(content)}\n"
+            texts += content
         else:
-            size = value.size if isinstance(value, np.ndarray) else 1
-            header += f"{name}\t{count + 1} {size}\n"
-            arrays.append((slice(count, count + size), value))
-            count += size
-    values = np.zeros(max(1, count))  # f2py does not pass empty arrays
-    for span, value in arrays:
-        values[span] = value.ravel(order="F") if isinstance(value, np.ndarray) else value
-    return header, texts, values
+            arrays.append(np.ravel(value, order="F"))
+            header += f"{name}\t{count + 1} {len(arrays[-1])}\n"
+            count += len(arrays[-1])
+    if not count:
+        arrays.append(np.zeros(1))  # f2py does not pass empty arrays
+    return header, texts, np.concatenate(arrays)
 
 
 def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
@@ -79,29 +72,30 @@ def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
     data, values = api.collect(handle, n_byte, n_value)
     header, _, texts = data.tobytes().partition(b"\0")
     answer: Bundle = {}
-    at = {"text": 0, "values": 0}
-    for group, name, extents, length in _items(header):
+    for line in header.decode().splitlines():
+        full, _, form = line.partition("\t")
+        group, _, name = full.rpartition(".")
         items = answer.setdefault(group, {}) if group else answer
-        if extents is None:
-            items[name] = texts[at["text"] : at["text"] + length]
-            at["text"] += length
+        if form.startswith("t"):
+            length = int(form[1:])
+            items[name] = texts[:length].decode(errors="surrogateescape")
+            texts = texts[length:]
         else:
-            chunk = values[at["values"] : at["values"] + length]
-            items[name] = chunk.reshape(extents, order="F") if extents else float(chunk[0])
-            at["values"] += length
+            extents = [int(extent) for extent in form.split(",") if extent]
+            length = math.prod(extents)
+            array = values[:length].reshape(extents, order="F")
+            items[name] = array if extents else float(array)
+            values = values[length:]
     if status:
-        kind = _ERRORS.get(status, NumericalError)
-        raise kind(text(answer["message"]), _refused(answer) if "group" in answer else None)
+        note = None
+        if "group" in answer:
+            subject = ".".join(answer[name] for name in ("group", "key") if answer[name])
+            value, low, high, low_open, high_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
+            others = {"name": _name(subject), "text": answer["problem"]}
+            others |= {"low_open": low_open, "high_open": high_open}
+            note = Note("refused", subject, value, low, high, others=others)
+        raise _ERRORS.get(status, NumericalError)(answer["message"], note)
     return answer
-
-
-def _refused(answer: Bundle) -> Note:
-    """Return what an error of the library is about."""
-    subject = ".".join(text(answer[name]) for name in ("group", "key") if answer[name])
-    value, low, high, low_open, high_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
-    others = {"name": _name(subject), "text": text(answer["problem"])}
-    others |= {"low_open": low_open, "high_open": high_open}
-    return Note("refused", subject, value, low, high, others=others)
 
 
 def _name(subject: str) -> str:
@@ -110,31 +104,11 @@ def _name(subject: str) -> str:
     return f"&{group}: {key}".rstrip()
 
 
-@lru_cache(maxsize=64)
-def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
-    """Return group, name, extents and length of each item of a header; texts have no extents."""
-    items: list[tuple[str, str, tuple[int, ...] | None, int]] = []
-    for line in header.decode().splitlines():
-        full, _, form = line.partition("\t")
-        group, _, name = full.rpartition(".")
-        if form.startswith("t"):
-            items.append((group, name, None, int(form[1:])))
-            continue
-        extents = tuple(int(extent) for extent in form.split(",") if extent)
-        items.append((group, name, extents, math.prod(extents)))
-    return items
-
-
-def text(value: bytes) -> str:
-    """Return the text in bytes of the library; invalid UTF-8 becomes surrogate escapes."""
-    return value.decode(errors="surrogateescape")
-
-
 def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
     """Return the warnings in a group of an answer, if there are any."""
     if not group:
         return ()
-    words = (text(group[name]).split("\n") for name in ("code", "subject", "text"))
+    words = (group[name].split("\n") for name in ("code", "subject", "text"))
     # Equal notes have the same NaN.
     numbers = (
         [math.nan if math.isnan(value) else float(value) for value in group[name]]
@@ -153,12 +127,12 @@ def without_units(columns: Mapping[str, Any]) -> dict[str, Any]:
 
 def version() -> str:
     """Return the version of the library."""
-    return text(ask("library")["version"])
+    return str(ask("library")["version"])
 
 
 def compiler() -> str:
     """Return the compiler of the library and its options, except options with paths."""
-    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(ask("library")["compiler"]))
+    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", ask("library")["compiler"])
 
 
 def progress() -> float:

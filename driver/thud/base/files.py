@@ -132,7 +132,7 @@ class Results:
 
         After an error it is removed. Raise InputError if the old one may not be replaced.
         """
-        part = Path(os.fsdecode(self._ask("open_results")["folder"]))
+        part = Path(self._ask("open_results")["folder"])
         try:
             yield part
         except BaseException:

@@ -1,16 +1,13 @@
-"""Declaration of an input key, and the base of the classes whose fields are keys."""
+"""Declarations of keys of the input and of quantities of results, as the library has them."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Literal
 
-from thud.base.checks import refuse, refuse_unknown
+from thud.base.checks import refuse
 from thud.base.immutable import Plain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
 
@@ -57,16 +54,52 @@ class Key:
     needs: tuple[str, ...] = ()
 
 
-class Group(Plain):
-    """Base of the dataclasses whose fields are keys, or groups of them."""
+@dataclass(frozen=True)
+class Quantity:
+    """Number that describes an impact.
 
-    def __new__(cls, *_: object, **keywords: object) -> Self:
-        """Raise InputError if a keyword is not a field."""
-        names = [field.name for field in fields(cls)]  # type: ignore[arg-type]
-        for word in keywords:
-            if word not in names:
-                refuse_keyword(f"{cls.__name__}()", word, names)
-        return super().__new__(cls)
+    Attributes
+    ----------
+    name, title : str
+        Name in files and programs, and in tables for readers.
+    symbol : str
+        Symbol in the mathematical notation of matplotlib; empty if there is none.
+    unit : str
+        SI unit, or dB; empty for pure numbers.
+    display_unit : str
+        Unit in tables for readers.
+    display_scale : float
+        Number of display units in one `unit`.
+    decimals : int
+        Decimals in tables for readers.
+    meaning : str
+        Description.
+    """
+
+    name: str
+    title: str
+    symbol: str
+    unit: str
+    display_unit: str
+    display_scale: float
+    decimals: int
+    meaning: str
+
+    @property
+    def label(self) -> str:
+        """Title and display unit."""
+        return f"{self.title}, {self.display_unit}".removesuffix(", ")
+
+    def show(self, value: float) -> str:
+        """Return the text of a value in SI units, converted to `display_unit`; empty for NaN."""
+        if math.isnan(value):
+            return ""
+        shown = value * self.display_scale
+        return f"{shown:.{self.decimals}f}" if 10**-self.decimals <= abs(shown) else f"{shown:z.3g}"
+
+
+class Group(Plain):
+    """Base of the dataclasses whose fields are keys."""
 
     def __post_init__(self) -> None:
         """Make a number or a text a list of one where a list is needed.
@@ -76,27 +109,7 @@ class Group(Plain):
         super().__post_init__()
         for option in fields(self):  # type: ignore[arg-type]
             value = getattr(self, option.name)
-            if not isinstance(option.default, tuple):
-                continue
-            if isinstance(value, int | float | str):
+            if isinstance(option.default, tuple) and isinstance(value, int | float | str):
                 object.__setattr__(self, option.name, (value,))
-            elif option.default and isinstance(value, tuple | list) and not value:
+            elif option.default and value == ():
                 refuse(f"{type(self).__name__}: {option.name} is empty", "one number or more")
-
-
-def _groups(base: type[Group]) -> Iterator[type[Group]]:
-    """Return the classes of groups below a base that have no class below them."""
-    for group in base.__subclasses__():
-        yield from _groups(group) if group.__subclasses__() else (group,)
-
-
-def refuse_keyword(label: str, word: str, allowed: Iterable[str]) -> None:
-    """Raise InputError for an unknown keyword; its message names the classes with that field."""
-    keys = {group.__name__: [field.name for field in fields(group)] for group in _groups(Group)}  # type: ignore[arg-type]
-    if owners := [name for name, names in keys.items() if word in names]:
-        refuse(
-            f"{label}: {word!r} is a key of {' and '.join(owners)}",
-            " or ".join(f"{name}({word}=...)" for name in owners),
-        )
-    also = [near for name, names in keys.items() for near in (name.lower(), *names)]
-    refuse_unknown(label, [word], allowed, also)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import f90nml
@@ -29,7 +29,7 @@ from thud.base._schema import (
     Sampling,
     Unknowns,
 )
-from thud.base.bridge import ask, text
+from thud.base.bridge import ask
 from thud.base.checks import (
     MAX_NUMBER,
     refuse,
@@ -38,17 +38,17 @@ from thud.base.checks import (
     require_choice,
     require_kind,
     shown,
+    suggestion,
 )
 from thud.base.display import Displayed
 from thud.base.errors import InputError
 from thud.base.files import replace_file
-from thud.base.key import Group
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Any, Self
 
-    from thud.base.key import Key
+    from thud.base.key import Group, Key
 
 # Values by group and key, as f90nml has them.
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
@@ -81,13 +81,18 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
     if model is None:
-        return ModalBall(**options)  # type: ignore[arg-type]
+        model = ModalBall.name
     require_choice("&model: name", model, MODELS)
+    known = [option.name for option in fields(MODELS[model])]
+    for word in options.keys() - known:
+        owners = dict.fromkeys(key.owner or f"&{key.group}" for key in KEYS if key.name == word)
+        of = f", but of {' and '.join(owners)}" if owners else suggestion(word, known)
+        refuse(f"{word!r} is no option of {model}{of}", ", ".join(known))
     return MODELS[model](**options)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Case(Group, Displayed):
+@dataclass(frozen=True, repr=False)
+class Case(Displayed):
     """Input of one run.
 
     Attributes
@@ -260,7 +265,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     InputError
         If the input is invalid; the message names file, group, key, value and allowed range.
     """
-    return Case.from_text(text(ask("effective_case", path=os.fsencode(path))["case"]))
+    return Case.from_text(ask("effective_case", path=os.fsencode(path))["case"])
 
 
 def check_case(case: Case) -> None:

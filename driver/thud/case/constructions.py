@@ -84,7 +84,7 @@ class Layer(NamedTuple):
         return f"{self.material}, {1e3 * self.width:g} mm wide, {self.spacing:g} m apart"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, repr=False)
 class Construction(Displayed):
     """A floor construction.
 
@@ -184,7 +184,7 @@ class Construction(Displayed):
         return f"<Construction {self.name}: {', '.join(map(str, self.layers))}>"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, repr=False)
 class Constructions(Displayed):
     """Floor constructions: a sequence, with access by name.
 

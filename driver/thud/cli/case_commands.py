@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.base._schema import VERDICTS
-from thud.base.bridge import ask, notes, text
+from thud.base.bridge import ask, notes
 from thud.base.checks import refuse
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
@@ -100,7 +100,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         print_notes(f"{path}: {value}" for value in notes(answer.get("warnings", {})))
         results.write_into(folder, _figures(answer, options))
     if not options.quiet:
-        print_results(text(answer["table"]).removesuffix("\n"))
+        print_results(answer["table"].removesuffix("\n"))
         print_path("  Results", f"{results.folder}\n")
     return bool(answer["conforms"])
 
@@ -142,7 +142,7 @@ def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     contents: dict[str, bytes] = {}
     if options.no_figures and not options.animation:
         return contents
-    case = Case.from_text(text(answer["case"]))
+    case = Case.from_text(answer["case"])
     impact = new_impact(case, answer) if "force" in answer else None
     modes = new_modes(case.ball, answer) if "modes" in answer else None
     curve = new_curve(case, answer) if "compression" in answer else None

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
-    from thud.base.quantity import Quantity
+    from thud.base.key import Quantity
     from thud.level.assessment import Criterion
     from thud.recordings.recording import ImpactResult
 

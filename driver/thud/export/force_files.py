@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.arguments import check_arguments
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
@@ -108,7 +107,6 @@ class BlockedForce(DropForce):
         return [Path(name) for name in contents]
 
 
-@check_arguments
 def blocked_force(
     source: ImpactResult, *, drop: int = 1, rate: float | None = None
 ) -> BlockedForce:
@@ -140,7 +138,7 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
     require_number("rate", rate)
     if not RATES[0] <= rate <= RATES[1]:
         refuse_value("rate", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    ratio = Fraction(rate / original.sample_rate).limit_denominator(MAX_RATIO)
+    ratio = Fraction(float(rate) / original.sample_rate).limit_denominator(MAX_RATIO)
     up, down = ratio.numerator, ratio.denominator
     if up > MAX_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:
         refuse(

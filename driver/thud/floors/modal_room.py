@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import RectangularFloor
-from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.display import Displayed
@@ -108,7 +107,6 @@ class ModalRoom(Displayed):
         )
 
 
-@check_arguments
 def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in them
     source: ImpactResult,
     floor: FloorOptions | None = None,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from thud.base._schema import LIMITS, VERDICTS, Room
-from thud.base.arguments import check_arguments
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
@@ -189,7 +188,6 @@ class RoomPrediction(RoomLevel, Displayed):
         return f"<RoomPrediction: {title} {prediction_text.rating_text(self)}>"
 
 
-@check_arguments
 def predict_level(
     source: ImpactResult | None = None,
     floor: FloorOptions | Construction | str | None = None,

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
-from thud.base.arguments import check_arguments
 from thud.base.bridge import ask, without_units
 from thud.base.display import Displayed
 from thud.base.extras import data_frame
@@ -66,7 +65,6 @@ class CompressionCurve(Displayed):
         return data_frame({"deflection_m": self.deflection, "force_N": self.force})
 
 
-@check_arguments
 def compress(
     ball: Ball | None = None,
     model: ModelName | ModelOptions = "modal_ball",

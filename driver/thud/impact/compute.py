@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base._schema import IMPACT_QUANTITIES, RATINGS, Ball, Drop, Sampling
-from thud.base.bridge import ask, notes, text, without_units
+from thud.base.bridge import ask, notes, without_units
 from thud.base.checks import refuse, require_kind
 from thud.base.errors import NumericalError, PlausibilityWarning
 from thud.case.case import Case, case_text, impact_only, new_model
@@ -165,7 +165,7 @@ def new_room_level(answer: Bundle) -> RoomLevel:
         )
         raise NumericalError(message)
     summary = answer["room_summary"]
-    names = text(summary["contribution"]).split("\n")
+    names = summary["contribution"].split("\n")
     contributed = zip(names, summary["contributed"].tolist(), strict=True)
     contributions = dict(sorted(contributed, key=lambda entry: -entry[1]))
     length, width, height = room["sides"].tolist()
@@ -183,7 +183,7 @@ def new_room_level(answer: Bundle) -> RoomLevel:
             for name, level in zip(RATINGS, summary["level"], strict=True)
         },
         probability=summary.get("probability", np.nan),
-        verdict=text(summary.get("verdict", b"")),
+        verdict=summary.get("verdict", ""),
         floor_notes=notes(answer.get("room_warnings", {})),
     )
 

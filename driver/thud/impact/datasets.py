@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.base.key import Key
-    from thud.base.quantity import Quantity
+    from thud.base.key import Key, Quantity
     from thud.case.case import Case
     from thud.impact.outcomes import Ensemble
     from thud.recordings.recording import ImpactResult

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base._schema import KEYS, Limits
-from thud.base.arguments import check_arguments
-from thud.base.bridge import ask, text
+from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -49,7 +48,6 @@ _MAX_SAMPLES = 2**17
 _MAX_VALUES = 2**26
 
 
-@check_arguments
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
     parameters: Mapping[str, ArrayLike] | pd.DataFrame,
     case: Case | None = None,
@@ -196,7 +194,7 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
         "samples", case=content, keys=",".join(names).encode("ascii", "replace"),
         key_count=len(names), values=numbers.T, threads=threads, levels=levels, forces=forces,
     )  # fmt: skip
-    reasons = text(answer.pop("reasons")).split("\n")[:-1]
+    reasons = answer.pop("reasons").split("\n")[:-1]
     results = {
         name: values.T != 0 if name in _FLAGS else values.T for name, values in answer.items()
     }

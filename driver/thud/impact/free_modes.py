@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
-from thud.base.arguments import check_arguments
 from thud.base.bridge import ask, notes, without_units
 from thud.base.checks import refuse, require_array, require_kind, require_real
 from thud.base.display import Displayed
@@ -89,7 +88,6 @@ class FreeModes(Displayed):
         return [("frequency, Hz", "harmonic", "participation"), *rows]
 
 
-@check_arguments
 def free_modes(
     ball: Ball | None = None,
     count: int = Modes.count,

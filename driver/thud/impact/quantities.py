@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from thud.base._schema import BANDS, QUANTITIES, RATED_BANDS, SAMPLE_QUANTITIES
-from thud.base.quantity import Quantity
+from thud.base.key import Quantity
 
 # Nominal frequencies, Hz, by the name of the dimension: of force levels, and of levels in a room.
 FREQUENCIES = {bands: entry["nominal"] for bands, entry in BANDS.items()} | {

@@ -99,13 +99,13 @@ def _new_impact(folder: Path, files: dict[str, str]) -> Impact:
     return new_impact(Case.from_text(files["effective.nml"]), answer)
 
 
-def _warnings(group: Mapping[str, Any]) -> dict[str, bytes | NDArray[np.float64]]:
+def _warnings(group: Mapping[str, Any]) -> dict[str, str | NDArray[np.float64]]:
     """Return the warnings of a summary as the library sends them."""
     # f90nml returns a single entry without a list, and drops unknown numbers at the end of one.
     lists = {name: entry if isinstance(entry, list) else [entry] for name, entry in group.items()}
     count = len(lists["code"])
-    result: dict[str, bytes | NDArray[np.float64]] = {
-        name: "\n".join(lists[name]).encode() for name in ("code", "subject", "text")
+    result: dict[str, str | NDArray[np.float64]] = {
+        name: "\n".join(lists[name]) for name in ("code", "subject", "text")
     }
     for name in ("value", "low", "high"):
         entries = [*lists.get(name, ()), *[None] * count]

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base._schema import LIMITS, QUANTITIES, VERDICTS
-from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_choice
 from thud.base.display import Displayed
-from thud.base.quantity import Quantity
+from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
@@ -319,7 +318,6 @@ class Verdict(Outcome):
         return csv_text([columns, *rows, ("all", *("",) * 6, *ends, "", self.conforms)])
 
 
-@check_arguments
 def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     levels: Iterable[Estimate | float],
     contact_time: Estimate | float = math.nan,

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import fdtrc
 
-from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_number
 from thud.base.note import Note
 from thud.recordings.channel import regular_file, shown_path, shown_text
@@ -72,7 +71,6 @@ MAX_DECAY = 0.5
 MAX_UNCERTAINTY = 0.1
 
 
-@check_arguments
 def calibrate(  # noqa: PLR0913 - the keys of the configuration
     record: Signal | str | os.PathLike[str],
     *,

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.special import chdtrc, stdtrit
 
-from thud.base.arguments import check_arguments
 from thud.base.checks import refuse
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.calibration import open_source
@@ -146,7 +145,6 @@ class _Tap(NamedTuple):
     before: NDArray[np.float64]
 
 
-@check_arguments
 def calibrate_tap(
     record: Signal | str | os.PathLike[str], *, channel: int | str | None = None
 ) -> TappedPlate:

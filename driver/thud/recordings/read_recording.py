@@ -13,7 +13,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from thud.base.arguments import check_arguments
 from thud.base.checks import refuse
 from thud.base.note import Note, about
 from thud.recordings.assumptions import with_assumptions
@@ -97,7 +96,6 @@ def measure_stages(section: Section, config: Config, calibration: float | None =
     return Stages(section, repaired, corrected, drop)
 
 
-@check_arguments
 def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     paths: Source | Iterable[Source],
     *,

@@ -13,7 +13,7 @@ from thud.recordings.assumptions import AMPLITUDE_DECIBEL
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from thud.base.quantity import Quantity
+    from thud.base.key import Quantity
 
 NOT_KNOWN = "not known"
 COUNT = "peak_count"

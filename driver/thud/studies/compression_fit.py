@@ -11,7 +11,6 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from thud.base._schema import Ball, Compression
-from thud.base.arguments import check_arguments
 from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
@@ -132,7 +131,6 @@ class CompressionFit(Estimates):
         return compression({"measured": measured, "model": self.curve})
 
 
-@check_arguments
 def fit_compression(  # noqa: PLR0913 - as in `compress`
     deflection: ArrayLike,
     force: ArrayLike,

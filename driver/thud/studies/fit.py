@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.base._schema import FiniteElement
-from thud.base.arguments import check_arguments
 from thud.base.checks import MAX_SEED, refuse, refuse_value, require_kind, require_whole
 from thud.base.errors import FitWarning, InputError, ThudError
 from thud.base.files import read_input
@@ -56,7 +55,6 @@ OPTIONS: dict[str, Any] = {
 _MAXIMUM = 100_000
 
 
-@check_arguments
 def fit(  # noqa: PLR0913 - options of a search
     target: Target | Recording | Impact | tuple[ArrayLike, ArrayLike] | list[Target],
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],

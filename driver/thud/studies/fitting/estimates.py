@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.arguments import check_arguments
 from thud.base.units import display_unit
 from thud.studies.fitting.inference import coverage_factor
 from thud.studies.study_result import StudyResult
@@ -90,7 +89,6 @@ class Estimates(StudyResult):
         """Degrees of freedom of Student's t in the intervals; None: they are normal."""
         return self.degrees_of_freedom
 
-    @check_arguments
     def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
         """Return confidence intervals by name, see `interval_freedom`.
 
