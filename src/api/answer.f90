@@ -13,6 +13,7 @@ module thud_answer
    use thud_field, only: name_length
    use thud_finite_element, only: finite_element_type
    use thud_floor_answers, only: answer_floor, answer_mobility_fit
+   use thud_interrupt, only: is_forked
    use thud_kinds, only: wp
    use thud_level_answers, only: answer_level
    use thud_progress_line, only: begin_progress, end_progress
@@ -20,7 +21,6 @@ module thud_answer
    use thud_request, only: request_type
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
    use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
-   use thud_system, only: is_forked
    use thud_text, only: newline, quoted
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)

@@ -9,11 +9,11 @@ module thud_api
    use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_bundle, only: bundle_type, retrieve, store
    use thud_error, only: error_type
+   use thud_interrupt, only: begin_call, end_call, interrupt_calls
    use thud_kinds, only: int64, int8, wp
    use thud_memory, only: require_memory
    use thud_progress, only: latest_progress
    use thud_request, only: request_type
-   use thud_system, only: begin_call, end_call, interrupt_calls
    use thud_text, only: to_text
    implicit none (type, external)
    private

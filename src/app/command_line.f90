@@ -5,16 +5,16 @@ module thud_command_line
    use thud_case, only: case_type
    use thud_case_text, only: describe_keys
    use thud_constants, only: version
-   use thud_error, only: bad_input, error_type, input_error
-   use thud_kinds, only: wp
-   use thud_memory, only: require_memory
+   use thud_error, only: bad_input, error_type, input_error, numerical_error
+   use thud_interrupt, only: prepare_process
+   use thud_kinds, only: int64, int8
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case, run_options_type
    use thud_samples_run, only: run_samples
    use thud_schema, only: get_schema
    use thud_screen, only: print_message, print_results, red, write_screen, yellow
    use thud_suggestion, only: get_suggestion
-   use thud_system, only: prepare_process, standard_output
+   use thud_system, only: standard_output
    use thud_text, only: join, newline, quoted, wrap_lines
    implicit none (type, external)
    private
@@ -32,8 +32,8 @@ module thud_command_line
    character(len=*), parameter :: usage = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] ' &
       //'[--all] [--check] [--quiet] [--verbose] | --keys | --schema | --help | --version'
 
-   !> Memory that OpenBLAS allocates in each thread that uses it, bytes; without it OpenBLAS would wait forever.
-   real(wp), parameter :: blas_memory = 160.0e6_wp
+   !> Address space that OpenBLAS allocates in each thread that uses it, bytes; without it OpenBLAS would wait forever.
+   integer(int64), parameter :: blas_memory = 160000000_int64
 
    !> Long names of all options.
    character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
@@ -68,7 +68,9 @@ contains
       type(bundle_type) :: records
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
-      integer :: i
+      integer(int8), allocatable, volatile :: buffer(:)
+      character(len=128) :: message
+      integer :: i, status
 
       exit_code = 0
       call prepare_process()
@@ -81,10 +83,11 @@ contains
          call write_screen(standard_output, request%information//newline, exit_code)
       else
          if (.not. request%quiet) call begin_progress()
-         call require_memory(blas_memory*request%threads, 'buffers of OpenBLAS', 'more memory, or fewer threads', &
-            error, mostly_unused=.true.)
-         if (allocated(error)) then
-            continue
+         ! Linux refuses more at once than the machine has.
+         allocate (buffer(blas_memory*request%threads), stat=status, errmsg=message)
+         if (allocated(buffer)) deallocate (buffer)
+         if (status /= 0) then
+            error = numerical_error('buffers of OpenBLAS do not fit into the memory; allowed: more memory, or fewer threads')
          else if (request%samples == '') then
             call run_case(request%case_file, request%options, case, records, outcome, error)
          else

@@ -2,8 +2,15 @@
 program thud
    use, intrinsic :: iso_c_binding, only: c_int
    use thud_command_line, only: execute
-   use thud_system, only: end_process
    implicit none (type, external)
+   interface
+      ! Threads of OpenBLAS that wait for memory would delay a usual exit.
+      subroutine end_process(code) bind(c, name='_exit')
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: code
+      end subroutine end_process
+   end interface
    integer :: exit_code
 
    call execute(exit_code)

@@ -9,7 +9,7 @@ module thud_text
    private
 
    public :: byte_order_mark, fixed, flush_right, get_width, is_number, is_utf8, join, join_quoted, lower_case, marked
-   public :: newline, padded, quoted, replaced, shortened, significant, tab, to_text, wrap_lines
+   public :: newline, padded, quoted, replaced, shortened, significant, split, tab, to_text, wrap_lines
 
    !> Width of the screen, characters.
    integer, parameter, public :: screen_width = 80
@@ -236,6 +236,23 @@ contains
       short = text
       if (len(text) > longest_shown) short(longest_shown - 2:) = '...'
    end function shortened
+
+   !> Pieces of a text between marks; none of an empty text.
+   pure subroutine split(text, mark, pieces)
+      character(len=*), intent(in) :: text
+      character(len=1), intent(in) :: mark
+      !> The pieces: [n_piece].
+      character(len=*), allocatable, intent(out) :: pieces(:)
+      integer :: i, at, length
+
+      allocate (pieces(count([(text(i:i) == mark, i=1, len(text))]) + merge(1, 0, len(text) > 0)))
+      at = 1
+      do i = 1, size(pieces)
+         length = index(text(at:)//mark, mark) - 1
+         pieces(i) = text(at:at + length - 1)
+         at = at + length + 1
+      end do
+   end subroutine split
 
    !> Text as a namelist character constant, with quotes inside doubled.
    pure function quoted(text) result(constant)

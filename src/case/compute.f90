@@ -11,6 +11,7 @@ module thud_compute
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
+   use thud_interrupt, only: is_forked
    use thud_kinds, only: wp
    use thud_memory, only: require_memory
    use thud_note, only: note_type
@@ -21,7 +22,6 @@ module thud_compute
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: combine_verdicts, conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_verdict, verdict_conforms
-   use thud_system, only: is_forked
    use thud_warnings, only: add_modes_warning, add_source_warning, get_warnings
    implicit none (type, external)
    private

@@ -6,18 +6,17 @@ module thud_run
    use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
    use thud_error, only: error_type, input_error, prefix_error
-   use thud_file, only: read_text_file
    use thud_note, only: get_sentence
    use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
    use thud_records, only: add_results
-   use thud_result_directory, only: check_target, close_results, open_results, result_directory_type, write_file
+   use thud_result_directory, only: add_text, check_target, close_results, open_results, result_directory_type
    use thud_screen_tables, only: get_screen_tables
-   use thud_system, only: path_length
+   use thud_system, only: path_length, read_text_file
    use thud_text, only: lower_case, newline
    implicit none (type, external)
    private
 
-   public :: load_case, outcome_type, run_case, run_options_type
+   public :: load_case, new_directory, outcome_type, run_case, run_options_type
 
    !> Maximum length of a warning.
    integer, parameter :: message_length = 1200
@@ -75,13 +74,9 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      outcome%directory = options%output
-      if (options%output == '') outcome%directory = 'outputs/'//trim(case%name)
-      directory%path = outcome%directory
-      directory%command = 'run'
-      directory%subject = trim(case%name)
+      directory = new_directory(options, 'run', trim(case%name), '')
       directory%inputs = [character(len=path_length) :: path]
-      directory%replace = options%replace
+      outcome%directory = directory%path
       if (options%folder == '') call check_target(directory, no_names, error)
       ! The default scope is all that the case asks for.
       if (.not. allocated(error)) call compute(case, scope_type(), results, error)
@@ -90,7 +85,6 @@ contains
          if (case%has_impact) outcome%conforms = is_conforming(case, results%impact%assessment)
          call get_screen_tables(case, results, options%verbose, outcome%table)
          call add_results(records, case, results)
-         directory%folder = options%folder
          if (options%folder == '') call open_results(directory, error)
          call write_results(case, records, options%write_all, directory, error)
          if (options%folder == '') call close_results(directory, error)
@@ -98,13 +92,28 @@ contains
       if (allocated(error)) call prefix_error(error, path)
    end subroutine run_case
 
+   !> The directory that a command writes, yet without its inputs.
+   function new_directory(options, command, subject, ending) result(directory)
+      type(run_options_type), intent(in) :: options
+      !> Command; subject, the name of the case; ending of the default directory, `outputs/<subject><ending>`.
+      character(len=*), intent(in) :: command, subject, ending
+      type(result_directory_type) :: directory
+
+      directory%path = options%output
+      if (options%output == '') directory%path = 'outputs/'//subject//ending
+      directory%command = command
+      directory%subject = subject
+      directory%replace = options%replace
+      if (options%folder /= '') directory%folder = options%folder
+   end function new_directory
+
    !> Writes the files of results.
    subroutine write_results(case, records, write_all, directory, error)
       type(case_type), intent(in) :: case
       type(bundle_type), intent(in) :: records
       !> Also write additional quantities of the model.
       logical, intent(in) :: write_all
-      type(result_directory_type), intent(inout) :: directory
+      type(result_directory_type), intent(in) :: directory
       !> Set if an earlier step fails, or a file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text, summary
@@ -112,15 +121,15 @@ contains
 
       ! The input with all defaults filled in.
       call get_case_text(case, text)
-      call write_file(directory, 'effective.nml', text, error)
+      call add_text(directory, 'effective.nml', text, error)
       do i = 1, size(tables)
          call get_table_csv(records, tables(i), text)
-         if (text /= '') call write_file(directory, trim(tables(i))//'.csv', text, error)
+         if (text /= '') call add_text(directory, trim(tables(i))//'.csv', text, error)
       end do
       do i = 1, size(histories)
          if (index(histories(i), 'model') > 0 .and. .not. write_all) cycle
          call get_history_csv(records, histories(i), text)
-         if (text /= '') call write_file(directory, trim(histories(i))//'.csv', text, error)
+         if (text /= '') call add_text(directory, trim(histories(i))//'.csv', text, error)
       end do
       if (.not. case%has_impact) return
       summary = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline
@@ -128,7 +137,7 @@ contains
          call get_namelist(records, summary_groups(i), text)
          summary = summary//text
       end do
-      call write_file(directory, 'summary.nml', summary, error)
+      call add_text(directory, 'summary.nml', summary, error)
    end subroutine write_results
 
    !> Reads a case from a namelist file.

@@ -5,13 +5,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
-#include <math.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -28,19 +26,17 @@ static atomic_int running = 0;
 
 // Handlers of the process, which `record_signal` calls too.
 static const int ending_signals[] = {SIGINT, SIGTERM};
-static struct sigaction handlers[2];
+static void (*handlers[2])(int);
 
-static void record_signal(int number, siginfo_t *information, void *context)
+static void record_signal(int number)
 {
    static volatile sig_atomic_t nested = 0;
-   const struct sigaction *handler = &handlers[number == SIGTERM];
 
    if (running > 0) thud_latest_signal = number;
    // Another library may have saved this handler and call it from its own handler.
    if (nested) return;
    nested = 1;
-   if (handler->sa_flags & SA_SIGINFO) handler->sa_sigaction(number, information, context);
-   else handler->sa_handler(number);
+   handlers[number == SIGTERM](number);
    nested = 0;
 }
 
@@ -59,11 +55,10 @@ void thud_begin_call(void)
    running++;
    if (atomic_flag_test_and_set(&hooking)) return;
    for (int i = 0; i < 2; i++) {
-      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == record_signal
-          || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
-      handlers[i] = action;
-      action.sa_sigaction = record_signal;
-      action.sa_flags |= SA_SIGINFO;
+      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_flags & SA_SIGINFO
+          || action.sa_handler == record_signal || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
+      handlers[i] = action.sa_handler;
+      action.sa_handler = record_signal;
       sigaction(ending_signals[i], &action, NULL);
    }
    atomic_flag_clear(&hooking);
@@ -81,74 +76,30 @@ void thud_end_call(void)
    if (--running == 0) thud_latest_signal = 0;
 }
 
-// Handler of the executable: the work ends in order, and the process at the third signal, as some callers send one both to
-// the process and to its group.
-static void interrupt(int number)
+// Handler of the executable: some callers send a signal both to the process and to its group.
+static void end_at_third(int number)
 {
    static volatile sig_atomic_t count = 0;
 
-   thud_latest_signal = number;
    if (++count == 3) _exit(128 + number);
 }
 
-// Prepares the process of the executable: writing to a full file or a closed pipe is an error and not a signal, no file
-// gets the descriptor of a closed standard stream, SIGINT and SIGTERM end the work.
+// Begins a call as long as the process: no file gets the descriptor of a closed standard stream, writing to a full file or a
+// closed pipe is an error and not a signal.
 void thud_prepare_process(void)
 {
-   struct sigaction action = {.sa_handler = SIG_IGN}, before;
+   struct sigaction action;
 
    for (int i = 0; i <= STDERR_FILENO; i++)
       if (fcntl(i, F_GETFD) < 0 && open("/dev/null", i == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
-   sigaction(SIGPIPE, &action, NULL);
-   sigaction(SIGXFSZ, &action, NULL);
-   action.sa_handler = interrupt;
-   for (int i = 0; i < 2; i++)
-      if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
-         sigaction(ending_signals[i], &action, NULL);
-}
-
-// Limit of the memory of the container, bytes, in version 2 or 1 of control groups below a directory; infinite if there is
-// none.
-double thud_get_container_limit(const char *directory)
-{
-   static const char *const names[] = {"memory.max", "memory/memory.limit_in_bytes"};
-   double limit = INFINITY;
-   char path[256];
-
+   signal(SIGPIPE, SIG_IGN);
+   signal(SIGXFSZ, SIG_IGN);
    for (int i = 0; i < 2; i++) {
-      snprintf(path, sizeof path, "%s/%s", directory, names[i]);
-      FILE *file = fopen(path, "re");
-
-      // Version 2 writes "max" for no limit.
-      if (file && fscanf(file, "%lf", &limit) != 1) limit = INFINITY;
-      if (file) fclose(file);
-      if (limit < INFINITY) break;
+      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_handler == SIG_IGN) continue;
+      action.sa_handler = end_at_third;
+      sigaction(ending_signals[i], &action, NULL);
    }
-   return limit;
-}
-
-// 1 if there is address space for that many bytes and, if `check_available` is set, the system does not report that less
-// memory is available.
-int thud_has_memory(double bytes, int check_available)
-{
-   size_t wanted = bytes < 1e18 ? (size_t)bytes : (size_t)1e18;
-   void *block = mmap(NULL, wanted, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-   char line[128];
-   double kilobytes, free = -1.0;
-   FILE *file;
-
-   if (block == MAP_FAILED) return 0;
-   munmap(block, wanted);
-   if (!check_available) return 1;
-   // Linux promises more memory than it has, and ends a process that then writes to it.
-   file = fopen("/proc/meminfo", "re");
-   if (!file) return 1;
-   while (fgets(line, sizeof line, file)) {
-      if (sscanf(line, "MemAvailable: %lf", &kilobytes) == 1) free = (free < 0.0 ? 0.0 : free) + 1024.0*kilobytes;
-      if (sscanf(line, "SwapFree: %lf", &kilobytes) == 1 && free >= 0.0) free += 1024.0*kilobytes;
-   }
-   fclose(file);
-   return (free < 0.0 || bytes <= free) && bytes <= thud_get_container_limit("/sys/fs/cgroup");
+   thud_begin_call();
 }
 
 // Message of an error, at most `length` bytes including the final zero.
@@ -157,89 +108,43 @@ void thud_get_error_text(int number, char *text, size_t length)
    snprintf(text, length, "%s", strerror(number));
 }
 
-// A descriptor to write to a new file, or minus the number of the error.
-int thud_create(const char *path)
+// Writes a whole text to a descriptor, or to the end of a file, which it creates if it is missing. A closed pipe or standard
+// stream has no reader: no error.
+int thud_write(const char *path, int descriptor, const char *bytes, size_t length)
 {
-   int descriptor = open(path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+   int file = *path ? open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666) : descriptor;
+   int error = file < 0 ? errno : 0;
 
-   return descriptor < 0 ? -errno : descriptor;
-}
+   while (length > 0 && !error) {
+      ssize_t count = write(file, bytes, length);
 
-// Writes a whole text. A closed pipe or standard stream has no reader: no error.
-int thud_write(int descriptor, const char *bytes, size_t length)
-{
-   while (length > 0) {
-      ssize_t count = write(descriptor, bytes, length);
-
-      if (count < 0 && errno == EINTR) continue;
-      if (count < 0) return errno == EPIPE || errno == EBADF ? 0 : errno;
-      bytes += count;
-      length -= (size_t)count;
+      if (count < 0 && errno != EINTR) error = errno;
+      bytes += count > 0 ? count : 0;
+      length -= count > 0 ? (size_t)count : 0;
    }
-   return 0;
+   // Some systems report a full disk only when the file is closed.
+   if (*path && file >= 0 && close(file) != 0 && !error) error = errno;
+   return error == EPIPE || error == EBADF ? 0 : error;
 }
 
-// Closes a file; some systems report a full disk only then.
-int thud_close(int descriptor)
+// Makes a directory.
+int thud_make_directory(const char *path)
 {
-   return close(descriptor) == 0 ? 0 : errno;
+   return mkdir(path, 0777) == 0 ? 0 : errno;
 }
 
-// Absolute path without links, at most `length` bytes; creates missing parent directories.
-static int resolve(const char *path, char *resolved, size_t length)
+// Puts a directory in the place of another one, which then has its path, in one step if the file system can exchange names;
+// else the other one is `NAME.old` for a moment. If it is missing or empty, nothing has the path afterwards.
+int thud_swap(const char *path, const char *target)
 {
-   char above[PATH_MAX], *real_path, *end;
-   const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
-   size_t used = (size_t)snprintf(above, sizeof above, "%s", path);
-
-   if (used >= sizeof above) return ENAMETOOLONG;
-   for (end = above; *end && (end = strchr(end + 1, '/')); *end = '/') {
-      *end = 0;
-      if (mkdir(above, 0777) != 0) continue;
-   }
-   real_path = realpath(path, NULL);
-   if (real_path) {
-      used = (size_t)snprintf(resolved, length, "%s", real_path);
-   } else {
-      above[name - path] = 0;
-      real_path = errno == ENOENT ? realpath(*above ? above : ".", NULL) : NULL;
-      if (!real_path) return errno;
-      used = (size_t)snprintf(resolved, length, "%s/%s", real_path[1] ? real_path : "", name);
-   }
-   free(real_path);
-   return used < length ? 0 : ENAMETOOLONG;
-}
-
-// Makes a new directory beside a target, which may be missing: `.NAME.<process>-<number>.new`. Creates missing parents.
-int thud_make_beside(const char *target, char *path, size_t length)
-{
-   char resolved[PATH_MAX], *name;
-   int error = resolve(target, resolved, sizeof resolved);
-
-   if (error) return error;
-   name = strrchr(resolved, '/') + 1;
-   for (int i = 1; i <= 1000; i++) {
-      int used = snprintf(path, length, "%.*s.%s.%ld-%d.new", (int)(name - resolved), resolved, name, (long)getpid(), i);
-
-      if ((size_t)used >= length) return ENAMETOOLONG;
-      if (mkdir(path, 0777) == 0) return 0;
-      if (errno != EEXIST) return errno;
-   }
-   return EEXIST;
-}
-
-// Puts a directory in the place of a target, which then has the path of the first, in one step if the file system can
-// exchange names; else the target is `NAME.old` for a moment.
-int thud_swap(const char *path, const char *place)
-{
-   char target[PATH_MAX], old[PATH_MAX];
+   char old[PATH_MAX];
    struct stat there;
-   int error = resolve(place, target, sizeof target);
+   int error;
 
-   if (error) return error;
-   // The target is missing or empty.
    if (rename(path, target) == 0) return 0;
-   if (stat(target, &there) == 0 && chmod(path, there.st_mode & 07777) != 0) return errno;
+   error = errno;
+   if (stat(target, &there) != 0) return error;
+   if (chmod(path, there.st_mode & 07777) != 0) return errno;
 #if defined RENAME_EXCHANGE
    if (renameat2(AT_FDCWD, path, AT_FDCWD, target, RENAME_EXCHANGE) == 0) return 0;
    if (errno != EINVAL && errno != ENOSYS && errno != ENOTSUP) return errno;
@@ -254,29 +159,26 @@ int thud_swap(const char *path, const char *place)
    return rename(old, target) == 0 ? error : errno;
 }
 
-// 1 if two paths lead to the same file.
-int thud_is_same_file(const char *path, const char *other)
+// Path without links, at most `length` bytes including the final zero.
+int thud_get_real_path(const char *path, char *text, size_t length)
 {
-   struct stat here, there;
+   char resolved[PATH_MAX];
 
-   return stat(path, &here) == 0 && stat(other, &there) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino;
+   if (!realpath(path, resolved)) return errno;
+   return (size_t)snprintf(text, length, "%s", resolved) < length ? 0 : ENAMETOOLONG;
 }
 
-// Names in a directory, each with a slash behind it, as far as they fit; returns the length of all of them.
+// Names in a directory, each with a slash behind it; their length, or a negative number if they cannot be read or are longer.
 int thud_list(const char *path, char *names, size_t length)
 {
    DIR *directory = opendir(path);
    struct dirent *entry;
-   int used = 0;
+   size_t used = 0;
 
-   while (directory && (entry = readdir(directory))) {
-      const char *name = entry->d_name;
-      int size = (int)strlen(name) + 1;
-
-      if (strcmp(name, ".") == 0 || strcmp(name, "..") == 0) continue;
-      if ((size_t)(used + size) <= length) snprintf(names + used, length - (size_t)used + 1, "%s/", name);
-      used += size;
-   }
-   if (directory) closedir(directory);
-   return used;
+   if (!directory) return -1;
+   while ((entry = readdir(directory)) && used < length)
+      if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+         used += (size_t)snprintf(names + used, length - used, "%s/", entry->d_name);
+   closedir(directory);
+   return used < length ? (int)used : -1;
 }

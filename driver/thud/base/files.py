@@ -124,7 +124,7 @@ class Results:
 
         Without names, they are not known yet, and are checked when the directory is replaced.
         """
-        self._ask("check_results", **_numbered("names", names))
+        self._ask("check_results", names=_lines(names))
 
     @contextmanager
     def new_folder(self) -> Iterator[Path]:
@@ -163,13 +163,13 @@ class Results:
     def _ask(self, question: str, **more: bytes) -> dict[str, Any]:
         return ask(
             question, path=os.fsencode(self.folder), command=self.command, subject=self.subject,
-            replace=self.replace, **_numbered("inputs", self.inputs), **more,
+            replace=self.replace, inputs=_lines(self.inputs), **more,
         )  # fmt: skip
 
 
-def _numbered(name: str, paths: Iterable[str | os.PathLike[str]]) -> dict[str, bytes]:
-    """Return paths as texts ``name.1``, ``name.2`` and so on of a request."""
-    return {f"{name}.{number}": os.fsencode(path) for number, path in enumerate(paths, start=1)}
+def _lines(paths: Iterable[str | os.PathLike[str]]) -> bytes:
+    """Return paths as the lines of a text of a request."""
+    return b"\n".join(map(os.fsencode, paths))
 
 
 def refuse_foreign(path: Path) -> NoReturn:
