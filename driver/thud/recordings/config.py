@@ -59,9 +59,8 @@ class Instrument(Table):
 
 
 def _instrument(value: object, key: str) -> str | Instrument:
-    if isinstance(value, Mapping | Instrument):
-        return Instrument.read(value, key)
-    return to_line(value, key)
+    is_table = isinstance(value, Mapping | Instrument)
+    return Instrument.read(value, key) if is_table else to_line(value, key)
 
 
 @dataclass(frozen=True)
@@ -207,33 +206,25 @@ class Config(Table):
         in the wrong order. `file_dates` are those of the files, which count if no date is stated.
         """
         read = [times.read_date(text) for text in ([self.date] if self.date else file_dates)]
-        days = sorted(day.date().isoformat() for day in read if day)
-        first, last = (days[0], days[-1]) if days else ("", "")
+        days = sorted(day.date().isoformat() for day in read if day) or [""]
         received, issued = self.report.received, self.report.issued
         # Each pair should be in this order; dates that are not stated are empty.
         pairs = (
-            ("the item was received", received, "the measurement", first),
-            ("the measurement was made", last, "the issue of the report", issued),
+            ("the item was received", received, "the measurement", days[0]),
+            ("the measurement was made", days[-1], "the issue of the report", issued),
             ("the item was received", received, "the issue of the report", issued),
         )
-        result = [
-            *(
-                Note("calibration_overdue", item.name or "an instrument", others={"due": item.due})
-                for item in self.instruments
-                if isinstance(item, Instrument) and item.due and item.due < last
-            ),
-            *(
-                Note(
-                    "dates_in_wrong_order",
-                    others={"event": event, "day": day, "other": other, "limit": limit},
-                )
-                for event, day, other, limit in pairs
-                if day and limit and day > limit
-            ),
+        due = [entry for entry in self.instruments if isinstance(entry, Instrument) and entry.due]
+        notes = [
+            Note("calibration_overdue", entry.name or "an instrument", others={"due": entry.due})
+            for entry in due
+            if entry.due < days[-1]
         ]
-        if not last and any(isinstance(item, Instrument) and item.due for item in self.instruments):
-            result.append(Note("date_unknown"))
-        return result
+        for event, day, other, limit in pairs:
+            if day and limit and day > limit:
+                others = {"event": event, "day": day, "other": other, "limit": limit}
+                notes.append(Note("dates_in_wrong_order", others=others))
+        return notes if days[-1] or not due else [*notes, Note("date_unknown")]
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import MISSING, dataclass, field, fields
 from datetime import date
 from typing import Any, ClassVar, Self
 
@@ -37,28 +37,18 @@ class Number:
     low: float
     high: float
     unit: str = ""
+    whole: bool = False
 
-    def __call__(self, value: object, key: str) -> float:
+    def __call__(self, value: Any, key: str) -> Any:  # noqa: ANN401 - of a user; a number
         """Return the number; raise InputError if it is none or out of range."""
+        if self.whole:
+            require_whole(key, value, int(self.low), int(self.high))
+            return int(value)
         require_number(key, value)
-        number = float(value)  # type: ignore[arg-type]
-        if not self.low <= number <= self.high:
+        if not self.low <= float(value) <= self.high:
             allowed = f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
             refuse_value(key, value, allowed, low=self.low, high=self.high)
-        return number
-
-
-@dataclass(frozen=True)
-class Whole:
-    """Check of a whole number between two limits."""
-
-    low: int
-    high: int
-
-    def __call__(self, value: object, key: str) -> int:
-        """Return the number; raise InputError if it is none or out of range."""
-        require_whole(key, value, self.low, self.high)
-        return int(value)  # type: ignore[call-overload, no-any-return]
+        return float(value)
 
 
 @dataclass(frozen=True)
@@ -78,13 +68,11 @@ class Listed:
     """Check of each entry of a list, or of a single entry, which need not be in a list."""
 
     entry: Callable[[object, str], object]
-    numbered: bool = False
 
     def __call__(self, value: object, key: str) -> tuple[Any, ...]:
-        """Return the entries; messages number them if `numbered`."""
+        """Return the entries."""
         entries = value if isinstance(value, list | tuple) else [value]
-        names = [f"{key}, entry {i}" if self.numbered else key for i in range(1, len(entries) + 1)]
-        return tuple(map(self.entry, entries, names))
+        return tuple(self.entry(entry, key) for entry in entries)
 
 
 def to_line(value: object, key: str) -> str:
@@ -94,26 +82,25 @@ def to_line(value: object, key: str) -> str:
     return value
 
 
+def to_day(value: object, key: str) -> str:
+    """Return the date of the measurement as text, in any form."""
+    return value.isoformat() if isinstance(value, date) else to_line(value, key)
+
+
 def to_date(value: object, key: str) -> str:
     """Return a date as text in ISO 8601; empty if not stated."""
-    if isinstance(value, date):
-        return value.isoformat()[:10]
-    text = to_line(value, key)
+    text = to_day(value, key)
     read = times.read_date(text) if text else None
     if text and read is None:
         refuse_value(key, value, 'a date, such as "2024-05-03"')
     return read.date().isoformat() if read else ""
 
 
-def to_day(value: object, key: str) -> str:
-    """Return the date of the measurement as text, in any form."""
-    return value.isoformat() if isinstance(value, date) else to_line(value, key)
-
-
 def to_channel(value: object, key: str) -> int | str:
     """Return the number or the name of a channel."""
     is_number = isinstance(value, int) and not isinstance(value, bool)
-    return Whole(1, 1_000_000)(value, key) if is_number else to_line(value, key)
+    number: int = Number(1, 1_000_000, whole=True)(value, key) if is_number else 0
+    return number or to_line(value, key)
 
 
 def require_channels(value: object, key: str = "channels") -> str | tuple[int | str, ...]:
@@ -122,48 +109,37 @@ def require_channels(value: object, key: str = "channels") -> str | tuple[int | 
     >>> require_channels("F1 + F2 + 3")
     ('F1', 'F2', 3)
     """
+    names: Any = value if isinstance(value, list | tuple) else ()
     if isinstance(value, str):
         if value.strip().casefold() == SUM:
             return SUM
-        names: Sequence[object] = [
-            int(name) if name.isdecimal() else name for name in map(str.strip, value.split("+"))
-        ]
-    else:
-        names = value if isinstance(value, list | tuple) else ()
-    allowed = 1 < len(names) <= MAX_CELLS and all(
-        isinstance(name, int | str) and not isinstance(name, bool) and name for name in names
-    )
-    if not allowed or len(set(names)) < len(names):
+        parts = map(str.strip, value.split("+"))
+        names = [int(name) if name.isdecimal() else name for name in parts]
+    are_names = all(type(name) in {int, str} and name for name in names)
+    if not 1 < len(names) <= MAX_CELLS or not are_names or len(set(names)) < len(names):
         refuse_value(key, value, f"{EXAMPLES}, 2 to {MAX_CELLS} different")
-    return tuple(name for name in names if isinstance(name, int | str))
+    return tuple(names)
 
 
-def to_calibration(value: object, key: str) -> Calibration | str | float:
-    """Return a calibration: a number, a text or a `Calibration`."""
+def to_calibrations(value: object, key: str) -> Any:  # noqa: ANN401 - one, or a tuple of them
+    """Return a calibration, also that of a list of one, or one for each channel.
+
+    Each is a number, a chain of factors or a `Calibration`.
+    """
+    if isinstance(value, list | tuple):
+        several = len(value) > 1
+        names = [f"{key}, entry {i}" if several else key for i in range(1, len(value) + 1)]
+        entries = tuple(map(to_calibrations, value, names))
+        return entries[0] if len(entries) == 1 else entries
+    value = plain_number(value)
     if isinstance(value, Calibration):
         return value
-    value = plain_number(value)
     if not isinstance(value, str):
         return Number(-1e30, 1e30)(value, key)
     try:
         read_chain(to_line(value, key))
     except InputError as error:
         raise error.within(key) from error
-    return value
-
-
-def to_calibrations(value: object, key: str) -> Any:  # noqa: ANN401 - one, or a tuple of them
-    """Return a calibration, also that of a list of one, or one for each channel."""
-    if not isinstance(value, list | tuple):
-        return to_calibration(value, key)
-    if len(value) == 1:
-        return to_calibration(value[0], key)
-    return Listed(to_calibration, numbered=True)(value, key)
-
-
-def _table(value: object, key: str) -> Mapping[str, object]:
-    if not isinstance(value, Mapping):
-        refuse_value(key, value, "a table")
     return value
 
 
@@ -201,6 +177,12 @@ def to_numbers(value: object, key: str) -> str:
     return text
 
 
+def _table(value: object, key: str) -> Mapping[str, object]:
+    if not isinstance(value, Mapping):
+        refuse_value(key, value, "a table")
+    return value
+
+
 def to_reasons(value: object, key: str) -> dict[str, str]:
     """Return reasons by numbers of drops."""
     reasons = {
@@ -227,13 +209,13 @@ def to_limits(value: object, key: str) -> dict[str, tuple[float, float]]:
 
 
 def key(
-    check: Callable[[object, str], object],
+    check: Callable[[Any, str], object],
     meaning: str,
     default: object = None,
 ) -> Any:  # noqa: ANN401 - a field of any type
     """Declare a key: its check, which returns the value or raises InputError, and its meaning."""
     metadata = {"check": check, "meaning": meaning}
-    if isinstance(default, dict):
+    if default == {}:
         return field(default_factory=dict, metadata=metadata)
     return field(default=default, metadata=metadata)
 
@@ -265,11 +247,12 @@ class Table:
     @property
     def stated(self) -> list[str]:
         """Names of the keys whose values are not the defaults."""
-        values = ((entry, getattr(self, entry.name)) for entry in fields(self))
         return [
             entry.name
-            for entry, value in values
-            if value is not None and value is not entry.default
+            for entry in fields(self)
+            if (value := getattr(self, entry.name)) is not None
+            and value is not entry.default
+            and not (entry.default is MISSING and isinstance(value, dict) and not value)
         ]
 
     def require(self, *names: str) -> None:

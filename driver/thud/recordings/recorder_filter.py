@@ -11,7 +11,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.base.units import frequency_text
-from thud.recordings.config_values import Choice, Number, Table, Whole, key
+from thud.recordings.config_values import Choice, Number, Table, key
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,7 +34,7 @@ class RecorderFilter(Table):
     kind: str = key(
         Choice((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
     )
-    order: int | None = key(Whole(1, MAX_ORDER), "order")
+    order: int | None = key(Number(1, MAX_ORDER, whole=True), "order")
     cutoff: float = key(Number(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
     cutoff_uncertainty: float | None = key(
         Number(0.0, 0.5), "relative standard uncertainty of the cutoff"

@@ -47,7 +47,7 @@ from thud.recordings.times import DATE as DATE_CELL, seconds_of_day
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -413,21 +413,16 @@ def _title_row(line: str, layout: _Layout) -> list[str]:
         is_value = re.search(r"[:=]|[\t;]\s*\S", text) or is_number(text)
         return [] if is_value or not text else [text.strip('"')]
     for cells in (*_splits(text, separator), *_splits(text.partition("#")[0].rstrip(), separator)):
-        filled = cells[: _width(cells)]
         has_number = any(
             is_number(c.rstrip(":")) or DATE_CELL.fullmatch(c) or seconds_of_day(c) is not None
-            for c in filled
+            for c in cells
         )
-        extra = filled[layout.width :]
-        is_wide = len(filled) > layout.full_width and not all(plain(c) in REMARK for c in extra)
-        if filled and len(cells) >= layout.width and not is_wide and not has_number:
-            return cells[: max(layout.width, len(filled))]
+        has_remarks = all(plain(c) in REMARK for c in cells[layout.width :] if c)
+        if len(cells) < layout.width or not any(cells) or has_number:
+            continue
+        if has_remarks or not any(cells[layout.full_width :]):
+            return cells[: max(layout.width, *(i for i, cell in enumerate(cells, 1) if cell))]
     return []
-
-
-def _width(cells: Sequence[str]) -> int:
-    """Return the number of cells without empty ones at the end."""
-    return max((i for i, cell in enumerate(cells, 1) if cell), default=0)
 
 
 def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
@@ -472,23 +467,19 @@ def _refuse_titles(
     `is_last` is the line above the numbers; with `is_open` the columns have no titles yet.
     """
     text = line.lstrip(COMMENTS + " \t").strip()
-    is_comment = line.lstrip(" ")[:1] in tuple(COMMENTS)
-    row = [] if is_comment else layout.cells(line.strip(" "))
-    row = row[: _width(row)]
+    row = [] if line.lstrip(" ")[:1] in tuple(COMMENTS) else layout.cells(line.strip(" "))
     if len(row) == layout.width and any(map(is_number, row)):
         # A word may stand in front of the numbers of the first row.
         is_row = is_last and all(is_number(row[i]) for i in layout.used)
-        if is_row or not any(map(str.isalpha, next(filter(None, row)))):
-            wrong = next(cell for cell in row if cell and not is_number(cell))
+        wrong = next((cell for cell in row if cell and not is_number(cell)), "")
+        if wrong and (is_row or not any(map(str.isalpha, next(filter(None, row))))):
             layout.refuse(number, f"{shown_text(wrong)!r} is not a number")
-    cells = next(_splits(text, layout.separator), [text])
     pieces = [piece.strip() for piece in re.split(r"[\t;,]", text)]
     if VALUE.search(text) or any(is_number(_value(piece)[0]) for piece in pieces):
         return
-    is_title = any(map(is_time, cells)) and (len(cells) > 1 or is_last)
-    if is_last and not is_comment and ":" not in text:
-        is_title |= (layout.separator or "\n") in text
-    if _are_units(cells) or any(map(_states_unit, pieces)) or (is_title and is_open):
+    cells = next(_splits(text, layout.separator), [text])
+    is_title = is_open and any(map(is_time, cells)) and (len(cells) > 1 or is_last)
+    if is_title or _are_units(cells) or any(map(_states_unit, pieces)):
         count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
         reason = count if len(cells) != layout.width else "is a second line of titles"
         layout.refuse(number, f"{shown_text(text)!r}: {reason}", ONE_TITLE)

@@ -68,45 +68,42 @@ class Vector:
 
 
 def vectors_of(
-    key: str,
-    kind: str,
-    shape: tuple[int, ...],
-    read: Callable[[int, int, int], NDArray[np.float64]],
+    key: str, kind: str, shape: tuple[int, ...], read: Callable[[Any], NDArray[np.generic]]
 ) -> list[Vector]:
     """Return an array as vectors, none if it is not a slender matrix of enough real numbers.
 
-    `kind` is that of its numbers as in NumPy; `read` returns a column from start to before stop.
+    `kind` is that of its numbers as in NumPy; `read` returns what an index selects of it.
     """
-    if kind not in "iuf" or len(shape) not in {1, 2} or max(shape) < MIN_SAMPLES:
+    n_sample = max(shape, default=0)
+    n_column = math.prod(shape) // max(1, n_sample)
+    if kind not in "iuf" or len(shape) > 2 or n_sample < MIN_SAMPLES or n_column > MAX_COLUMNS:  # noqa: PLR2004
         return []
-    n_sample = max(shape)
-    n_column = math.prod(shape) // n_sample
-    if n_column > MAX_COLUMNS:
-        return []
+    axis = shape.index(n_sample)
     return [
-        Vector(key, i + 1 if n_column > 1 else 0, n_sample, partial(read, i))
+        Vector(key, i + 1 if n_column > 1 else 0, n_sample,
+               partial(_section, read, (i,) * axis, (i,) * (len(shape) - axis - 1)))
         for i in range(n_column)
-    ]
+    ]  # fmt: skip
 
 
-def read_column(array: Any, column: int, start: int, stop: int) -> NDArray[np.float64]:  # noqa: ANN401
-    """Return a section of a column of an array of NumPy or of a file."""
-    if array.ndim == 1:
-        piece = array[start:stop]
-    elif array.shape[1] > array.shape[0]:
-        piece = array[column, start:stop]
-    else:
-        piece = array[start:stop, column]
-    return np.array(piece, dtype=np.float64)
+def _section(
+    read: Callable[[Any], Any],
+    before: tuple[int, ...],
+    behind: tuple[int, ...],
+    start: int,
+    stop: int,
+) -> NDArray[np.float64]:
+    return np.array(read((*before, slice(start, stop), *behind)), dtype=np.float64)
 
 
 def header_entry(key: str, value: object) -> tuple[str, str]:
     """Return a name and its value as text; of several values those of units and of factors only."""
     title = key.rpartition("/")[2]
-    many = np.size(value) != 1 if isinstance(value, np.ndarray | list) else False
-    if many and (plain(title) in UNIT or neutral_value(title) is not None):
-        return key, ", ".join(map(str, np.ravel(np.asarray(value))[:MIN_SAMPLES])) or "nothing"
-    return key, "" if many else text_of(value)
+    if not isinstance(value, np.ndarray | list) or np.size(value) == 1:
+        return key, text_of(value)
+    if plain(title) not in UNIT and neutral_value(title) is None:
+        return key, ""
+    return key, ", ".join(map(str, np.ravel(np.asarray(value))[:MIN_SAMPLES])) or "nothing"
 
 
 def channels_of_vectors(vectors: list[Vector], header: Header, name: str) -> list[Channel]:

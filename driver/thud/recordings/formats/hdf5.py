@@ -15,7 +15,6 @@ from thud.recordings.variables import (
     Vector,
     channels_of_vectors,
     header_entry,
-    read_column,
     vectors_of,
 )
 
@@ -34,10 +33,10 @@ CELLS = "#refs#"
 MATLAB_OTHERS = {b"cell", b"struct", b"function_handle", b"canonical empty"}
 
 
-def _read(path: Path, key: str, column: int, start: int, stop: int) -> NDArray[np.float64]:
+def _read(path: Path, key: str, index: tuple[int | slice, ...]) -> NDArray[np.generic]:
     h5py = library("h5py", "HDF5")
     with guarded(path, "HDF5"), h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
-        return read_column(file[key], column, start, stop)
+        return np.asarray(file[key][index])
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -76,17 +75,13 @@ def read_channels(path: Path) -> list[Channel]:
 
 def _attributes(h5py: Any, owner: str, entry: Any) -> Header:  # noqa: ANN401 - a library
     """Return the attributes of an object that are numbers or texts."""
-    attributes = [(key, entry.attrs.get_id(key)) for key in entry.attrs]
-    return [
-        header_entry(owner + key.replace("/", " "), _value(entry.attrs[key]))
-        for key, kind in attributes
-        if _is_header(h5py, kind)
-    ]
-
-
-def _value(value: object) -> object:
-    """Return a value of the library, without elements if it is empty."""
-    return np.array([]) if getattr(value, "shape", ()) is None else value
+    header = []
+    for key in entry.attrs:
+        value = entry.attrs[key] if _is_header(h5py, entry.attrs.get_id(key)) else None
+        if value is not None:
+            is_empty = isinstance(value, h5py.Empty)
+            header.append(header_entry(owner + key.replace("/", " "), [] if is_empty else value))
+    return header
 
 
 def _is_header(h5py: Any, entry: Any) -> bool:  # noqa: ANN401 - a library

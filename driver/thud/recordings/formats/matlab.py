@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +15,6 @@ from thud.recordings.variables import (
     Vector,
     channels_of_vectors,
     header_entry,
-    read_column,
     vectors_of,
 )
 
@@ -43,7 +41,7 @@ def read_channels(path: Path) -> list[Channel]:
     header = []
     for title, content in scipy.io.loadmat(file, simplify_cells=True).items():
         for key, value in _arrays(title, content, name) if not title.startswith("__") else ():
-            found = vectors_of(key, value.dtype.kind, value.shape, partial(read_column, value))
+            found = vectors_of(key, value.dtype.kind, value.shape, value.__getitem__)
             vectors += found
             header += [] if found else [header_entry(key, value)]
     return channels_of_vectors(vectors, header, name)
