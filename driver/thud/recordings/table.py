@@ -22,10 +22,10 @@ from thud.recordings.channel import MAX_COLUMNS, require_small, shown_path, show
 from thud.recordings.header import (
     BRACKETS,
     DATE,
-    LOOSE,
     NUMBER,
     RATE,
     STEP,
+    TIME,
     TIME_UNIT,
     UNIT,
     WORDS,
@@ -340,37 +340,55 @@ def _find_numbers(layout: _Layout) -> list[str]:
 # Header: titles, units, names and values.
 
 
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """A line above the numbers: name and unit of its cells, and if there is one for each column."""
+
+    number: int
+    text: str
+    titles: Pairs
+    fits: bool
+
+    @property
+    def are_units(self) -> bool:
+        """Whether most cells are units without a name."""
+        filled = [title for title in self.titles if any(map(str.isalpha, "".join(title)))]
+        known = sum(bool(find_unit(unit or name)) for name, unit in filled)
+        has_names = any(name and unit for name, unit in filled)
+        is_bare = bool(filled) and all(unit for _, unit in filled)
+        return not has_names and (2 * known > len(filled) or is_bare)
+
+    @property
+    def states(self) -> tuple[bool, bool]:
+        """Whether it states units, and whether it names times."""
+        units = [find_unit(unit) for _, unit in self.titles]
+        names_time = any(plain(name) in TIME for name, _ in self.titles)
+        return any(units), names_time or any(UNITS[unit][0] == "s" for unit in units if unit)
+
+
 def _read_header(above: list[str], layout: _Layout) -> tuple[Pairs, Pairs, bool]:
     """Return names and values of the header, name and unit of each column, and if it has a line."""
     header: Pairs = []
-    rows: list[tuple[int, list[str]]] = []
-    others: list[tuple[int, str]] = []
+    rows: list[_Row] = []
     for number, line in enumerate(above, 1):
-        if pair := _known_pair(line.lstrip(COMMENTS + " \t").strip()):
+        text = line.lstrip(COMMENTS + " \t").strip()
+        if pair := _known_pair(text):
             header.append(pair)
-        elif cells := _title_row(line, layout):
-            rows.append((number, cells))
-        else:
-            others.append((number, line))
-    units = [cells for _, cells in rows if _are_units(cells)]
-    titles = [row for row in rows if row[1] not in units]
+        elif text:
+            rows.append(_read_row(number, line, text, layout))
+    units = [row for row in rows if row.fits and row.are_units]
+    titles = [row for row in rows if row.fits and not row.are_units]
     # Titles state units or times, or are next to the numbers.
-    _, chosen = max(
-        titles,
-        key=lambda row: (any(map(_states_unit, row[1])), any(map(is_time, row[1])), row[0]),
-        default=(0, []),
-    )
-    others += [(number, "\t".join(cells)) for number, cells in titles if cells is not chosen]
-    for number, line in sorted(others):
-        _refuse_titles(line, number, layout, is_last=number == len(above), is_open=not chosen)
-    layout.width = max([layout.width, *map(len, (chosen, *units))])
-    names = [split_title(cell) for cell in chosen] or [("", "")] * layout.width
-    stated = [[unit] for _, unit in names]
-    for i, cell in itertools.chain(*map(enumerate, units)):
-        name, unit = split_title(cell)
+    chosen = max(titles, key=lambda row: (row.states, row.number), default=None)
+    for row in rows:
+        if row is not chosen and row not in units:
+            _refuse_row(row, above, layout, is_open=chosen is None)
+    names = chosen.titles if chosen else []
+    layout.width = max([layout.width, len(names), *(len(row.titles) for row in units)])
+    names += [("", "")] * (layout.width - len(names))
+    stated = [[unit, layout.used.get(i, "")] for i, (_, unit) in enumerate(names)]
+    for i, (name, unit) in itertools.chain(*(enumerate(row.titles) for row in units)):
         stated[i].append(unit or name)
-    for i, unit in layout.used.items():
-        stated[i].append(unit)
     times = [i for i in layout.used if is_time(f"{names[i][0]} [{stated[i][0]}]")]
     for title, value in header:
         for i, unit in _header_units(title, value, times, layout):
@@ -379,7 +397,11 @@ def _read_header(above: list[str], layout: _Layout) -> tuple[Pairs, Pairs, bool]
         (name, _one_unit(name, stated[i], f"{layout.name}: column {i + 1}"))
         for i, (name, _) in enumerate(names)
     ]
-    return [(name, re.split(r"[\t;]", value)[0]) for name, value in header], columns, bool(rows)
+    return (
+        [(name, re.split(r"[\t;]", value)[0]) for name, value in header],
+        columns,
+        bool(titles + units),
+    )
 
 
 def _one_unit(name: str, stated: list[str], label: str) -> str:
@@ -402,17 +424,17 @@ def _known_pair(text: str) -> tuple[str, str] | None:
     return (name, value) if value and is_pair else None
 
 
-def _title_row(line: str, layout: _Layout) -> list[str]:
-    """Return the cells of a line if it has a title or unit for each column, else an empty list."""
+def _read_row(number: int, line: str, text: str, layout: _Layout) -> _Row:
+    """Return the cells of a line, split so that there is a title or unit for each column."""
     separator = layout.separator
-    # A separator in front of the titles is no comment.
-    marks = (COMMENTS + " \t").replace(separator or " ", "")
-    text = line.lstrip(marks).rstrip(" \r")
     if layout.width == 1:
-        text = text.strip(" ;\t")
-        is_value = re.search(r"[:=]|[\t;]\s*\S", text) or is_number(text)
-        return [] if is_value or not text else [text.strip('"')]
-    for cells in (*_splits(text, separator), *_splits(text.partition("#")[0].rstrip(), separator)):
+        bare = text.strip(" ;\t")
+        is_value = re.search(r"[:=]|[\t;]\s*\S", bare) or is_number(bare)
+        return _Row(number, text, [split_title(bare)], fits=not is_value)
+    # A separator in front of the titles is no comment.
+    full = line.lstrip((COMMENTS + " \t").replace(separator or " ", "")).rstrip(" \r")
+    splits = [*_splits(full, separator), *_splits(full.partition("#")[0].rstrip(), separator)]
+    for cells in splits:
         has_number = any(
             is_number(c.rstrip(":")) or DATE_CELL.fullmatch(c) or seconds_of_day(c) is not None
             for c in cells
@@ -421,8 +443,10 @@ def _title_row(line: str, layout: _Layout) -> list[str]:
         if len(cells) < layout.width or not any(cells) or has_number:
             continue
         if has_remarks or not any(cells[layout.full_width :]):
-            return cells[: max(layout.width, *(i for i, cell in enumerate(cells, 1) if cell))]
-    return []
+            count = max(layout.width, *(i for i, cell in enumerate(cells, 1) if cell))
+            return _Row(number, text, [split_title(cell) for cell in cells[:count]], fits=True)
+    cells = next(_splits(text, separator), [text])
+    return _Row(number, text, [split_title(cell) for cell in cells], fits=False)
 
 
 def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
@@ -430,8 +454,9 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
     for mark in dict.fromkeys((separator or "\t", "\t", ";", ",")):
         if mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
             cells = split_line(text, mark)
-            parts = [find_unit(part) for part in UNIT_PART.findall(text)]
-            if mark != "," or _are_units(cells) or not any({*parts} - {"", "counts", "FS"}):
+            parts = {find_unit(part) for part in UNIT_PART.findall(text)}
+            are_units = all(find_unit(cell) for cell in cells)
+            if mark != "," or are_units or not parts - {"", "counts", "FS"}:
                 yield cells
     if separator is None:
         yield re.split(r" {2,}", text)
@@ -441,48 +466,32 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
         yield [" ".join(word.split("\0")) for word in words]
 
 
-def _are_units(cells: list[str]) -> bool:
-    """Whether most cells of a line are units without a name."""
-    filled = [split_title(cell) for cell in cells if any(map(str.isalpha, cell))]
-    known = sum(bool(find_unit(unit or name)) for name, unit in filled)
-    return not any(name and unit for name, unit in filled) and (
-        2 * known > len(filled) or (bool(filled) and all(unit for _, unit in filled))
-    )
-
-
-def _states_unit(text: str) -> bool:
-    """Whether a text holds a unit in brackets, or ends with one after a mark or "in"."""
-    units = ["".join(groups) for groups in BRACKETS.findall(text)]
-    loose = LOOSE.fullmatch(text)
-    if loose and loose["mark"].strip():
-        units.append(loose["unit"])
-    return any(map(find_unit, units))
-
-
-def _refuse_titles(
-    line: str, number: int, layout: _Layout, *, is_last: bool, is_open: bool
-) -> None:
+def _refuse_row(row: _Row, above: list[str], layout: _Layout, *, is_open: bool) -> None:
     """Raise InputError for a line above the numbers with numbers, or with titles that do not fit.
 
-    `is_last` is the line above the numbers; with `is_open` the columns have no titles yet.
+    With `is_open` the columns have no titles yet.
     """
-    text = line.lstrip(COMMENTS + " \t").strip()
-    row = [] if line.lstrip(" ")[:1] in tuple(COMMENTS) else layout.cells(line.strip(" "))
-    if len(row) == layout.width and any(map(is_number, row)):
+    line, is_last = above[row.number - 1].strip(" "), row.number == len(above)
+    is_comment = line[:1] in tuple(COMMENTS)
+    cells = [] if is_comment else layout.cells(line)
+    if len(cells) == layout.width and any(map(is_number, cells)):
         # A word may stand in front of the numbers of the first row.
-        is_row = is_last and all(is_number(row[i]) for i in layout.used)
-        wrong = next((cell for cell in row if cell and not is_number(cell)), "")
-        if wrong and (is_row or not any(map(str.isalpha, next(filter(None, row))))):
-            layout.refuse(number, f"{shown_text(wrong)!r} is not a number")
-    pieces = [piece.strip() for piece in re.split(r"[\t;,]", text)]
-    if VALUE.search(text) or any(is_number(_value(piece)[0]) for piece in pieces):
+        is_row = is_last and all(is_number(cells[i]) for i in layout.used)
+        wrong = next((cell for cell in cells if cell and not is_number(cell)), "")
+        if wrong and (is_row or not any(map(str.isalpha, next(filter(None, cells))))):
+            layout.refuse(row.number, f"{shown_text(wrong)!r} is not a number")
+    pieces = [piece.strip() for piece in re.split(r"[\t;,]", row.text)]
+    if VALUE.search(row.text) or any(is_number(_value(piece)[0]) for piece in pieces):
         return
-    cells = next(_splits(text, layout.separator), [text])
-    is_title = is_open and any(map(is_time, cells)) and (len(cells) > 1 or is_last)
-    if is_title or _are_units(cells) or any(map(_states_unit, pieces)):
-        count = f"{len(cells)} title{'s' * (len(cells) > 1)} for {layout.width} columns"
-        reason = count if len(cells) != layout.width else "is a second line of titles"
-        layout.refuse(number, f"{shown_text(text)!r}: {reason}", ONE_TITLE)
+    states_unit, names_time = row.states
+    count = len(row.titles)
+    is_title = names_time and (count > 1 or is_last)
+    if is_last and not is_comment and ":" not in row.text:
+        is_title |= (layout.separator or "\n") in row.text
+    if (is_title and is_open) or states_unit or row.are_units:
+        reason = f"{count} title{'s' * (count > 1)} for {layout.width} columns"
+        reason = reason if count != layout.width else "is a second line of titles"
+        layout.refuse(row.number, f"{shown_text(row.text)!r}: {reason}", ONE_TITLE)
 
 
 def _header_units(
