@@ -239,6 +239,10 @@ WARNINGS = {
         "local gravity not stated (gravity, --gravity): {value:.6g} {unit} is used, and the "
         "uncertainty includes {spread:.2%} for {low:.3f} to {high:.3f} {unit} at sea level"
     ),
+    "tap_misfit": (
+        "the ringing differs from decaying oscillations by {value:.1%}, as by modes close to each "
+        "other or a hammer that hits twice: the uncertainties include it; tap again"
+    ),
     # Fits of mobilities.
     "mobility_implausible": (
         "the mean mobility, {value:.2g} {unit}, is not that of a floor ({low:g} to {high:g} "

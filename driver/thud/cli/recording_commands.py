@@ -172,7 +172,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(plate.lines())
         if not options.quiet:
             print_results(f"# {plate}")
-        print_notes(plate.warnings)
+        print_notes(note.message for note in plate.notes)
         return 0
     result = calibrate(
         options.record,
