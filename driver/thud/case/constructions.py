@@ -15,8 +15,6 @@ from thud.base._schema import (
     KEYS,
     FloorOptions,
     JoistFloor,
-    LaminateFloor,
-    Plate,
     RectangularFloor,
     Room,
 )
@@ -44,8 +42,6 @@ if TYPE_CHECKING:
 CEILING_KEYS = tuple(
     key.name for key in KEYS if key.owner == "room" and key.name.startswith("ceiling_")
 )
-# Density of layers that the keys need not contain, kg/m3, and tolerance of masses.
-MAX_LIGHT, MASS_TOLERANCE = 250.0, 0.02
 # Entries of a file, the texts first; the others are tables.
 _TEXTS = ("name", "kind", "floor", "note")
 _ENTRIES = (*_TEXTS, "layers", "keys", "room")
@@ -201,21 +197,6 @@ class Constructions(Displayed):
         """Names of the constructions."""
         return tuple(entry.name for entry in self.entries)
 
-    def filter(self, text: str) -> Constructions:
-        """Return the constructions whose name, kind and materials contain all words of a text.
-
-        Raise InputError if there is none.
-        """
-        require_kind("text", text, str)
-        words = _words(text)
-        chosen = tuple(
-            entry for entry in self.entries if all(word in _searched(entry) for word in words)
-        )
-        if not chosen:
-            kinds = ", ".join(dict.fromkeys(entry.kind for entry in self.entries))
-            refuse(f"no construction contains {shown(text)}", f"words such as those of {kinds}")
-        return Constructions(chosen)
-
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and a row of text for each construction."""
         header = ("construction", "layers from top to bottom", "mass, kg/m2")
@@ -269,7 +250,13 @@ def constructions(text: str = "") -> Constructions:
     >>> thud.constructions("screed 200 15").names
     ('concrete 200, screed on 15 MN/m3', 'hollow core 200, screed on 15 MN/m3')
     """
-    return Constructions(_entries()).filter(text)
+    require_kind("text", text, str)
+    words = _words(text)
+    chosen = tuple(entry for entry in _library() if all(word in _searched(entry) for word in words))
+    if not chosen:
+        kinds = ", ".join(dict.fromkeys(entry.kind for entry in _library()))
+        refuse(f"no construction contains {shown(text)}", f"words such as those of {kinds}")
+    return Constructions(chosen)
 
 
 def construction(name: str | os.PathLike[str]) -> Construction:
@@ -293,7 +280,7 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     """
     require_kind("construction", name, str | os.PathLike)
     if isinstance(name, str) and not name.endswith(".toml"):
-        return Constructions(_entries())[name]
+        return Constructions(_library())[name]
     return read_construction(Path(name))
 
 
@@ -305,14 +292,10 @@ def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> C
 
 
 @cache
-def _read_library() -> list[Construction]:
+def _library() -> tuple[Construction, ...]:
     files = (inputs_folder() / "constructions").glob("*.toml")
-    return sorted(map(read_construction, files), key=lambda entry: (entry.kind, _order(entry.name)))
-
-
-def _entries() -> tuple[Construction, ...]:
-    """Return copies of all constructions of the inputs, with dictionaries of their own."""
-    return tuple(map(replace, _read_library()))
+    entries = map(read_construction, files)
+    return tuple(sorted(entries, key=lambda entry: (entry.kind, _order(entry.name))))
 
 
 def _order(name: str) -> list[tuple[int, str]]:
@@ -373,7 +356,7 @@ def _new_construction(content: Mapping[str, Any]) -> Construction:
     case = Case.from_namelist(groups if room else {**groups, "room": {}})
     check_case(case if room else replace(case, room=None))
     assert case.floor is not None  # noqa: S101 - the tables have a floor
-    result = Construction(
+    return Construction(
         name=content["name"],
         kind=content["kind"],
         floor=case.floor,
@@ -382,45 +365,6 @@ def _new_construction(content: Mapping[str, Any]) -> Construction:
         sources={key: source for key, (_, source) in (keys | room).items()},
         note=content.get("note", ""),
     )
-    _require_masses(result)
-    return result
-
-
-def _require_masses(entry: Construction) -> None:
-    """Raise InputError if the masses per unit area of layers and keys contradict each other.
-
-    Light layers, such as resilient ones, need not be in the keys.
-    """
-    mass = mass_of_keys(entry)
-    if mass is None:
-        return
-    least = sum(
-        layer.thickness * layer.density for layer in entry.layers if layer.density > MAX_LIGHT
-    )
-    if least * (1 - MASS_TOLERANCE) <= mass <= entry.mass_per_area * (1 + MASS_TOLERANCE):
-        return
-    refuse(
-        f"the layers ({', '.join(map(str, entry.layers))}) have {entry.mass_per_area:.0f} kg/m2, "
-        f"but the keys {mass:.0f} kg/m2",
-        f"layers and keys of the same mass, but for layers of up to {MAX_LIGHT:g} kg/m3",
-    )
-
-
-def mass_of_keys(entry: Construction) -> float | None:
-    """Return the mass per unit area that the keys describe, kg/m2; None if they do not."""
-    floor = entry.floor
-    if isinstance(floor, JoistFloor):
-        joists = floor.joist_density * floor.joist_width * floor.joist_height / floor.spacing
-        mass = floor.sheathing_thickness * floor.sheathing_density + joists
-    elif isinstance(floor, LaminateFloor):
-        mass = sum(floor.layer_thickness) * floor.density + floor.added_mass
-    elif isinstance(floor, Plate):
-        mass = floor.thickness * floor.density
-    else:
-        return None
-    mass += floor.screed_thickness * floor.screed_density
-    mass += floor.subceiling_thickness * floor.subceiling_density
-    return mass + entry.room.get("ceiling_mass", 0.0)
 
 
 def _read_keys(table: str, keys: object) -> dict[str, tuple[Any, str]]:
@@ -438,17 +382,20 @@ def _read_layers(layers: object) -> tuple[Layer, ...]:
     """Return the layers in a list of tables."""
     if not isinstance(layers, list) or not layers:
         refuse_value("layers", layers, "a list of tables with material, thickness and density")
-    for number, layer in enumerate(layers, 1):
-        known = set(layer) if isinstance(layer, Mapping) else set()
-        if not set(Layer._fields[:3]) <= known <= set(Layer._fields):
+    result = []
+    for number, table in enumerate(layers, 1):
+        try:
+            layer = Layer(**table)
+        except TypeError as error:
             allowed = "a table of material, thickness and density, for members width and spacing"
-            refuse_value(f"layer {number}", layer, allowed)
-        _require_text(f"layer {number}: material", layer["material"])
-        for key in sorted(known - {"material"}):
-            require_number(f"layer {number}: {key}", layer[key])
-            if layer[key] <= 0:
-                refuse_value(f"layer {number}: {key}", layer[key], "positive numbers")
-    return tuple(Layer(**layer) for layer in layers)
+            refuse(f"layer {number} = {shown(table)} is not allowed", allowed, error)
+        _require_text(f"layer {number}: material", layer.material)
+        for key in table.keys() - {"material"}:
+            require_number(f"layer {number}: {key}", table[key])
+            if table[key] <= 0:
+                refuse_value(f"layer {number}: {key}", table[key], "positive numbers")
+        result.append(layer)
+    return tuple(result)
 
 
 def _require_text(name: str, value: object) -> None:
