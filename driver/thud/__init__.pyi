@@ -69,7 +69,10 @@ from .impact.compression import (
     CompressionCurve as CompressionCurve,
     compress as compress,
 )
-from .impact.ensemble import solve_many as solve_many
+from .impact.ensemble import (
+    Ensemble as Ensemble,
+    solve_many as solve_many,
+)
 from .impact.floor_impact import (
     FloorEnergy as FloorEnergy,
     FloorImpact as FloorImpact,
@@ -82,7 +85,6 @@ from .impact.free_modes import (
 from .impact.impact import Impact as Impact
 from .impact.mobility import mobility as mobility
 from .impact.motion import Motion as Motion
-from .impact.outcomes import Ensemble as Ensemble
 from .impact.results import read_results as read_results
 from .impact.solve import solve as solve
 from .level.assessment import (

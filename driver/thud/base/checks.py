@@ -104,8 +104,13 @@ def suggestion(word: object, known: Collection[str]) -> str:
     return f" (did you mean {by_small[close[0]]!r}?)" if close else ""
 
 
-def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
-    """Return an array; raise InputError if it is ragged or masked, or `ndim` is not allowed."""
+def require_array(
+    name: str, values: ArrayLike, dimensions: Container[int], kinds: str = ""
+) -> NDArray[Any]:
+    """Return an array, of real numbers as float64 if `kinds` states which NumPy has for them.
+
+    Raise InputError if it is ragged or masked, or if `ndim` or the kind is not allowed.
+    """
     allowed = "one dimension" + (", or a scalar" if 0 in dimensions else "")
     try:
         array = np.asarray(values)
@@ -115,19 +120,21 @@ def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> N
         refuse(f"{name} has {array.ndim} dimensions", allowed)
     if np.ma.is_masked(values):
         refuse(f"{name} has masked entries", "values only")
-    return array
-
-
-def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
-    """Return an array as float64; raise InputError if its entries are not real numbers."""
+    if not kinds:
+        return array
     if array.size and array.dtype.kind not in kinds:
         refuse(f"{name} is not an array of real numbers", "one dimension of real numbers")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
+def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
+    """Return an array as float64; raise InputError if its entries are not real numbers."""
+    return require_array(name, array, range(array.ndim + 1), kinds)
+
+
 def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
     """Return two finite numbers; raise InputError for anything else."""
-    array = require_real(name, require_array(name, values, dimensions=(1,)))
+    array = require_array(name, values, (1,), "iuf")
     if array.shape != (2,) or not np.isfinite(array).all():
         refuse_value(name, values, "two finite numbers")
     return float(array[0]), float(array[1])

@@ -30,7 +30,7 @@ class Plain:
     def __post_init__(self) -> None:
         """Store plain values."""
         for name, value in vars(self).items():
-            object.__setattr__(self, name, _plain(value))
+            object.__setattr__(self, name, plain(value))
 
 
 def freeze(array: Array) -> Array:
@@ -40,8 +40,9 @@ def freeze(array: Array) -> Array:
 
 
 def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
-    if isinstance(value, np.ndarray):
-        return freeze(value.copy()) if value.flags.writeable else value
+    if isinstance(value, np.ndarray) and value.flags.writeable:
+        value = value.copy()
+        value.setflags(write=False)
     if type(value) in {list, tuple}:
         return tuple(map(_read_only, value))
     if type(value) is dict:
@@ -49,7 +50,8 @@ def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
     return value
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401 - values of any kind
+def plain(value: Any) -> Any:  # noqa: ANN401 - values of any kind
+    """Return a value with tuples in place of lists and arrays, and numbers of Python."""
     if hasattr(value, "tolist"):
         value = value.tolist()
-    return tuple(map(_plain, value)) if isinstance(value, list | tuple) else value
+    return tuple(map(plain, value)) if isinstance(value, list | tuple) else value

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from thud.base.checks import refuse
-from thud.base.immutable import Plain
+from thud.base.immutable import Plain, plain
 
 Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
 
@@ -102,14 +102,14 @@ class Group(Plain):
     """Base of the dataclasses whose fields are keys."""
 
     def __post_init__(self) -> None:
-        """Make a number or a text a list of one where a list is needed.
+        """Store plain values; a number or a text becomes a list of one where a list is needed.
 
         Raise InputError if a list that has a default is empty.
         """
-        super().__post_init__()
         for option in fields(self):  # type: ignore[arg-type]
-            value = getattr(self, option.name)
+            value = plain(getattr(self, option.name))
             if isinstance(option.default, tuple) and isinstance(value, int | float | str):
-                object.__setattr__(self, option.name, (value,))
+                value = (value,)
             elif option.default and value == ():
                 refuse(f"{type(self).__name__}: {option.name} is empty", "one number or more")
+            object.__setattr__(self, option.name, value)

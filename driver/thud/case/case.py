@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 import f90nml
-import numpy as np
 
 from thud.base._schema import (
     FLOORS,
@@ -180,14 +179,24 @@ class Case(Displayed):
         Raise InputError if a value is not a number, a text or, if the key takes a list, a list of
         numbers.
         """
-        groups: dict[str, dict[str, object]] = {"case": {"name": _plain(KEYS[0], self.name)}}
+        groups: dict[str, dict[str, object]] = {}
         model = self.model.name if self.model else ""
-        for key, value in self.entries():
-            group = groups.setdefault(key.group, {})
+        for key, value in ((KEYS[0], self.name), *self.entries()):
             if value is None and key.owner in {"", model} and (model, key.name) in STANDARD_BALL:
                 continue
-            if (plain := _plain(key, value)) != []:
-                group[key.name] = plain
+            entries = list(value) if isinstance(value, tuple) else [value]
+            # What f90nml can write.
+            is_plain = all(
+                isinstance(entry, float)
+                or (isinstance(entry, int) and abs(entry) <= MAX_NUMBER)
+                or (isinstance(entry, str) and entry.isprintable())
+                for entry in entries
+            )
+            if not is_plain or isinstance(value, tuple) is not (key.kind in {"list", "texts"}):
+                refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
+            group = groups.setdefault(key.group, {})
+            if entries:
+                group[key.name] = entries if isinstance(value, tuple) else value
         namelist = f90nml.Namelist()  # a dictionary of groups would be sorted
         namelist.update(groups)
         result: Namelist = namelist
@@ -229,18 +238,6 @@ class Case(Displayed):
         groups: dict[str, Any] = {group: kind(**values[group]) for group, kind in kinds.items()}
         name = content.get("case", {}).get("name", cls.name)
         return cls(name=name, **{"model": None, **groups})
-
-
-def _plain(key: Key, value: object) -> float | str | list[float | str]:
-    """Return the value of a key converted to a type that f90nml can write."""
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, list | tuple) and key.kind in {"list", "texts"}:
-        return [_plain(key, entry) for entry in value]  # type: ignore[misc]
-    is_plain = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
-    if not is_plain or (isinstance(value, int) and abs(value) > MAX_NUMBER):
-        refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
-    return value  # type: ignore[return-value]
 
 
 def case_text(case: Case) -> bytes:

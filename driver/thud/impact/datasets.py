@@ -13,7 +13,7 @@ import xarray as xr
 from thud.base._schema import BANDS, QUANTITIES, VERDICTS
 from thud.base.bridge import compiler, version, without_units
 from thud.case.keys import find_key, key_owners
-from thud.impact.quantities import DIMENSIONS, FREQUENCIES, RESULTS
+from thud.impact.outcomes import DIMENSIONS, FREQUENCIES, RESULTS
 from thud.level.levels import FORCES
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from thud.base.key import Key, Quantity
     from thud.case.case import Case
-    from thud.impact.outcomes import Ensemble
+    from thud.impact.ensemble import Ensemble
     from thud.recordings.recording import ImpactResult
 
 

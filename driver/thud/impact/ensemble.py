@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import os
-import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import KEYS, Limits
+from thud.base._schema import KEYS, Limits, SampleQuantities
 from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
@@ -21,31 +20,149 @@ from thud.base.checks import (
     require_real,
     require_whole,
 )
+from thud.base.display import Displayed
+from thud.base.extras import require_extra
 from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key, key_owners
-from thud.impact.outcomes import Ensemble
-from thud.level.levels import FORCES, get_bands
+from thud.impact.outcomes import NO_ERRORS, RESULTS, sample_warnings
+from thud.level.levels import FORCES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     import pandas as pd
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet, LimitsSource, ModelName
     from thud.base.key import Key
+    from thud.base.note import Note
 
 MAX_THREADS = 1024
 # Results that are truth values.
 _FLAGS = {"conforms", *(f"{force}_conforms" for force in FORCES)}
-# Duration of one call of the library, s, and samples of a thread in the first call; interrupts are
-# handled between calls.
-_CALL_TIME = 1.0
-_FIRST_BLOCK = 4
-# Limits of one call, for its memory: number of samples, and number of values of their forces.
-_MAX_SAMPLES = 2**17
+# Maximum number of values of one call of the library, for its memory, and of one sample without its
+# forces.
 _MAX_VALUES = 2**26
+_SAMPLE_VALUES = 2**6
+# Number of steps of a progress bar, each with at least this number of samples for every thread.
+_STEPS = 100
+_MIN_SAMPLES = 4
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Ensemble(SampleQuantities, Displayed):
+    """Results of many samples of a case; NaN for samples that could not be computed.
+
+    Attributes are those of `SampleQuantities` and the following.
+
+    Attributes
+    ----------
+    case : Case
+        All other keys.
+    parameters : dict of str to ndarray, shape (n_sample,)
+        Values of the keys in which the samples differ.
+    status : ndarray of int, shape (n_sample,)
+        0, or the exit code of the error: 1 invalid input, 2 numerical failure.
+    reason : ndarray of str, shape (n_sample,)
+        Message of the error; empty without an error.
+    elastic_octave, floor_octave : ndarray, shape (n_sample, 5)
+        Force exposure levels of the octaves, which are assessed, dB: those of the elastic force and
+        of the force on a rigid floor.
+    elastic_third, floor_third : ndarray, shape (n_sample, 15), or None
+        Levels of the one-third-octave bands, dB; None unless requested.
+    margin : ndarray, shape (n_sample,)
+        Minimum distance of the octave levels of the assessed force from their limits, dB; negative
+        outside the limits.
+    conforms : ndarray of bool, shape (n_sample,)
+        Whether all criteria are met with the force that the case assesses.
+    elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
+        Whether all criteria are met with the elastic force, and with the force on the floor.
+    elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
+        Forces, N; None unless requested.
+    sample_rate : float
+        Samples per second, Hz.
+    contact_octave, contact_third : ndarray, shape (n_sample, n_band), or None
+        Levels of the force on the floor of the case, dB; equal to those on a rigid floor if the
+        model has no other force. None without a floor, or if the bands are not requested.
+    floor_work : ndarray, shape (n_sample,), or None
+        Energy that the source transfers to the floor, J; None without a floor.
+    room_third : ndarray, shape (n_sample, 12), or None
+        Maximum Fast levels in the room, dB re 20 uPa, in the one-third-octave bands 50 to 630 Hz;
+        None without a room.
+    room_rating : ndarray, shape (n_sample,), or None
+        The rating that the room asks for by its key `rating`, dB, not rounded; None without a room.
+    """
+
+    case: Case
+    parameters: dict[str, NDArray[np.generic]]
+    status: NDArray[np.int32]
+    reason: NDArray[np.object_]
+    elastic_octave: NDArray[np.float64]
+    floor_octave: NDArray[np.float64]
+    margin: NDArray[np.float64]
+    conforms: NDArray[np.bool_]
+    elastic_conforms: NDArray[np.bool_]
+    floor_conforms: NDArray[np.bool_]
+    sample_rate: float
+    elastic_third: NDArray[np.float64] | None = None
+    floor_third: NDArray[np.float64] | None = None
+    contact_octave: NDArray[np.float64] | None = None
+    contact_third: NDArray[np.float64] | None = None
+    elastic_force: NDArray[np.float64] | None = None
+    floor_force: NDArray[np.float64] | None = None
+    floor_work: NDArray[np.float64] | None = None
+    room_third: NDArray[np.float64] | None = None
+    room_rating: NDArray[np.float64] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.status)
+
+    def __repr__(self) -> str:
+        """Return the parameters and the number of drops that conform."""
+        names = ", ".join(self.parameters)
+        failed = f", {np.sum(self.status != 0)} failed" if self.status.any() else ""
+        # If no levels were computed, all margins are NaN.
+        is_assessed = np.isfinite(self.margin).any() or (self.status != 0).all()
+        verdict = f"{self.conforms.sum()} conform" if is_assessed else "not assessed"
+        return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
+
+    @property
+    def results(self) -> dict[str, NDArray[Any]]:
+        """Results that were computed, by their names in `thud.impact.outcomes.RESULTS`."""
+        values = {name: getattr(self, name, None) for name in RESULTS}
+        return {name: array for name, array in values.items() if array is not None}
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings of samples without results or conformity; that none states numerical errors."""
+        # Without levels, nothing is known of the source.
+        conforms = None if self.room_rating is None else self.conforms | np.isnan(self.margin)
+        return (*sample_warnings(self.status, self.reason, conforms), NO_ERRORS)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: the range of each number that every sample has."""
+        rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
+        for name, values in self.results.items():
+            if values.ndim > 1 or values.dtype.kind != "f":
+                continue
+            computed = values[(self.status == 0) & np.isfinite(values)]
+            if computed.size:
+                quantiles = np.quantile(computed, [0, 0.5, 1])
+                rows.append((RESULTS[name].label, *map(RESULTS[name].show, quantiles)))
+        return rows
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the results along the dimension ``sample``, with units and provenance.
+
+        Raise InputError if xarray is not installed.
+        """
+        with require_extra("studies"):
+            from thud.impact.datasets import ensemble_dataset
+
+        return ensemble_dataset(self)
 
 
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
@@ -115,9 +232,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 
     base = Case() if case is None else case
     require_kind("case", base, Case)
-    if bands is not None:
-        get_bands(bands)
-    if base.model is None and base.modes is not None and model is None:
+    if model not in {None, base.model and base.model.name}:
+        base = replace(base, model=new_model(model, {}))
+    if base.model is None:
         refuse("the case has no source model", "a case with a model, or model = its name")
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     keywords = {name: value for name, value in sampling.items() if value is not None}
@@ -127,46 +244,36 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         levels=replace(base.levels, bands=bands or base.levels.bands),
         limits=Limits(source) if source is not None else base.limits,
     )
-    if base.model is None or (model is not None and model != base.model.name):
-        base = replace(base, model=new_model(model, {}))
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
-    # Without parameters, there is only the drop of the case.
-    varied = dict(parameters) or {"height": base.drop.height}
-    try:
-        columns, numbers = _columns(varied, base)
-    except MemoryError as error:
-        refuse("the parameters do not fit in memory", "fewer samples", error)
-    for name in {*keywords, *(["source"] if source else [])} & columns.keys():
-        refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
     n_thread = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", n_thread, 1, MAX_THREADS)
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
-    max_count = min(_MAX_SAMPLES, _MAX_VALUES // max(1, len(FORCES) * length))
-    block_size = min(_FIRST_BLOCK * n_thread, max(1, max_count))
-    blocks: list[dict[str, NDArray[Any]]] = []
     try:
+        # Without parameters, there is only the drop of the case.
+        columns, numbers = _columns(dict(parameters) or {"height": base.drop.height}, base)
+        for name in {*keywords, *(["source"] if source else [])} & columns.keys():
+            refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
         # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
+        size = _MAX_VALUES // (_SAMPLE_VALUES + len(FORCES) * length)
+        if progress:
+            size = min(size, max(_MIN_SAMPLES * n_thread, len(numbers) // _STEPS))
+        blocks = []
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
-            start = 0
-            while start < len(numbers) or not blocks:
-                block = numbers[start : start + block_size]
-                began = time.perf_counter()
+            for start in range(0, max(1, len(numbers)), max(1, size)):
+                block = numbers[start : start + max(1, size)]
                 blocks.append(
                     _compute(content, columns, block, n_thread, levels=levels, forces=forces)
                 )
-                start += len(block)
-                rate = len(block) / (time.perf_counter() - began)
-                block_size = int(np.clip(_CALL_TIME * rate, 1, max(1, max_count)))
                 bar.update(len(block))
         results, *more = blocks
         if more:
             results = {name: np.concatenate([block[name] for block in blocks]) for name in results}
     except MemoryError as error:
-        size = f"{len(numbers)} samples with forces of {length} values"
-        refuse(f"forces = {forces}: {size} do not fit in memory", "fewer samples", error)
+        problem = f"the parameters, or forces of {length} values each, do not fit in memory"
+        refuse(problem, "fewer samples", error)
     # Forces may fill the memory; `Ensemble` does not copy frozen arrays.
     force = freeze(results.pop("force"))
     return Ensemble(

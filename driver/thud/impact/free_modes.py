@@ -14,7 +14,7 @@ from thud.base.checks import refuse, require_array, require_kind, require_real
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
 from thud.case.case import Case, case_text
-from thud.impact.mesh_files import write_vtu
+from thud.impact.motion import write_vtu
 
 if TYPE_CHECKING:
     import os

@@ -1,140 +1,67 @@
-"""Results of many drops."""
+"""Results of many drops, by the names that the library gives them, with units and meanings."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from thud.base._schema import SampleQuantities
-from thud.base.display import Displayed
-from thud.base.extras import require_extra
+from thud.base._schema import (
+    BANDS,
+    QUANTITIES,
+    RATED_BANDS,
+    SAMPLE_QUANTITIES,
+)
+from thud.base.key import Quantity
 from thud.base.note import Note
-from thud.impact.quantities import RESULTS
 
 if TYPE_CHECKING:
-    import xarray as xr
+    import numpy as np
     from numpy.typing import NDArray
 
-    from thud.case.case import Case
 
 NO_ERRORS = Note("no_numerical_errors")
+# Nominal frequencies, Hz, by the name of the dimension: of force levels, and of levels in a room.
+FREQUENCIES = {bands: entry["nominal"] for bands, entry in BANDS.items()} | {
+    "rated_third": RATED_BANDS["third"]
+}
+# Dimension of the force exposure levels, of the elastic force, of the force on a rigid floor and of
+# that on the floor of the case.
+LEVELS: dict[str, str] = {
+    f"{force}_{bands}": bands for bands in BANDS for force in ("elastic", "floor", "contact")
+}
+# Second dimension of results; the first is the sample.
+DIMENSIONS = LEVELS | {"room_third": "rated_third"}
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Ensemble(SampleQuantities, Displayed):
-    """Results of many samples of a case; NaN for samples that could not be computed.
+def _level(force: str, bands: str) -> Quantity:
+    """Return the declaration of the levels of a force in bands."""
+    meaning = f"force exposure level of the {force} force, re 1 N and 1 s"
+    title = f"{force} level" if bands == "octave" else f"{force} {bands} level"
+    return Quantity(f"{force}_{bands}", title, "L_{FE}", "dB", "dB", 1.0, 2, meaning)
 
-    Attributes are those of `SampleQuantities` and the following.
 
-    Attributes
-    ----------
-    case : Case
-        All other keys.
-    parameters : dict of str to ndarray, shape (n_sample,)
-        Values of the keys in which the samples differ.
-    status : ndarray of int, shape (n_sample,)
-        0, or the exit code of the error: 1 invalid input, 2 numerical failure.
-    reason : ndarray of str, shape (n_sample,)
-        Message of the error; empty without an error.
-    elastic_octave, floor_octave : ndarray, shape (n_sample, 5)
-        Force exposure levels of the octaves, which are assessed, dB: those of the elastic force and
-        of the force on a rigid floor.
-    elastic_third, floor_third : ndarray, shape (n_sample, 15), or None
-        Levels of the one-third-octave bands, dB; None unless requested.
-    margin : ndarray, shape (n_sample,)
-        Minimum distance of the octave levels of the assessed force from their limits, dB; negative
-        outside the limits.
-    conforms : ndarray of bool, shape (n_sample,)
-        Whether all criteria are met with the force that the case assesses.
-    elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
-        Whether all criteria are met with the elastic force, and with the force on the floor.
-    elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
-        Forces, N; None unless requested.
-    sample_rate : float
-        Samples per second, Hz.
-    contact_octave, contact_third : ndarray, shape (n_sample, n_band), or None
-        Levels of the force on the floor of the case, dB; equal to those on a rigid floor if the
-        model has no other force. None without a floor, or if the bands are not requested.
-    floor_work : ndarray, shape (n_sample,), or None
-        Energy that the source transfers to the floor, J; None without a floor.
-    room_third : ndarray, shape (n_sample, 12), or None
-        Maximum Fast levels in the room, dB re 20 uPa, in the one-third-octave bands 50 to 630 Hz;
-        None without a room.
-    room_rating : ndarray, shape (n_sample,), or None
-        The rating that the room asks for by its key `rating`, dB, not rounded; None without a room.
-    """
+def _number(name: str, meaning: str) -> Quantity:
+    """Return the declaration of a pure number, a truth value or a text."""
+    return Quantity(name, name, "", "", "", 1.0, 0, meaning)
 
-    case: Case
-    parameters: dict[str, NDArray[np.generic]]
-    status: NDArray[np.int32]
-    reason: NDArray[np.object_]
-    elastic_octave: NDArray[np.float64]
-    floor_octave: NDArray[np.float64]
-    margin: NDArray[np.float64]
-    conforms: NDArray[np.bool_]
-    elastic_conforms: NDArray[np.bool_]
-    floor_conforms: NDArray[np.bool_]
-    sample_rate: float
-    elastic_third: NDArray[np.float64] | None = None
-    floor_third: NDArray[np.float64] | None = None
-    contact_octave: NDArray[np.float64] | None = None
-    contact_third: NDArray[np.float64] | None = None
-    elastic_force: NDArray[np.float64] | None = None
-    floor_force: NDArray[np.float64] | None = None
-    floor_work: NDArray[np.float64] | None = None
-    room_third: NDArray[np.float64] | None = None
-    room_rating: NDArray[np.float64] | None = None
 
-    def __len__(self) -> int:
-        """Return the number of samples."""
-        return len(self.status)
-
-    def __repr__(self) -> str:
-        """Return the parameters and the number of drops that conform."""
-        names = ", ".join(self.parameters)
-        failed = f", {np.sum(self.status != 0)} failed" if self.status.any() else ""
-        # If no levels were computed, all margins are NaN.
-        is_assessed = np.isfinite(self.margin).any() or (self.status != 0).all()
-        verdict = f"{self.conforms.sum()} conform" if is_assessed else "not assessed"
-        return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
-
-    @property
-    def results(self) -> dict[str, NDArray[Any]]:
-        """Results that were computed, by their names in `thud.impact.quantities.RESULTS`."""
-        values = {name: getattr(self, name, None) for name in RESULTS}
-        return {name: array for name, array in values.items() if array is not None}
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        """Warnings of samples without results or conformity; that none states numerical errors."""
-        # Without levels, nothing is known of the source.
-        conforms = None if self.room_rating is None else self.conforms | np.isnan(self.margin)
-        return (*sample_warnings(self.status, self.reason, conforms), NO_ERRORS)
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text: the range of each number that every sample has."""
-        rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
-        for name, values in self.results.items():
-            if values.ndim > 1 or values.dtype.kind != "f":
-                continue
-            computed = values[(self.status == 0) & np.isfinite(values)]
-            if computed.size:
-                quantiles = np.quantile(computed, [0, 0.5, 1])
-                rows.append((RESULTS[name].label, *map(RESULTS[name].show, quantiles)))
-        return rows
-
-    def to_xarray(self) -> xr.Dataset:
-        """Return the results along the dimension ``sample``, with units and provenance.
-
-        Raise InputError if xarray is not installed.
-        """
-        with require_extra("studies"):
-            from thud.impact.datasets import ensemble_dataset
-
-        return ensemble_dataset(self)
+# All results of samples, including those of surrogates and of their training, in their order.
+RESULTS = {
+    **{name: QUANTITIES[name] for name in SAMPLE_QUANTITIES},
+    **{name: _level(name.partition("_")[0], bands) for name, bands in LEVELS.items()},
+    "margin": QUANTITIES["margin"],
+    "conforms": _number("conforms", "all criteria of the standard are met"),
+    "status": _number("status", "0: computed; otherwise the exit code of the error"),
+    "reason": _number("reason", "why there are no results"),
+    "floor_work": QUANTITIES["floor_work"],
+    "room_third": Quantity(
+        "room_third", "level in the room", "L_{i,Fmax}", "dB", "dB", 1.0, 1,
+        "maximum Fast level in the room, re 20 uPa",
+    ),
+    "room_rating": QUANTITIES["room_rating"],
+    "undecided": _number("undecided", "the verdict could change by the errors of the surrogate"),
+    "peaks": QUANTITIES["peak_count"],
+}  # fmt: skip
 
 
 def sample_warnings(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +10,17 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
+from thud.base.files import read_input
 from thud.case.case import Case
 from thud.impact.compute import new_impact
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
     from thud.impact.impact import Impact
-
-# Endings of the files that are read.
-_ENDINGS = (".nml", ".csv")
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -45,58 +43,24 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     """
     folder = Path(directory)
     try:
-        files = _read_texts(folder)
-        for name in ("summary.nml", "effective.nml"):
-            _require(folder, name, files)
-        return _new_impact(folder, files)
+        answer: dict[str, Any] = dict(f90nml.reads(_text(folder / "summary.nml")))
+        if "warnings" in answer:
+            answer["warnings"] = _warnings(answer["warnings"])
+        for prefix in ("", "floor_") if "floor_summary" in answer else ("",):
+            answer[f"{prefix}force"] = _table(folder / f"{prefix}force.csv")
+            for name in (f"{prefix}model_histories", f"{prefix}snapshots"):
+                if (path := folder / f"{name}.csv").exists():
+                    answer[name] = _table(path)
+        return new_impact(Case.from_text(_text(folder / "effective.nml")), answer)
     except ThudError:
         raise
-    except FileNotFoundError as error:
-        refuse(f"{folder}: there is no such directory", "the results of an impact", error)
     except Exception as error:  # noqa: BLE001 - parsers of damaged files raise various errors
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
         refuse(f"{folder}: cannot be read ({reason})", "the results of an impact", error)
 
 
-def _read_texts(folder: Path) -> dict[str, str]:
-    """Return the texts of the files of a result directory by name.
-
-    The directory is opened once: a run that replaces it meanwhile adds no file of its own.
-    """
-    directory = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-
-    def opener(name: str, flags: int) -> int:
-        # Opening a pipe could block.
-        return os.open(name, flags | os.O_NONBLOCK, dir_fd=directory)
-
-    texts = {}
-    try:
-        for name in os.listdir(directory):  # noqa: PTH208 - by its descriptor
-            if name.endswith(_ENDINGS):
-                with open(name, encoding="utf-8", opener=opener) as file:
-                    texts[name] = file.read()
-    finally:
-        os.close(directory)
-    return texts
-
-
-def _require(folder: Path, name: str, files: dict[str, str]) -> None:
-    """Raise InputError if a file is missing."""
-    if name not in files:
-        refuse(f"{folder / name}: there is no such file", "the results of an impact")
-
-
-def _new_impact(folder: Path, files: dict[str, str]) -> Impact:
-    """Return the impact of a result directory, whose files are the groups of the library."""
-    answer: dict[str, Any] = dict(f90nml.reads(files["summary.nml"]))
-    if "warnings" in answer:
-        answer["warnings"] = _warnings(answer["warnings"])
-    for prefix in ("", "floor_") if "floor_summary" in answer else ("",):
-        _require(folder, f"{prefix}force.csv", files)
-        for name in (f"{prefix}force", f"{prefix}model_histories", f"{prefix}snapshots"):
-            if f"{name}.csv" in files:
-                answer[name] = _table(files[f"{name}.csv"])
-    return new_impact(Case.from_text(files["effective.nml"]), answer)
+def _text(path: Path) -> str:
+    return read_input(path).decode()
 
 
 def _warnings(group: Mapping[str, Any]) -> dict[str, str | NDArray[np.float64]]:
@@ -113,11 +77,11 @@ def _warnings(group: Mapping[str, Any]) -> dict[str, str | NDArray[np.float64]]:
     return result
 
 
-def _table(text: str) -> dict[str, NDArray[np.float64]]:
+def _table(path: Path) -> dict[str, NDArray[np.float64]]:
     """Return the columns of a CSV file by name."""
-    names, *lines = text.splitlines()
+    names, *lines = _text(path).splitlines()
     columns = np.loadtxt(lines, delimiter=",", ndmin=2).T
     if not np.isfinite(columns).all():
-        message = "a value is not finite"
+        message = f"{path.name}: a value is not finite"
         raise ValueError(message)
     return dict(zip(names.split(","), columns, strict=True))

@@ -6,13 +6,12 @@ import math
 import re
 from abc import abstractmethod
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base._schema import LIMITS, QUANTITIES, VERDICTS
-from thud.base.checks import refuse, refuse_value, require_choice
+from thud.base.checks import refuse, require_choice
 from thud.base.display import Displayed
 from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
 
-_MAX_PEAKS = 2**31
 _BISECTIONS = 40
 _SPREAD_COLUMNS = (
     "criterion", "value", "range", "limits", "probability (95 %)", "main unknown", "result",
@@ -55,9 +53,19 @@ class Outcome(Displayed):
     counts: tuple[int, int] | None
 
     @property
-    @abstractmethod
     def conforms(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"undecided"``."""
+        """``"conforms"``, ``"does not conform"`` or ``"undecided"``.
+
+        Over what is not known of a source: whether all drops conform, none does, or some do.
+        """
+        if self.counts is None:
+            return self._of_one_source()
+        inside, count = self.counts
+        return VERDICTS[0] if inside == count else VERDICTS[2] if inside else VERDICTS[1]
+
+    @abstractmethod
+    def _of_one_source(self) -> str:
+        """Return `conforms` of a source of which all is known."""
 
     def __bool__(self) -> bool:
         """Return whether it conforms; raise InputError if that is undecided."""
@@ -69,11 +77,6 @@ class Outcome(Displayed):
     def interval(self) -> tuple[float, float] | None:
         """Wilson's interval (95 %) of the probability that a drop conforms, if many were made."""
         return self.counts and wilson_interval(*self.counts)
-
-    def _by_counts(self) -> str:
-        """Return whether all drops conform, none does, or some do."""
-        inside, count = self.counts or (0, 0)
-        return VERDICTS[0] if inside == count else VERDICTS[2] if inside else VERDICTS[1]
 
     def _shown_interval(self) -> str:
         ends = dict.fromkeys(f"{100 * end:.0f}" for end in self.interval or ())
@@ -136,17 +139,12 @@ class Criterion(Outcome):
         ends = (f"{end * scale:g}" for end in (self.lower, self.upper))
         return " to ".join(dict.fromkeys(ends))
 
-    @property
-    def conforms(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"undecided"``.
+    def _of_one_source(self) -> str:
+        """Return the verdict at 95 % confidence, with a guard band of `expanded` (JCGM 106).
 
-        Over what is not known of a source: whether all drops conform, none does, or some do. Else
-        at 95 % confidence: the guard band is the expanded uncertainty (JCGM 106); an upper bound
-        cannot conform, and an uncertainty that lacks a contribution which is not stated decides
-        nothing.
+        An upper bound cannot conform, and an uncertainty that lacks a contribution which is not
+        stated decides nothing.
         """
-        if self.counts:
-            return self._by_counts()
         return VERDICTS[2] if self.estimate.not_stated else self.conforms_if_stated
 
     @property
@@ -268,19 +266,10 @@ class Verdict(Outcome):
     fixed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
-    @property
-    def conforms(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"undecided"``.
-
-        Over what is not known of a source: whether all drops conform, none does, or some do. Else
-        it does not conform if any criterion fails, and is undecided if any other is.
-        """
-        if self.counts:
-            return self._by_counts()
+    def _of_one_source(self) -> str:
+        """Return that any criterion fails, else that any is undecided, else that all conform."""
         results = {criterion.conforms for criterion in self.criteria}
-        return next(
-            result for result in (VERDICTS[1], VERDICTS[2], VERDICTS[0]) if result in results
-        )
+        return next(result for result in (*VERDICTS[1:], VERDICTS[0]) if result in results)
 
     def __repr__(self) -> str:
         """Return the result and the criteria that cause it."""
@@ -360,39 +349,24 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     InputError
         If the source is not known, `levels` has not five entries, or a value is not a number.
     """
-    standard = get_criteria(source)
-    octaves = [_estimate("levels", level, "dB") for level in levels]
+    octaves = tuple(levels)
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
         refuse(f"levels: {len(octaves)} values", allowed)
-    others = {
-        "contact_time": contact_time, "restitution": restitution, "peaks": peaks, "mass": mass,
-        "drop_height": drop_height,
-    }  # fmt: skip
-    units = [criterion.unit for criterion in standard[len(nominal) :]]
-    estimates = octaves + [
-        _estimate(name, value, unit)
-        for (name, value), unit in zip(others.items(), units, strict=True)
-    ]
-    count = estimates[len(nominal) + list(others).index("peaks")].value
-    if not (math.isnan(count) or (0 <= count < _MAX_PEAKS and count.is_integer())):
-        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
+    values = (*octaves, contact_time, restitution, peaks, mass, drop_height)
     criteria = []
-    for criterion, estimate in zip(standard, estimates, strict=True):
-        lower, upper = (limits or {}).get(criterion.name, (criterion.lower, criterion.upper))
-        criteria.append(Criterion(criterion.name, estimate, lower, upper))
+    for standard, value in zip(get_criteria(source), values, strict=True):
+        name, unit = standard.name, standard.unit
+        estimate = value if isinstance(value, Estimate) else Estimate(to_float(name, value))
+        lower, upper = (limits or {}).get(name, (standard.lower, standard.upper))
+        criteria.append(Criterion(name, replace(estimate, unit=unit), lower, upper))
     return Verdict(source, tuple(criteria))
 
 
 def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
     """Return the criteria of the standards for a source, with unknown values."""
     require_choice("source", source, SOURCES)
-    return _criteria(source)
-
-
-@lru_cache
-def _criteria(source: LimitsSource) -> tuple[Criterion, ...]:
     unknown = Estimate.unknown()
     return tuple(
         Criterion(name, replace(unknown, unit=unit), lower, upper)
@@ -410,10 +384,3 @@ def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np
     """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
     octaves = get_criteria(source)[: len(get_bands(BANDWIDTHS[0]).nominal)]
     return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
-
-
-def _estimate(name: str, value: Any, unit: str) -> Estimate:  # noqa: ANN401 - of a user
-    """Return a value as an estimate with a unit; raise InputError if it is not a number."""
-    if not isinstance(value, Estimate):
-        return Estimate(to_float(name, value), unit=unit)
-    return value if value.unit == unit else replace(value, unit=unit)

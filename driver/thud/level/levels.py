@@ -9,7 +9,7 @@ import numpy as np
 
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_choice
 from thud.base.display import Displayed
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def force_exposure_levels(
     """
     require_choice("bands", bands, BANDWIDTHS)
     require_choice("method", method, LEVEL_METHODS)
-    record = require_real("force", require_array("force", force, dimensions=(1,)))
+    record = require_array("force", force, (1,), "iuf")
     rate = to_float("sample_rate", sample_rate)
     answer = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
     return np.asarray(answer["levels"])
@@ -148,7 +148,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
 
 def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return an array of one dimension; raise InputError if it is empty or not finite."""
-    array = require_real(name, require_array(name, values, dimensions=(1,)))
+    array = require_array(name, values, (1,), "iuf")
     if not array.size or not np.isfinite(array).all():
         problem = "has a value that is not finite" if array.size else "is empty"
         refuse(f"{name} {problem}", "finite numbers")
