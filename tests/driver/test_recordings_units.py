@@ -6,9 +6,12 @@ import gc
 import logging
 import math
 import random
+import re
 import struct
+import sys
 import warnings
 from itertools import product
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -18,10 +21,11 @@ import pytest
 import pyuff
 import scipy.io
 import soundfile
-from conftest import naming
+from conftest import REPOSITORY, naming
 from recording_files import WRITERS, half_sine, opened
 
 from thud.base.errors import InputError
+from thud.recordings import formats
 from thud.recordings.calibration import calibrate
 
 if TYPE_CHECKING:
@@ -397,3 +401,21 @@ def test_every_writer_of_the_tests_is_read_without_a_note_on_factors(tmp_path: P
         write(tmp_path / name, FORCE / 5000 if sound else FORCE, RATE, "N")
         (signal,) = opened(tmp_path / name, calibration=5000.0 if sound else None)
         assert "factor_not_applied" not in [note.code for note in signal.notes]
+
+
+def test_format_is_added_by_one_file_and_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The example of docs/how_to_add.md."""
+    page = (REPOSITORY / "docs/how_to_add.md").read_text().partition("## A file format")[2]
+    source, line = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[:2]
+    module = ModuleType("thud.recordings.formats.npy")
+    exec(source, module.__dict__)  # noqa: S102 - our own
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    (entry,) = eval(f"[{line}]", vars(formats))  # noqa: S307
+    monkeypatch.setattr(formats, "FORMATS", (*formats.FORMATS[:-1], entry, formats.FORMATS[-1]))
+    np.save(tmp_path / "force.npy", np.column_stack([TIME, FORCE]))
+    with pytest.raises(InputError, match=naming("sample_rate")):
+        opened(tmp_path / "force.npy", channel=2)
+    (signal,) = opened(tmp_path / "force.npy", channel=2, sample_rate=RATE, unit="N")
+    np.testing.assert_array_equal(signal.read(0, signal.n_sample), FORCE)
