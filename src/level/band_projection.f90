@@ -122,7 +122,7 @@ contains
       !> LAPACK does not find them.
       logical, intent(out) :: failed
       real(wp) :: values(minval(shape(waves))), work(5*sum(shape(waves)))
-      integer :: i, info, n
+      integer :: info, n
 
       n = size(values)
       allocate (space%sequences(size(waves, 1), n), space%spectra(n, size(waves, 2)))
@@ -132,10 +132,7 @@ contains
       if (failed) return
       n = count(values > max_omitted*values(1))
       space%sequences = space%sequences(:, :n)
-      space%spectra = space%spectra(:n, :)
-      do i = 1, n
-         space%spectra(i, :) = values(i)*space%spectra(i, :)
-      end do
+      space%spectra = spread(values(:n), 2, size(waves, 2))*space%spectra(:n, :)
    end subroutine find_space
 
    !> Energies of records in bands.

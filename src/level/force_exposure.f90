@@ -53,7 +53,7 @@ contains
       !> Set if the record or the rate cannot be used, the method is unknown, or an interrupt came.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: energy(size(bands)), lower(size(bands)), upper(size(bands))
-      real(wp) :: resolution, spacing
+      real(wp) :: spacing
       integer :: first, last
 
       call check_record(force, sample_rate, bands, error)
@@ -77,8 +77,7 @@ contains
       call check_interrupt(error)
       if (allocated(error)) return
       ! The rounding errors of a band are about this fraction of the total energy and limit the resolution.
-      resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
-      levels = 10*log10(max(energy, resolution))
+      levels = 10*log10(max(energy, epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate))
    end subroutine get_force_exposure_levels
 
    !> Checks that a record has levels.

@@ -6,7 +6,7 @@ module thud_rating
    implicit none (type, external)
    private
 
-   public :: class_limits, correct_for_background, fast_reverberation, get_a_weighted_level, get_class, get_inverse_a_rating
+   public :: class_limits, correct_for_background, get_a_weighted_level, get_class, get_inverse_a_rating
    public :: get_rated_bands, get_rounded, get_standardization, rating_names, rating_titles
 
    !> Nominal mid frequency of the lowest one-third-octave band that is rated, Hz.
@@ -71,11 +71,9 @@ contains
       real(wp), intent(in) :: level(:)
       real(wp) :: total
 
-      if (name == 'octave') then
-         total = 10*log10(sum(10**((level + a_weighting(2::3))/10)))
-      else
-         total = 10*log10(sum(10**((level + a_weighting)/10)))
-      end if
+      associate (first => merge(2, 1, name == 'octave'), stride => merge(3, 1, name == 'octave'))
+         total = 10*log10(sum(10**((level + a_weighting(first::stride))/10)))
+      end associate
    end function get_a_weighted_level
 
    !> A single number as it is stated: rounded, halves upwards.
@@ -125,23 +123,14 @@ contains
       real(wp), intent(in) :: reverberation_time, volume
       !> The difference, dB.
       real(wp) :: difference
+      real(wp), dimension(2) :: c, log_gain
 
-      difference = 10*log10(volume/reference_volume) &
-         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_reverberation))
-   end function get_standardization
-
-   !> ln g = -ln C/(C - 1), which tends to -1 at C = 1.
-   elemental function get_log_gain(reverberation_time) result(log_gain)
-      !> Reverberation time, s.
-      real(wp), intent(in) :: reverberation_time
-      real(wp) :: log_gain
-
+      c = [reverberation_time, reference_reverberation]/fast_reverberation
+      ! ln g, which tends to -1 at C = 1; near 1 the difference is exact.
       log_gain = -1.0_wp
-      associate (c => reverberation_time/fast_reverberation)
-         ! Near 1 the difference is exact.
-         if (abs(c - 1) > 0.0_wp) log_gain = -log(c)/(c - 1)
-      end associate
-   end function get_log_gain
+      where (abs(c - 1) > 0.0_wp) log_gain = -log(c)/(c - 1)
+      difference = 10*log10(volume/reference_volume) - 10/log(10.0_wp)*(log_gain(1) - log_gain(2))
+   end function get_standardization
 
    !> Level without the background (ISO 16283-2). From 6 to 15 dB above the background, its energy is subtracted from the
    !> level. Nearer to the background, the correction is that for 6 dB, and the result is an upper bound.
@@ -152,12 +141,11 @@ contains
       real(wp), intent(out) :: corrected
       !> True if the level is less than 6 dB above the background: the corrected level is an upper bound.
       logical, intent(out) :: is_upper_bound
-      real(wp) :: difference
 
-      difference = level - background
-      is_upper_bound = difference < min_difference
+      is_upper_bound = level - background < min_difference
       corrected = level
-      if (difference < clear_difference) corrected = level + 10*log10(1 - 10**(-max(difference, min_difference)/10))
+      if (level - background < clear_difference) corrected = level &
+         + 10*log10(1 - 10**(-max(level - background, min_difference)/10))
    end subroutine correct_for_background
 
 end module thud_rating

@@ -104,10 +104,8 @@ contains
       integer :: verdict
 
       verdict = verdict_undecided
-      associate (value => criterion%value, lower => criterion%lower, upper => criterion%upper)
-         if (criterion%error <= min(abs(value - lower), abs(value - upper))) verdict = merge(verdict_conforms, &
-            verdict_fails, conforms(criterion))
-      end associate
+      if (criterion%error <= minval(abs(criterion%value - [criterion%lower, criterion%upper]))) verdict = merge( &
+         verdict_conforms, verdict_fails, conforms(criterion))
    end function get_verdict
 
    !> Verdict on all of several: it fails if one fails, and is undecided if one is undecided and none fails.
