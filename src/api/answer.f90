@@ -20,7 +20,7 @@ module thud_answer
    use thud_records, only: add_compression, add_results
    use thud_request, only: request_type
    use thud_run, only: load_case, outcome_type, run_case, run_options_type
-   use thud_sweep, only: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
+   use thud_sweep, only: keep_matrices, new_sweep, solve_sweep, sweep_type
    use thud_text, only: newline, quoted
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
@@ -145,7 +145,7 @@ contains
       !> Set if a key is unknown, or the samples cannot be computed together.
       type(error_type), allocatable, intent(out) :: error
       type(column_type), allocatable :: columns(:)
-      type(sweep_type), allocatable :: sweep
+      type(sweep_type) :: sweep
       type(text_buffer_type) :: reasons
       character(len=:), allocatable :: keys
       character(len=name_length), allocatable :: names(:)
@@ -160,7 +160,6 @@ contains
       if (status /= 0) names = keys
       call find_columns(case, names, columns, error)
       if (allocated(error)) return
-      call acquire_sweep(sweep)
       call new_sweep(case, request%get_number('levels') > 0.0_wp, sweep)
       allocate (values, source=request%get_array('values'))
       call solve_sweep(case, columns, reshape(values, [size(columns), size(values)/size(columns)]), &
@@ -179,7 +178,7 @@ contains
          i = i + n
       end do
       call bundle%move_array('force', sweep%force)
-      call release_sweep(sweep)
+      call keep_matrices(sweep)
    end subroutine answer_samples
 
 end module thud_answer

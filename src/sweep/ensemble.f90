@@ -15,13 +15,14 @@ module thud_ensemble
    use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
    use thud_kinds, only: wp
    use thud_quantities, only: sample_quantity_count
-   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_result_column, only: set_source_values
+   use thud_sampling, only: get_sample_count
    use thud_shell_samples, only: block_size, get_sample_fields, sample_outcome_type, sample_type, solve_block
    use thud_source_limits, only: conforms, criterion_type, get_peak_count
    implicit none (type, external)
    private
 
-   public :: block_result_type, fill_samples, get_record, projections_type, set_projections, solve_drops, suits_batch
+   public :: fill_samples, get_record, projections_type, solve_drops, suits_batch
 
    !> Matrices that give the levels, one per window length, computed when first needed; `thud_band_projection` explains
    !> windows and folding.
@@ -33,20 +34,6 @@ module thud_ensemble
       !> The matrices: [n_window].
       type(band_projection_type), allocatable :: window(:)
    end type projections_type
-
-   !> Results of the samples of a block.
-   type :: block_result_type
-      !> Index of the last instant at which a force is not zero.
-      integer :: n_written = 0
-      !> The sample has been computed: [block_size].
-      logical :: computed(block_size) = .false.
-      !> The quantities of samples, SI units: [sample_quantity_count, block_size].
-      real(wp) :: quantity(sample_quantity_count, block_size)
-      !> Force exposure levels, dB: [n_band, force_count, block_size].
-      real(wp), allocatable :: level(:, :, :)
-      !> The source conforms, by each force: [force_count, block_size].
-      logical :: conforms(force_count, block_size) = .false.
-   end type block_result_type
 
 contains
 
@@ -110,83 +97,70 @@ contains
       end do
    end subroutine fill_samples
 
-   !> Sets the projections, still without matrices, unless they are those of the same rate, bands and longest window.
-   pure subroutine set_projections(projections, sample_rate, bands, n_time)
-      !> The projections; empty, or those of an earlier sweep.
-      type(projections_type), intent(inout) :: projections
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      !> Bands of the levels, octaves first: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> Number of samples of the longest record.
-      integer, intent(in) :: n_time
-
-      if (allocated(projections%window)) then
-         if (size(projections%window) == get_window_index(n_time) .and. size(projections%bands) == size(bands)) then
-            if (abs(projections%sample_rate - sample_rate) <= 0.0_wp .and. all(projections%bands%set == bands%set)) return
-         end if
-         deallocate (projections%window)
-      end if
-      projections%sample_rate = sample_rate
-      projections%bands = bands
-      allocate (projections%window(get_window_index(n_time)))
-   end subroutine set_projections
-
-   !> Quantities, levels and verdicts of one block of samples, and their forces.
-   subroutine solve_drops(samples, sampling, criteria, with_levels, projections, force, block)
+   !> Results of one block of samples, and their forces.
+   subroutine solve_drops(case, samples, criteria, projections, force, n_written, computed, values)
+      !> The case, for all that samples share.
+      type(case_type), intent(in) :: case
       !> The samples, with the same choice of the flux term: [n_sample].
       type(sample_type), intent(in) :: samples(:)
-      type(sampling_type), intent(in) :: sampling
-      !> Criteria of the source, of which only the ranges are used: [criterion_count].
+      !> Criteria of the source, of which only the ranges are used: [criterion_count]; none without levels and verdicts.
       type(criterion_type), intent(in) :: criteria(:)
-      !> Compute levels and verdicts; otherwise no sample conforms.
-      logical, intent(in) :: with_levels
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
       !> Elastic forces, then forces on the floor, N: [force_count block_size, length of the longest window].
       real(wp), intent(inout) :: force(force_count*block_size, get_window_length(size(projections%window)))
-      type(block_result_type), intent(out) :: block
+      !> Index of the last instant at which a force is not zero.
+      integer, intent(out) :: n_written
+      !> The sample has been computed: [n_sample].
+      logical, intent(out) :: computed(:)
+      !> Values of the columns, set for samples that have been computed: [n_column, n_sample].
+      real(wp), intent(inout) :: values(:, :)
       type(sample_outcome_type) :: outcomes(size(samples))
       type(criterion_type) :: tested(size(criteria))
+      real(wp) :: level(size(projections%bands), force_count, size(samples)), quantity(sample_quantity_count)
+      logical :: conforming(force_count)
       integer :: window_index(size(samples))
       integer :: i, j, window
 
-      allocate (block%level(size(projections%bands), force_count, block_size))
-      call solve_block(samples, sampling, force(:, :get_sample_count(sampling)), block%n_written, outcomes)
-      window_index = 0
-      do i = 1, size(samples)
-         block%computed(i) = outcomes(i)%computed
-         if (.not. block%computed(i)) cycle
-         associate (outcome => outcomes(i))
-            block%quantity(:, i) = [outcome%contact_time, outcome%peak_force, outcome%peak_elastic_force, &
-               outcome%max_deflection, outcome%restitution, outcome%impulse]
-         end associate
-         window_index(i) = get_window_index(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
-      end do
-      if (.not. with_levels) return
-      force(:, block%n_written + 1:get_window_length(max(1, maxval(window_index)))) = 0.0_wp
-      ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
-      do window = minval(window_index, mask=window_index > 0), maxval(window_index)
-         if (any(window_index == window)) call set_levels(projections, window, window_index == window, force, block)
-      end do
-      tested = criteria
-      do i = 1, size(samples)
-         if (.not. block%computed(i)) cycle
-         do j = 1, force_count
-            tested%value = [block%level(:octave_count, j, i), outcomes(i)%contact_time, outcomes(i)%restitution, 1.0_wp, &
-               samples(i)%ball%mass, samples(i)%drop%height]
-            if (.not. all(conforms(tested))) cycle
-            ! Peaks are counted last, as this takes longer than all other criteria.
-            tested(octave_count + 3)%value = real(get_peak_count(get_record(force, i, j, block%n_written, &
-               get_sample_count(sampling)), sampling%sample_rate), wp)
-            block%conforms(j, i) = conforms(tested(octave_count + 3))
+      associate (rate => case%sampling%sample_rate, n_time => get_sample_count(case%sampling))
+         call solve_block(samples, case%sampling, force(:, :n_time), n_written, outcomes)
+         computed = outcomes%computed
+         window_index = 0
+         do i = 1, merge(size(samples), 0, size(criteria) > 0)
+            if (computed(i)) window_index(i) = get_window_index(min(int(outcomes(i)%contact_time*rate) + 1, size(force, 2)))
          end do
-      end do
+         force(:, n_written + 1:get_window_length(max(1, maxval(window_index)))) = 0.0_wp
+         ! Each sample has its own window, so that its levels do not depend on the other samples of the block.
+         do window = minval(window_index, mask=window_index > 0), maxval(window_index)
+            if (any(window_index == window)) call set_levels(projections, window, window_index == window, force, level, &
+               computed)
+         end do
+         do i = 1, size(samples)
+            if (.not. computed(i)) cycle
+            associate (outcome => outcomes(i))
+               quantity = [outcome%contact_time, outcome%peak_force, outcome%peak_elastic_force, outcome%max_deflection, &
+                  outcome%restitution, outcome%impulse]
+            end associate
+            values(:sample_quantity_count, i) = quantity
+            if (size(criteria) == 0) cycle
+            tested = criteria
+            do j = 1, force_count
+               tested%value = [level(:octave_count, j, i), outcomes(i)%contact_time, outcomes(i)%restitution, 1.0_wp, &
+                  samples(i)%ball%mass, samples(i)%drop%height]
+               conforming(j) = all(conforms(tested))
+               if (.not. conforming(j)) cycle
+               ! Peaks are counted last, as this takes longer than all other criteria.
+               tested(octave_count + 3)%value = get_peak_count(get_record(force, i, j, n_written, n_time), rate)
+               conforming(j) = conforms(tested(octave_count + 3))
+            end do
+            call set_source_values(case, criteria, quantity, level(:, :, i), conforming, values(:, i))
+         end do
+      end associate
    end subroutine solve_drops
 
    !> Levels of all samples with the same window; none is computed if the matrices of the window would take too long or
    !> LAPACK fails.
-   subroutine set_levels(projections, window, chosen, force, block)
+   subroutine set_levels(projections, window, chosen, force, level, computed)
       type(projections_type), intent(inout) :: projections
       !> Index of the window.
       integer, intent(in) :: window
@@ -194,8 +168,10 @@ contains
       logical, intent(in) :: chosen(:)
       !> Forces, N: [force_count block_size, n_time].
       real(wp), intent(in), contiguous :: force(:, :)
-      !> The block; only levels and `computed` of chosen samples are written.
-      type(block_result_type), intent(inout) :: block
+      !> Levels, dB, of which those of chosen samples are set: [n_band, force_count, n_sample].
+      real(wp), intent(inout) :: level(:, :, :)
+      !> They have been computed: [n_sample].
+      logical, intent(inout) :: computed(:)
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
       logical :: has_matrices
       integer :: i, j, row
@@ -207,14 +183,14 @@ contains
          has_matrices = projection%n_sample > 0
       end associate
       !$omp end critical (thud_projections)
-      where (chosen) block%computed(:size(chosen)) = has_matrices
+      where (chosen) computed = has_matrices
       if (.not. has_matrices) return
       call get_band_energies(projections%window(window), force, energy, square_sum)
       do i = 1, size(chosen)
          if (.not. chosen(i)) cycle
          do j = 1, force_count
             row = i + (j - 1)*block_size
-            block%level(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/projections%sample_rate))
+            level(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/projections%sample_rate))
          end do
       end do
    end subroutine set_levels

@@ -4,13 +4,13 @@
 !> the work. The results of a sample do not depend on the number of threads, the other samples or its index.
 module thud_sweep
    use thud_band, only: band_type, get_level_bands
-   use thud_band_projection, only: get_window_length
+   use thud_band_projection, only: get_window_index, get_window_length
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_case, only: case_type, check_case, get_active_fields, get_floor_number, keep_impact_only, set_floor_air
    use thud_column, only: column_type
    use thud_compute, only: assess_floor, compute_impact, drop_on_floor, impact_type, scope_type
    use thud_constants, only: not_a_number
-   use thud_ensemble, only: block_result_type, fill_samples, get_record, projections_type, set_projections, solve_drops, &
+   use thud_ensemble, only: fill_samples, get_record, projections_type, solve_drops, &
       suits_batch
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, key_length
@@ -30,7 +30,7 @@ module thud_sweep
    implicit none (type, external)
    private
 
-   public :: acquire_sweep, new_sweep, release_sweep, solve_sweep, sweep_type
+   public :: keep_matrices, new_sweep, solve_sweep, sweep_type
 
    !> The reason why a sample has no results.
    type :: reason_type
@@ -42,8 +42,8 @@ module thud_sweep
    type :: sweep_type
       !> Levels and verdicts are wanted.
       logical :: levels = .true.
-      !> Bands and matrices of the levels, reused by later calls.
-      type(projections_type) :: projections
+      !> Bands and matrices of the levels.
+      type(projections_type), allocatable :: projections
       !> 0, or the error code: [n_sample].
       integer, allocatable :: status(:)
       !> Messages of the errors: [n_sample].
@@ -68,8 +68,8 @@ module thud_sweep
       real(wp), allocatable :: values(:)
    end type shared_type
 
-   !> Sweep of an earlier call, for reuse of its matrices; `acquire_sweep` moves it to one thread at a time.
-   type(sweep_type), allocatable :: kept
+   !> Matrices of an earlier sweep, which take as long as some thousand drops; one thread at a time has them.
+   type(projections_type), allocatable :: kept
 
 contains
 
@@ -78,47 +78,38 @@ contains
       type(case_type), intent(in), target :: case
       !> Levels and verdicts are wanted.
       logical, intent(in) :: levels
-      !> A sweep of an earlier call, whose matrices are reused if they fit, or an empty sweep.
-      type(sweep_type), intent(inout) :: sweep
+      !> The sweep, with the matrices of an earlier one if they fit.
+      type(sweep_type), intent(out) :: sweep
       type(band_type), allocatable :: bands(:)
-      ! Index of the first band that the case asks for.
-      integer :: first_band
+      logical :: reuse
+      ! Index of the first band that the case asks for; number of windows up to that of the longest record.
+      integer :: first_band, n_window
 
       call get_level_bands(case%bands, bands, first_band)
       sweep%levels = levels
       sweep%columns = get_result_columns(case, bands, first_band)
-      call set_projections(sweep%projections, case%sampling%sample_rate, bands, get_sample_count(case%sampling))
+      !$omp critical (thud_sweep)
+      call move_alloc(kept, sweep%projections)
+      !$omp end critical (thud_sweep)
+      n_window = get_window_index(get_sample_count(case%sampling))
+      reuse = allocated(sweep%projections)
+      ! Choices of bands differ in their number.
+      if (reuse) reuse = size(sweep%projections%window) == n_window .and. size(sweep%projections%bands) == size(bands) &
+         .and. abs(sweep%projections%sample_rate - case%sampling%sample_rate) <= 0.0_wp
+      if (reuse) return
+      sweep%projections = projections_type(case%sampling%sample_rate, bands)
+      allocate (sweep%projections%window(n_window))
    end subroutine new_sweep
 
-   !> Takes the sweep of an earlier call.
-   subroutine acquire_sweep(sweep)
-      !> The sweep, without results of samples; empty if there is none.
-      type(sweep_type), allocatable, intent(out) :: sweep
-
-      !$omp critical (thud_sweep)
-      call move_alloc(kept, sweep)
-      !$omp end critical (thud_sweep)
-      if (.not. allocated(sweep)) allocate (sweep)
-   end subroutine acquire_sweep
-
-   !> Deallocates the results of samples, and stores the sweep for a later call.
-   subroutine release_sweep(sweep)
-      !> The sweep, not allocated afterwards.
-      type(sweep_type), allocatable, intent(inout) :: sweep
-
-      call clear(sweep)
-      !$omp critical (thud_sweep)
-      call move_alloc(sweep, kept)
-      !$omp end critical (thud_sweep)
-   end subroutine release_sweep
-
-   !> Deallocates the results of samples.
-   subroutine clear(sweep)
+   !> Leaves the matrices of a sweep to the next one.
+   subroutine keep_matrices(sweep)
+      !> The sweep, which computes no further samples.
       type(sweep_type), intent(inout) :: sweep
 
-      if (allocated(sweep%status)) deallocate (sweep%status, sweep%reason, sweep%values)
-      if (allocated(sweep%force)) deallocate (sweep%force)
-   end subroutine clear
+      !$omp critical (thud_sweep)
+      call move_alloc(sweep%projections, kept)
+      !$omp end critical (thud_sweep)
+   end subroutine keep_matrices
 
    !> Computes samples.
    subroutine solve_sweep(case, columns, values, threads, forces, sweep, error)
@@ -140,9 +131,7 @@ contains
 
       call check_samples(case, columns, forces, error)
       if (allocated(error)) return
-      call clear(sweep)
-      allocate (sweep%status(size(values, 2)), sweep%reason(size(values, 2)))
-      sweep%values = spread(merge(0.0_wp, not_a_number, sweep%columns%is_flag), 2, size(values, 2))
+      if (allocated(sweep%force)) deallocate (sweep%force, sweep%status, sweep%reason)
       allocate (sweep%force(merge(get_sample_count(case%sampling), 0, forces), force_count, size(values, 2)), stat=status, &
          errmsg=message)
       if (status /= 0) then
@@ -150,7 +139,9 @@ contains
             //'fewer at a time')
          return
       end if
+      allocate (sweep%status(size(values, 2)), sweep%reason(size(values, 2)))
       sweep%status = 1
+      sweep%values = spread(merge(0.0_wp, not_a_number, sweep%columns%is_flag), 2, size(values, 2))
       if (suits_batch(case, columns)) call solve_batch(case, columns, values, threads, sweep, error)
       if (allocated(error)) return
       ! Those that fail in a batch are repeated one by one, for their error messages.
@@ -206,8 +197,7 @@ contains
       call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
          .and. [(all(columns%field /= i), i=1, size(fields))]), error)
       if (allocated(error) .or. .not. forces) return
-      if (any([(any(fields(columns(i)%field)%key == [character(len=11) :: 'duration', 'sample_rate']), &
-         i=1, size(columns))])) then
+      if (any(fields(columns%field)%key == 'duration' .or. fields(columns%field)%key == 'sample_rate')) then
          error = input_error('forces are wanted of samples with their own sampling; allowed: one sampling for all, ' &
             //'that of the case')
       else
@@ -330,11 +320,11 @@ contains
 
       !> Computes the blocks of one thread. Memory beyond the longest contact is never touched.
       subroutine solve_blocks()
-         type(block_result_type) :: block
          type(error_type), allocatable :: thread_error
-         real(wp), allocatable :: force(:)
+         real(wp), allocatable :: block_values(:, :), force(:)
          character(len=128) :: message
-         integer :: i, j, n_row, n_time, start, status
+         logical :: computed(block_size)
+         integer :: i, j, n_row, n_time, n_written, start, status
 
          start = 1
          n_row = force_count*block_size
@@ -352,10 +342,14 @@ contains
             if (.not. allocated(thread_error)) call check_interrupt(thread_error)
             if (allocated(thread_error)) cycle
             associate (indices => order(first(i):first(i + 1) - 1))
-               call solve_drops(samples(indices), case%sampling, criteria, sweep%levels, sweep%projections, force(start), &
-                  block)
+               block_values = sweep%values(:, indices)
+               call solve_drops(case, samples(indices), criteria(:merge(criterion_count, 0, sweep%levels)), &
+                  sweep%projections, force(start), n_written, computed(:size(indices)), block_values)
                do j = 1, size(indices)
-                  if (block%computed(j)) call store_sample(j, indices(j), block, force(start))
+                  if (.not. computed(j)) cycle
+                  sweep%status(indices(j)) = 0
+                  sweep%values(:, indices(j)) = block_values(:, j)
+                  if (size(sweep%force) > 0) call store_forces(j, indices(j), n_written, force(start))
                end do
             end associate
          end do
@@ -365,23 +359,18 @@ contains
          !$omp end critical (thud_sweep_error)
       end subroutine solve_blocks
 
-      !> Stores the results of a sample.
-      subroutine store_sample(i, sample, block, force)
-         !> Index of the sample in the block, and among all samples.
-         integer, intent(in) :: i, sample
-         type(block_result_type), intent(in) :: block
+      !> Stores the forces of a sample.
+      subroutine store_forces(i, sample, n_written, force)
+         !> Index of the sample in the block, and among all samples; number of instants that are set.
+         integer, intent(in) :: i, sample, n_written
          !> Forces of the block, N: [force_count block_size, n_written].
-         real(wp), intent(in) :: force(force_count*block_size, block%n_written)
+         real(wp), intent(in) :: force(force_count*block_size, n_written)
          integer :: j
 
-         sweep%status(sample) = 0
-         sweep%values(:sample_quantity_count, sample) = block%quantity(:, i)
-         if (sweep%levels) call set_source_values(case, criteria, block%quantity(:, i), block%level(:, :, i), &
-            block%conforms(:, i), sweep%values(:, sample))
-         do j = 1, merge(force_count, 0, size(sweep%force) > 0)
-            sweep%force(:, j, sample) = get_record(force, i, j, block%n_written, size(sweep%force, 1))
+         do j = 1, force_count
+            sweep%force(:, j, sample) = get_record(force, i, j, n_written, size(sweep%force, 1))
          end do
-      end subroutine store_sample
+      end subroutine store_forces
 
    end subroutine solve_batch
 
