@@ -1,13 +1,12 @@
 !> All that a Fortran program needs from thud: a case or a single source model, the force, its levels, the verdict.
 module thud
-   use thud_ball, only: ball_type, get_density
+   use thud_ball, only: ball_type, drop_type, get_density, get_impact_velocity
    use thud_band, only: band_type, get_bands, octave_count, octaves
    use thud_case, only: case_type, check_case, get_model_number, new_case
    use thud_case_text, only: get_case_text, read_case
    use thud_compression, only: compression_options_type, compression_type
    use thud_compute, only: assessment_type, compute, impact_type, is_conforming, results_type, scope_type
    use thud_constants, only: version
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type
    use thud_finite_element, only: finite_element_modulus, finite_element_type
    use thud_force_exposure, only: get_force_exposure_levels, level_methods

@@ -86,8 +86,9 @@ contains
       real(wp), intent(in) :: value
       !> See `record_type` (default: no unit, `real`).
       character(len=*), intent(in), optional :: unit, kind
+      integer :: extents(0)
 
-      call self%add_array(name, [integer :: ], [value], unit, kind)
+      call self%add_array(name, extents, [value], unit, kind)
    end subroutine add_number
 
    !> Adds an array of any rank.

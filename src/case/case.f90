@@ -1,9 +1,8 @@
 !> A case, the input of one run: its keys, the keys that it uses, and their checks.
 module thud_case
-   use thud_ball, only: ball_type, get_ball_fields
+   use thud_ball, only: ball_type, drop_type, get_ball_fields, get_drop_fields
    use thud_band, only: band_choices
    use thud_compression, only: check_compression, compression_options_type, get_compression_fields
-   use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, in_group, key_length, name_length, new_field
    use thud_force_exposure, only: level_methods

@@ -1,4 +1,4 @@
-!> The ball: geometry, mass, material and the gas in it.
+!> The ball, with its geometry, mass, material and gas, and its drop.
 module thud_ball
    use thud_constants, only: pi
    use thud_field, only: field_type, new_field
@@ -6,7 +6,7 @@ module thud_ball
    implicit none (type, external)
    private
 
-   public :: ball_type, get_ball_fields, get_density
+   public :: ball_type, drop_type, get_ball_fields, get_density, get_drop_fields, get_impact_velocity
 
    !> A hollow ball; the default is the paper's rubber ball (section 2.3).
    type :: ball_type
@@ -26,6 +26,14 @@ module thud_ball
       !> Ratio of specific heats of the enclosed gas.
       real(wp) :: heat_capacity_ratio = 1.4_wp
    end type ball_type
+
+   !> A free fall onto the floor; the default is the drop of the standards.
+   type :: drop_type
+      !> Height of the ball's lowest point above the floor, m.
+      real(wp) :: height = 1.0_wp
+      !> Acceleration of free fall, m/s2.
+      real(wp) :: gravity = 9.81_wp
+   end type drop_type
 
 contains
 
@@ -59,5 +67,26 @@ contains
 
       density = ball%mass/(4.0_wp/3.0_wp*pi*(ball%outer_radius**3 - (ball%outer_radius - ball%wall_thickness)**3))
    end function get_density
+
+   !> Keys, units and allowed ranges of the group `&drop`.
+   function get_drop_fields(drop) result(fields)
+      !> The drop that the fields read and set.
+      type(drop_type), intent(in), target :: drop
+      !> One field per component: [2].
+      type(field_type) :: fields(2)
+
+      fields = [ &
+         new_field('height', drop%height, 'm', "height of the ball's lowest point above the floor", '[1e-12, 1000000]'), &
+         new_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', '[1e-12, 1000]')]
+   end function get_drop_fields
+
+   !> Velocity at first touch, m/s (paper eq. 4).
+   pure function get_impact_velocity(drop) result(velocity)
+      type(drop_type), intent(in) :: drop
+      !> Velocity towards the floor, m/s.
+      real(wp) :: velocity
+
+      velocity = sqrt(2.0_wp*drop%gravity*drop%height)
+   end function get_impact_velocity
 
 end module thud_ball

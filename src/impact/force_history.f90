@@ -5,14 +5,13 @@ module thud_force_history
    use thud_constants, only: not_a_number
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_motion, only: motion_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: add_model_quantity, add_to_means, check_samples, continue_to_zero, force_count, force_history_type
-   public :: force_names, get_model_quantity, holds_impulse, max_residual, min_contact_samples, new_force_history
-   public :: numerical_error_type
+   public :: add_model_quantity, add_to_means, check_samples, force_count, force_history_type, force_names
+   public :: get_model_quantity, holds_impulse, max_residual, min_contact_samples, motion_type, new_force_history
+   public :: numerical_error_type, snapshot_type
 
    !> Residual of the balances of impulse and energy above which all models except the finite elements return an error; it
    !> is below 1e-9 at the default step.
@@ -32,6 +31,33 @@ module thud_force_history
 
    !> Length of the name of a force component.
    integer, parameter :: name_length = 24
+
+   !> The deforming ball at one time, for pictures: its nodes run from the lowest point to the highest and from the inner
+   !> surface to the outer.
+   type :: snapshot_type
+      !> Time since the beginning of the record, s.
+      real(wp) :: time = 0.0_wp
+      !> Positions of the nodes, m, relative to a floor at rest at height 0: [0:n_polar, 0:n_radial, 2].
+      real(wp), allocatable :: position(:, :, :)
+      !> Velocities, m/s: the same shape.
+      real(wp), allocatable :: velocity(:, :, :)
+      !> Stresses from the floor on the nodes of the outer surface, outwards and upwards, Pa: [n_polar + 1, 2].
+      real(wp), allocatable :: contact_stress(:, :)
+      !> Overpressure of the gas, Pa.
+      real(wp) :: cavity_pressure = 0.0_wp
+      !> Displacement of the floor under the ball, downwards, m.
+      real(wp) :: floor_displacement = 0.0_wp
+   end type snapshot_type
+
+   !> The snapshots of an impact.
+   type :: motion_type
+      !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
+      real(wp), allocatable :: start(:, :, :)
+      !> Number of snapshots taken.
+      integer :: n_frame = 0
+      !> The snapshots, and space for more: [capacity].
+      type(snapshot_type), allocatable :: snapshot(:)
+   end type motion_type
 
    !> Errors due to the resolution; NaN if they are not known.
    type :: numerical_error_type
@@ -156,22 +182,6 @@ contains
       mean(i) = mean(i) + (1 - fraction)*integral/interval
       if (i < size(mean)) mean(i + 1) = mean(i + 1) + fraction*integral/interval
    end subroutine add_to_means
-
-   !> Estimates the contact time between samples, which are means: a force that falls linearly to zero has the last two.
-   pure subroutine continue_to_zero(history)
-      !> The history, with its contact time; `exact_contact_time` is set.
-      type(force_history_type), intent(inout) :: history
-      real(wp) :: fraction
-      integer :: last
-
-      last = min(size(history%floor_force), ceiling((history%touch_time + history%contact_time)*history%sample_rate) + 2)
-      last = findloc(abs(history%floor_force(:last)) > 0.0_wp, .true., dim=1, back=.true.)
-      if (last < 2) return
-      ! The force ends at the fraction x of the last interval: end/before = x**2/(2 x + 1).
-      fraction = max(0.0_wp, history%floor_force(last))/maxval(history%floor_force(last - 1:last))
-      fraction = min(1.0_wp, fraction + sqrt(fraction**2 + fraction))
-      history%exact_contact_time = (last - 1.5_wp + fraction)/history%sample_rate - history%touch_time
-   end subroutine continue_to_zero
 
    !> Adds a scalar quantity of the model.
    pure subroutine add_model_quantity(history, name, unit, value)

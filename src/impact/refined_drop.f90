@@ -3,16 +3,14 @@
 !> the change from a coarser level.
 module thud_refined_drop
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, drop_type
    use thud_band, only: band_type, octave_count, octaves
    use thud_constants, only: not_a_number, pi
-   use thud_drop, only: drop_type
    use thud_error, only: error_type, signal_base
    use thud_force_exposure, only: get_force_exposure_levels
-   use thud_force_history, only: add_model_quantity, check_samples, force_history_type, get_model_quantity, &
+   use thud_force_history, only: add_model_quantity, check_samples, force_history_type, get_model_quantity, motion_type, &
       numerical_error_type
    use thud_kinds, only: wp
-   use thud_motion, only: motion_type
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: resolution_type, source_model_type

@@ -4,9 +4,8 @@
 !> src/case/registry.f90. Its options form the namelist group `&<name>` unless stated otherwise. The
 !> descriptions of arguments in this file hold for every model.
 module thud_source_model
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, drop_type
    use thud_band, only: octave_count
-   use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type

@@ -2,8 +2,7 @@
 !> are computed with a warning.
 module thud_validity_limit
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
-   use thud_ball, only: ball_type, get_density
-   use thud_drop, only: drop_type
+   use thud_ball, only: ball_type, drop_type, get_density
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_note, only: note_type
@@ -53,11 +52,9 @@ contains
       character(len=24) :: text
       real(wp) :: near
 
-      if (.not. abs(value) < 1.0e300_wp) then
-         ! A quotient may overflow; messages do not print Infinity.
-         text = merge('unknown     ', 'beyond 1e300', ieee_is_nan(value))
-         return
-      end if
+      ! A quotient may overflow; messages do not print Infinity.
+      text = merge('unknown     ', 'beyond 1e300', ieee_is_nan(value))
+      if (.not. abs(value) < 1.0e300_wp) return
       write (text, '(es24.2e3)') value
       read (text, *) near
       text = to_text(near)

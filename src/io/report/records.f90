@@ -10,10 +10,9 @@ module thud_records
    use thud_constants, only: not_a_number
    use thud_floor_model, only: floor_state_type
    use thud_floor_result, only: floor_result_type
-   use thud_force_history, only: force_count, force_history_type, force_names
+   use thud_force_history, only: force_count, force_history_type, force_names, motion_type
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_motion, only: motion_type
    use thud_note, only: get_subject, note_type
    use thud_quantities, only: get_quantities, history_quantity_count, quantities
    use thud_rating, only: get_class, get_rounded, rating_names, rating_titles

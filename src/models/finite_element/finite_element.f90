@@ -3,15 +3,14 @@
 !> Each sampling interval holds as many equal steps as stability requires. The force of a sample is the mean over one
 !> sampling interval around it, so that the record has the impulse of the run.
 module thud_finite_element
-   use thud_ball, only: ball_type, get_density
+   use thud_ball, only: ball_type, drop_type, get_density, get_impact_velocity
    use thud_band, only: octave_count
    use thud_constants, only: pi
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_element_block, only: n_element
    use thud_error, only: error_type, input_error, numerical_error, numerical_failure
    use thud_field, only: field_type, in_group, new_field
    use thud_floor_contact, only: contact_options_type, get_contact_fields, new_floor_contact
-   use thud_force_history, only: add_model_quantity, add_to_means, force_history_type
+   use thud_force_history, only: add_model_quantity, add_to_means, force_history_type, snapshot_type
    use thud_impact_record, only: check_interval, check_run, contacts_type, continue_flight, finish_record, follow_contact, &
       get_duration_error, max_energy_residual, new_impact_record, record_sample
    use thud_impact_run, only: get_energy, get_stable_interval, impact_run_type, new_impact_run, update_position, &
@@ -21,7 +20,6 @@ module thud_finite_element
       material_type, new_material
    use thud_mesh, only: check_mesh, get_element_counts, get_mesh_fields, get_nodal_areas, mesh_options_type, mesh_type, &
       min_radial, new_mesh
-   use thud_motion, only: snapshot_type
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_receiver, only: receiver_type

@@ -3,7 +3,7 @@ module thud_impact_record
    use thud_constants, only: recorded_band
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: add_model_quantity, continue_to_zero, force_history_type, new_force_history
+   use thud_force_history, only: add_model_quantity, force_history_type, new_force_history
    use thud_impact_run, only: get_energy, get_mean_height, get_mean_velocity, impact_run_type
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
@@ -15,7 +15,7 @@ module thud_impact_record
    implicit none (type, external)
    private
 
-   public :: check_run, contacts_type, continue_flight, finish_record, follow_contact, get_duration_error
+   public :: check_run, contacts_type, continue_flight, continue_to_zero, finish_record, follow_contact, get_duration_error
    public :: max_energy_residual, new_impact_record, record_sample
 
    !> Maximum error of the balance of energy, relative to the energy at first touch.
@@ -273,5 +273,21 @@ contains
       error = numerical_error(to_text(1.0e3_wp*time)//' ms after the start '//cause, 'finite_element')
       error%has_short_record = rests
    end subroutine check_run
+
+   !> Estimates the contact time between samples, which are means: a force that falls linearly to zero has the last two.
+   pure subroutine continue_to_zero(history)
+      !> The history, with its contact time; `exact_contact_time` is set.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: fraction
+      integer :: last
+
+      last = min(size(history%floor_force), ceiling((history%touch_time + history%contact_time)*history%sample_rate) + 2)
+      last = findloc(abs(history%floor_force(:last)) > 0.0_wp, .true., dim=1, back=.true.)
+      if (last < 2) return
+      ! The force ends at the fraction x of the last interval: end/before = x**2/(2 x + 1).
+      fraction = max(0.0_wp, history%floor_force(last))/maxval(history%floor_force(last - 1:last))
+      fraction = min(1.0_wp, fraction + sqrt(fraction**2 + fraction))
+      history%exact_contact_time = (last - 1.5_wp + fraction)/history%sample_rate - history%touch_time
+   end subroutine continue_to_zero
 
 end module thud_impact_record

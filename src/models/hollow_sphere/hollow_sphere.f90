@@ -1,10 +1,9 @@
 !> The paper's analytical model (section 2, after Hubbard and Stronge 2001): an elastic hollow
 !> sphere whose flattened cap rests on the floor while the rest moves uniformly.
 module thud_hollow_sphere
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, drop_type, get_impact_velocity
    use thud_constants, only: pi
    use thud_contact_source, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_step_error, contact_source_type
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, numerical_error
    use thud_field, only: field_type, name_length, new_field
    use thud_force_history, only: force_history_type

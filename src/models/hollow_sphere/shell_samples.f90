@@ -4,10 +4,9 @@
 !> Samples that cannot be computed, or whose balances must be checked, are NaN and do not affect others.
 module thud_shell_samples
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_sizeof
-   use thud_ball, only: ball_type, get_ball_fields
+   use thud_ball, only: ball_type, drop_type, get_ball_fields, get_drop_fields, get_impact_velocity
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: not_a_number, pi
-   use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_field, only: field_type, in_group
    use thud_force_history, only: holds_impulse, min_contact_samples
    use thud_hollow_sphere, only: compression_weights, get_shell_stiffness, restitution_weights

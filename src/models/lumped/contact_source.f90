@@ -5,7 +5,7 @@
 !> `get_derivative` returns for the velocities are the absolute accelerations of the masses; force and loss are defined as on
 !> a rigid floor.
 module thud_contact_source
-   use thud_drop, only: drop_type
+   use thud_ball, only: drop_type
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
    use thud_rk4, only: ode_type

@@ -1,10 +1,9 @@
 !> A lumped source on a spring with damping that grows with the deflection (Hunt and Crossley 1975; paper, reference [6]): a
 !> baseline, also for the tyre.
 module thud_hunt_crossley
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, drop_type, get_impact_velocity
    use thud_contact_source, only: at_deflection, at_impulse, at_loss, at_velocity, contact_law_type, contact_source_type, &
       get_contact_force
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, signal_base
    use thud_field, only: field_type, new_field
    use thud_force_history, only: force_history_type

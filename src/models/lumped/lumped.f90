@@ -2,10 +2,10 @@
 !> events between compression, restitution and flight, samples the forces, and checks the balances of impulse and energy. A
 !> rigid floor is a receiver without states. Gravity is left out: a return by gravity is another impact.
 module thud_lumped
+   use thud_ball, only: drop_type, get_impact_velocity
    use thud_contact_source, only: coarse_step_error, contact_source_type
    use thud_coupled_step, only: coupled_state_type, get_relative_state, new_receiver_stages, receiver_stages_type, &
       take_coupled_step
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_force_history, only: add_model_quantity, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt

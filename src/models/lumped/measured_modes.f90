@@ -2,9 +2,8 @@
 !> each mode is an oscillator on the floor that starts with the impact velocity, and the contact lasts until the sum of the
 !> modal forces first returns to zero.
 module thud_measured_modes
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, drop_type, get_impact_velocity
    use thud_constants, only: pi
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, new_field
    use thud_force_history, only: force_history_type, new_force_history

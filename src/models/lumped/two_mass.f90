@@ -2,10 +2,9 @@
 !> area plus the force of the carcass, both damped and never tensile: F = (p w d + c d (d/d0)^(n - 1))(1 + a d'). A sidewall,
 !> a linear spring with viscous damping, joins rim and belt (in tyre dynamics: residual stiffness and rigid ring).
 module thud_two_mass
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, drop_type, get_impact_velocity
    use thud_constants, only: pi
    use thud_contact_source, only: contact_law_type, contact_source_type, get_contact_force
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, new_field
    use thud_force_history, only: force_history_type

@@ -5,9 +5,8 @@
 !> creep of the material. Time steps are exact for each mode. In every step the forces of the surface rings make gaps and
 !> pressures complementary: no ring penetrates, none pulls, and there is no penalty stiffness.
 module thud_modal_ball
-   use thud_ball, only: ball_type, get_density
+   use thud_ball, only: ball_type, drop_type, get_density, get_impact_velocity
    use thud_constants, only: pi
-   use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length, new_field, only_with
    use thud_force_history, only: add_model_quantity, force_history_type
