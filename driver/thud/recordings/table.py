@@ -350,15 +350,6 @@ class _Row:
     fits: bool
 
     @property
-    def are_units(self) -> bool:
-        """Whether most cells are units without a name."""
-        filled = [title for title in self.titles if any(map(str.isalpha, "".join(title)))]
-        known = sum(bool(find_unit(unit or name)) for name, unit in filled)
-        has_names = any(name and unit for name, unit in filled)
-        is_bare = bool(filled) and all(unit for _, unit in filled)
-        return not has_names and (2 * known > len(filled) or is_bare)
-
-    @property
     def states(self) -> tuple[bool, bool]:
         """Whether it states units, and whether it names times."""
         units = [find_unit(unit) for _, unit in self.titles]
@@ -376,8 +367,9 @@ def _read_header(above: list[str], layout: _Layout) -> tuple[Pairs, Pairs, bool]
             header.append(pair)
         elif text:
             rows.append(_read_row(number, line, text, layout))
-    units = [row for row in rows if row.fits and row.are_units]
-    titles = [row for row in rows if row.fits and not row.are_units]
+    fitting = [row for row in rows if row.fits]
+    units = [row for row in fitting if _are_units(row.titles)]
+    titles = [row for row in fitting if row not in units]
     # Titles state units or times, or are next to the numbers.
     chosen = max(titles, key=lambda row: (row.states, row.number), default=None)
     for row in rows:
@@ -400,8 +392,17 @@ def _read_header(above: list[str], layout: _Layout) -> tuple[Pairs, Pairs, bool]
     return (
         [(name, re.split(r"[\t;]", value)[0]) for name, value in header],
         columns,
-        bool(titles + units),
+        bool(fitting),
     )
+
+
+def _are_units(titles: Pairs) -> bool:
+    """Whether most titles are units without a name."""
+    filled = [title for title in titles if any(map(str.isalpha, "".join(title)))]
+    known = sum(bool(find_unit(unit or name)) for name, unit in filled)
+    has_names = any(name and unit for name, unit in filled)
+    is_bare = bool(filled) and all(unit for _, unit in filled)
+    return not has_names and (2 * known > len(filled) or is_bare)
 
 
 def _one_unit(name: str, stated: list[str], label: str) -> str:
@@ -455,8 +456,8 @@ def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
         if mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
             cells = split_line(text, mark)
             parts = {find_unit(part) for part in UNIT_PART.findall(text)}
-            are_units = all(find_unit(cell) for cell in cells)
-            if mark != "," or are_units or not parts - {"", "counts", "FS"}:
+            is_split = mark != "," or _are_units(list(map(split_title, cells)))
+            if is_split or not parts - {"", "counts", "FS"}:
                 yield cells
     if separator is None:
         yield re.split(r" {2,}", text)
@@ -474,6 +475,8 @@ def _refuse_row(row: _Row, above: list[str], layout: _Layout, *, is_open: bool) 
     line, is_last = above[row.number - 1].strip(" "), row.number == len(above)
     is_comment = line[:1] in tuple(COMMENTS)
     cells = [] if is_comment else layout.cells(line)
+    while cells and not cells[-1]:
+        cells.pop()
     if len(cells) == layout.width and any(map(is_number, cells)):
         # A word may stand in front of the numbers of the first row.
         is_row = is_last and all(is_number(cells[i]) for i in layout.used)
@@ -488,7 +491,7 @@ def _refuse_row(row: _Row, above: list[str], layout: _Layout, *, is_open: bool) 
     is_title = names_time and (count > 1 or is_last)
     if is_last and not is_comment and ":" not in row.text:
         is_title |= (layout.separator or "\n") in row.text
-    if (is_title and is_open) or states_unit or row.are_units:
+    if (is_title and is_open) or states_unit or _are_units(row.titles):
         reason = f"{count} title{'s' * (count > 1)} for {layout.width} columns"
         reason = reason if count != layout.width else "is a second line of titles"
         layout.refuse(row.number, f"{shown_text(row.text)!r}: {reason}", ONE_TITLE)
