@@ -120,13 +120,16 @@ contains
       !> Set if a cell is too long, or has a quote only at its beginning.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: cell
-      integer :: at
+      integer :: at, i, length, n
 
-      allocate (cells(0))
+      allocate (cells(1 + count([(line(i:i) == table%separator, i=1, len(line))])))
+      n = 0
       at = 1
-      do while (at <= len(line) + 1 .and. .not. allocated(error))
-         cell = trim(adjustl(line(at:at - 2 + index(line(at:)//table%separator, table%separator))))
-         at = at + index(line(at:)//table%separator, table%separator)
+      do while (at <= len(line) + 1)
+         length = index(line(at:), table%separator) - 1
+         if (length < 0) length = len(line) - at + 1
+         cell = trim(adjustl(line(at:at + length - 1)))
+         at = at + length + 1
          ! One of several blanks in a row.
          if (cell == '' .and. table%separator == ' ') cycle
          if (len(cell) > cell_length) then
@@ -135,10 +138,13 @@ contains
          else if (scan(cell, '''"') == 1) then
             if (len(cell) == 1 .or. cell(len(cell):) /= cell(:1)) error = row_error(table, 'a quote is not closed: '//cell &
                //'; allowed: quotes that begin and end in one cell, without a separator between them')
-            cell = adjustl(cell(2:len(cell) - 1))
+            cell = trim(adjustl(cell(2:len(cell) - 1)))
          end if
-         cells = [character(len=cell_length) :: cells, cell]
+         if (allocated(error)) return
+         n = n + 1
+         cells(n) = cell
       end do
+      cells = cells(:n)
    end subroutine split_line
 
    !> Finds the decimal mark of a table from the numbers of a row, and replaces it by a point.

@@ -314,7 +314,7 @@ def edited(path: Path, line: int, old: str, new: str) -> None:
         (5, "0,0.25", "0,0.5", ("rectangular grid", "one point for each")),
         (5, "0,0.25", "0.1,0.25", ("rectangular grid", "one point for each")),
         (5, "0,0.25,", "# ", ("rectangular grid", 356, 21, 17)),
-        (0, "frequency,Hz,", "frequency,Hz,20,", (37, "frequencies", 36)),
+        (0, "frequency,Hz,", "frequency,Hz,20,", ("line 2", 38, 39)),
     ],
 )
 def test_incomplete_tables_are_refused(

@@ -41,11 +41,6 @@ module thud_sampled_modes
    !> spacings, 4 sin(pi/4)**2.
    real(wp), parameter :: max_roughness = 2.0_wp
 
-   !> A row that describes the modes: [n_mode].
-   type :: row_type
-      real(wp), allocatable :: value(:)
-   end type row_type
-
 contains
 
    !> Modes of a floor from a file.
@@ -54,8 +49,7 @@ contains
       type(floor_modes_type), intent(out) :: modes
       !> Set if the file cannot be read, or its modes are not complete; the message begins with the path.
       type(error_type), allocatable, intent(out) :: error
-      type(row_type) :: rows(size(labels))
-      real(wp), allocatable :: point(:, :), x(:), y(:), shape(:, :, :)
+      real(wp), allocatable :: frequency(:), loss_factor(:), point(:, :), x(:), y(:), shape(:, :, :)
       integer(int64) :: bytes
 
       ! Pipes and devices have no size; opening one could block.
@@ -66,36 +60,40 @@ contains
       else
          ! Threads may read the same file, and none can be open twice.
          !$omp critical (thud_sampled_modes)
-         call read_rows(path, rows, point, error)
+         call read_rows(path, frequency, loss_factor, point, error)
          !$omp end critical (thud_sampled_modes)
       end if
       if (.not. allocated(error)) call get_coordinates(point(1, :), 'x', x, error)
       if (.not. allocated(error)) call get_coordinates(point(2, :), 'y', y, error)
       if (.not. allocated(error)) call get_shapes(point, x, y, shape, error)
-      if (.not. allocated(error)) call check_shapes(shape, rows(1)%value, error)
+      if (.not. allocated(error)) call check_shapes(shape, frequency, error)
       if (allocated(error)) then
          call prefix_error(error, path)
       else
-         call get_sampled_modes(rows, x, y, shape, modes)
+         call get_sampled_modes(frequency, loss_factor, x, y, shape, modes)
       end if
    end subroutine read_sampled_modes
 
    !> Reads all rows of a file.
-   subroutine read_rows(path, rows, point, error)
+   subroutine read_rows(path, frequency, loss_factor, point, error)
       character(len=*), intent(in) :: path
-      !> In the order of `labels`.
-      type(row_type), intent(inout) :: rows(:)
-      !> Points, with coordinates and shapes: [2 + n_mode, n_point].
+      !> Natural frequencies, Hz, and loss factors: [n_mode].
+      real(wp), allocatable, intent(out) :: frequency(:), loss_factor(:)
+      !> Points, with coordinates, m, and shapes for a modal mass of 1 kg, 1/sqrt(kg): [2 + n_mode, n_point].
       real(wp), allocatable, intent(out) :: point(:, :)
       !> Set if a row is not one of a table, or one is missing.
       type(error_type), allocatable, intent(out) :: error
       type(table_reader_type) :: table
       character(len=cell_length), allocatable :: cells(:)
       character(len=:), allocatable :: missing
-      real(wp), allocatable :: value(:)
+      real(wp), allocatable :: value(:), rows(:, :)
       logical, allocatable :: valid(:)
-      integer :: first, i, n_point, number
+      integer :: at(0:size(labels))
+      integer :: i, label, n, n_point
 
+      ! Index of the latest row without a label, and of that with each label.
+      at = 0
+      n = 0
       n_point = 0
       call open_table(path, table, error)
       do
@@ -103,80 +101,57 @@ contains
          if (allocated(error)) return
          if (size(cells) == 0) exit
          if (index(lower_case(cells(1)), 'x') == 1) cycle
-         number = findloc(labels == lower_case(cells(1)), .true., dim=1)
+         label = findloc(labels == lower_case(cells(1)), .true., dim=1)
          ! A label and a unit stand before values.
-         first = merge(3, 1, number > 0)
+         if (label > 0) cells(:min(2, size(cells))) = '0'
+         if (n == 0) allocate (rows(size(cells), 8))
          if (allocated(value)) deallocate (value, valid)
-         allocate (value(size(cells(first:))), valid(size(cells(first:))))
-         call read_number(cells(first:), value, valid)
+         allocate (value(size(cells)), valid(size(cells)))
+         call read_number(cells, value, valid)
          i = findloc(valid, .false., dim=1)
          if (i > 0) then
-            error = row_error(table, quoted(trim(cells(first + i - 1)))//' in column '//to_text(first + i - 1)//' is not ' &
-               //'a number; allowed: finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
-         else if (number > 0) then
-            i = findloc(value > 0.0_wp .and. value <= highest_value(number), .false., dim=1)
-            if (allocated(rows(number)%value)) then
-               error = row_error(table, trim(labels(number))//' is given twice; allowed: once')
+            error = row_error(table, quoted(trim(cells(i)))//' in column '//to_text(i)//' is not a number; allowed: ' &
+               //'finite numbers, and in the first column also frequency, loss_factor, modal_mass or x')
+         else if (label > 0) then
+            i = findloc(value(3:) > 0.0_wp .and. value(3:) <= highest_value(label), .false., dim=1)
+            if (at(label) > 0) then
+               error = row_error(table, trim(labels(label))//' is given twice; allowed: once')
             else if (i > 0) then
-               error = row_error(table, trim(labels(number))//' of mode '//to_text(i)//' is ' &
-                  //to_text(value(i))//'; allowed: above 0, up to '//to_text(highest_value(number)))
+               error = row_error(table, trim(labels(label))//' of mode '//to_text(i)//' is '//to_text(value(2 + i)) &
+                  //'; allowed: above 0, up to '//to_text(highest_value(label)))
             end if
-            rows(number)%value = value
-         else
-            call add_point(table, value, point, n_point, error)
          end if
+         if (size(value) /= size(rows, 1) .and. .not. allocated(error)) error = row_error(table, 'it has ' &
+            //to_text(size(value))//' cells, the rows before it '//to_text(size(rows, 1))//'; allowed: two and one for ' &
+            //'each mode')
+         if (allocated(error)) return
+         if (n == size(rows, 2)) rows = reshape(rows, [size(rows, 1), 2*n], pad=[0.0_wp])
+         n = n + 1
+         rows(:, n) = value
+         at(label) = n
+         if (label == 0) n_point = n_point + 1
       end do
       missing = ''
-      if (n_point == 0) missing = 'x, y and the shapes at a point'
-      if (.not. allocated(rows(2)%value)) missing = trim(labels(2))
-      if (.not. allocated(rows(1)%value)) missing = trim(labels(1))
+      if (at(0) == 0) missing = 'x, y and the shapes at a point'
+      if (at(2) == 0) missing = trim(labels(2))
+      if (at(1) == 0) missing = trim(labels(1))
       if (missing /= '') then
          error = input_error('there is no row of '//missing//'; allowed: a table with rows '//trim(labels(1))//' (Hz) and ' &
             //trim(labels(2))//', and a row of x, y (m) and the shapes of all modes for each point')
       else if (n_point > max_points) then
          error = input_error('the grid has '//to_text(n_point)//' points; allowed: up to '//to_text(max_points) &
             //', of which eight per wavelength are enough')
+      else if (size(rows, 1) < 3) then
+         error = input_error('there are no modes; allowed: a column for each mode behind the first two')
       end if
       if (allocated(error)) return
-      point = point(:, :n_point)
-      associate (n => size(point, 1) - 2)
-         if (.not. allocated(rows(3)%value)) rows(3)%value = spread(1.0_wp, 1, n)
-         if (n < 1 .or. any([(size(rows(i)%value), i=1, size(rows))] /= n)) then
-            error = input_error('there are '//to_text(size(rows(1)%value))//' frequencies, ' &
-               //to_text(size(rows(2)%value))//' loss factors, '//to_text(size(rows(3)%value))//' modal masses and ' &
-               //to_text(n)//' shapes; allowed: one of each per mode')
-            return
-         end if
-         point(3:, :) = point(3:, :)/spread(sqrt(rows(3)%value), 2, n_point)
-      end associate
+      frequency = rows(3:, at(1))
+      loss_factor = rows(3:, at(2))
+      point = rows(:, pack([(i, i=1, n)], [(all(at(1:) /= i), i=1, n)]))
+      do i = 1, merge(n_point, 0, at(3) > 0)
+         point(3:, i) = point(3:, i)/sqrt(rows(3:, at(3)))
+      end do
    end subroutine read_rows
-
-   !> Adds a point to those of a table.
-   subroutine add_point(table, value, point, n_point, error)
-      type(table_reader_type), intent(in) :: table
-      !> Coordinates and shapes: [2 + n_mode].
-      real(wp), intent(in) :: value(:)
-      !> The points, with space for more: [2 + n_mode, at least n_point]; not allocated before the first one.
-      real(wp), allocatable, intent(inout) :: point(:, :)
-      integer, intent(inout) :: n_point
-      !> Set if it does not have as many values as the others.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp), allocatable :: more(:, :)
-
-      if (n_point == 0) allocate (point(size(value), 64))
-      if (size(value) /= size(point, 1)) then
-         error = row_error(table, 'it has '//to_text(size(value))//' values, points before it have ' &
-            //to_text(size(point, 1))//'; allowed: x, y and the shape of each mode')
-         return
-      end if
-      if (n_point == size(point, 2)) then
-         allocate (more(size(value), 2*n_point))
-         more(:, :n_point) = point
-         call move_alloc(more, point)
-      end if
-      n_point = n_point + 1
-      point(:, n_point) = value
-   end subroutine add_point
 
    !> Shapes at the points of a grid.
    subroutine get_shapes(point, x, y, shape, error)
@@ -267,9 +242,9 @@ contains
    end subroutine check_shapes
 
    !> Modes of a floor from a table.
-   subroutine get_sampled_modes(rows, x, y, samples, modes)
-      !> Rows in the order of `labels`.
-      type(row_type), intent(in) :: rows(:)
+   subroutine get_sampled_modes(frequency, loss_factor, x, y, samples, modes)
+      !> Natural frequencies, Hz, and loss factors: [n_mode].
+      real(wp), intent(in) :: frequency(:), loss_factor(:)
       !> Coordinates of the grid, m: [n_x], [n_y].
       real(wp), intent(in) :: x(:), y(:)
       !> Shapes there, 1/sqrt(kg): [n_x, n_y, n_mode].
@@ -283,9 +258,9 @@ contains
       modes%stack%length = x(size(x))
       modes%stack%width = y(size(y))
       allocate (modes%stack%plate(1), modes%stack%layer(0))
-      order = get_ascending_order(rows(1)%value)
-      modes%omega = 2*pi*rows(1)%value(order)
-      modes%loss_factor = rows(2)%value(order)
+      order = get_ascending_order(frequency)
+      modes%omega = 2*pi*frequency(order)
+      modes%loss_factor = loss_factor(order)
       ! There is no mode above the highest one.
       modes%limit = maxval(modes%omega)*(1 + epsilon(1.0_wp))
       modes%sum_limit = modes%limit
