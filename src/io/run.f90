@@ -5,14 +5,14 @@ module thud_run
    use thud_case_text, only: get_case_text, read_case
    use thud_compute, only: compute, is_conforming, results_type, scope_type
    use thud_constants, only: version
-   use thud_error, only: error_type, input_error, prefix_error
+   use thud_error, only: error_type, prefix_error
    use thud_note, only: get_sentence
    use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
    use thud_records, only: add_results
    use thud_result_directory, only: add_text, check_target, close_results, open_results, result_directory_type
    use thud_screen_tables, only: get_screen_tables
    use thud_system, only: path_length, read_text_file
-   use thud_text, only: lower_case, newline
+   use thud_text, only: newline
    implicit none (type, external)
    private
 
@@ -150,8 +150,6 @@ contains
       logical, intent(in), optional :: unchecked
       !> Allow a room without a floor (default: false).
       logical, intent(in), optional :: room_alone
-      ! Endings of recordings and studies, which the driver reads.
-      character(len=*), parameter :: other_endings = '.wav.flac.tdms.h5.hdf5.mat.uff.unv.csv.lvm.toml.'
       character(len=:), allocatable :: text
       integer :: dot, slash
 
@@ -159,12 +157,7 @@ contains
       dot = index(path, '.', back=.true.)
       ! A name that begins with its only point has no ending.
       if (dot <= slash + 1) dot = len(path) + 1
-      if (dot <= len(path) .and. index(other_endings, lower_case(path(dot:))//'.') > 0) then
-         error = input_error('this is no namelist file; allowed: a namelist file; thud-driver measure reads recordings,'// &
-            ' thud-driver fit, sweep and other studies read TOML')
-      else
-         call read_text_file(path, text, error)
-      end if
+      call read_text_file(path, text, error)
       if (.not. allocated(error)) call read_case(text, path(slash + 1:dot - 1), case, error, unchecked, path(:slash), &
          room_alone)
       if (allocated(error)) call prefix_error(error, path)

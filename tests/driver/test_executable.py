@@ -176,7 +176,7 @@ BAD_CASES = {
         f"{MINIMAL}&sampling rate = 1 /",
         naming("&sampling: rate", "line 4", "'sample_rate'"),
     ),
-    "open quote at the start of a line": (f"{MINIMAL}\n'\n", naming("quote", "line 5")),
+    "open quote at the start of a line": (f"{MINIMAL}\n'\n", naming("group", "line 5")),
     "wrong type": ("&ball mass = 'heavy' / &drop / &model /", naming("&ball: mass", "'heavy'")),
     "two values": ("&ball mass = 1 2 / &drop / &model /", naming("&ball: mass", "1 2", "kg")),
     "unit in the value": (
@@ -252,14 +252,6 @@ def test_closing_shell_is_a_numerical_failure(run: Run, case_file: CaseFile) -> 
     result = run(case_file(MINIMAL.replace("&drop", "&drop height = 5000")))
     assert result.returncode == 2
     assert re.search(naming("&drop: height", "5000.0 m"), result.stderr)
-
-
-@pytest.mark.parametrize("name", ["a.wav", "a.TDMS", "a.csv", "study.toml"])
-def test_files_of_the_driver_are_told(run: Run, tmp_path: Path, name: str) -> None:
-    (tmp_path / name).write_bytes(b"\n" * 100_000)
-    result = run(name)
-    assert result.returncode == 1
-    assert re.search(naming(name, "namelist", "measure", "fit"), result.stderr)
 
 
 def test_pipe_as_input_is_told(run: Run, tmp_path: Path) -> None:
