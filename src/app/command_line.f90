@@ -14,8 +14,8 @@ module thud_command_line
    use thud_schema, only: get_schema
    use thud_screen, only: print_message, print_results, red, write_screen, yellow
    use thud_suggestion, only: get_suggestion
-   use thud_system, only: standard_output
-   use thud_text, only: join, newline, quoted, wrap_lines
+   use thud_system, only: path_length, standard_output
+   use thud_text, only: join, newline, quoted, to_text, wrap_lines
    implicit none (type, external)
    private
 
@@ -24,9 +24,8 @@ module thud_command_line
    !> Exit code if the source does not conform, with `--check`.
    integer, parameter :: not_conforming = 3
 
-   !> Maximum number of threads, and the allowed numbers as text.
+   !> Maximum number of threads.
    integer, parameter :: max_threads = 1024
-   character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
 
    !> Usage of the program.
    character(len=*), parameter :: usage = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] ' &
@@ -110,9 +109,10 @@ contains
    !> Parses the arguments.
    subroutine parse_arguments(request, error)
       type(request_type), intent(out) :: request
-      !> Set if an argument is unknown, missing or given twice.
+      !> Set if an argument is unknown, missing or not allowed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: argument, number, suggestion, text
+      character(len=path_length) :: argument, value
+      character(len=:), allocatable :: suggestion, text
       integer :: i
 
       request%options%output = ''
@@ -120,7 +120,7 @@ contains
       request%samples = ''
       i = 1
       do while (i <= command_argument_count())
-         argument = get_argument(i)
+         call get_command_argument(i, argument)
          select case (argument)
          case ('--version')
             request%information = 'thud '//version
@@ -141,82 +141,38 @@ contains
             request%quiet = .true.
          case ('--verbose', '-v')
             request%options%verbose = .true.
-         case ('--output', '-o')
-            call take_value(i, '--output', 'a directory', request%options%output, error)
-         case ('--samples')
-            call take_value(i, '--samples', 'a table of samples', request%samples, error)
-         case ('--threads')
-            call take_value(i, '--threads', threads_allowed, number, error)
-            if (.not. allocated(error)) call take_threads(number, request%threads, error)
+         case ('--output', '-o', '--samples', '--threads')
+            i = i + 1
+            call get_command_argument(i, value)
+            if (value == '') then
+               error = input_error(trim(argument)//' has no value; allowed: a directory, a table, or a number of threads')
+            else if (argument == '--samples') then
+               request%samples = trim(value)
+            else if (argument /= '--threads') then
+               request%options%output = trim(value)
+            else
+               request%threads = 0
+               if (verify(trim(value), '0123456789') == 0 .and. len_trim(value) <= 4) read (value, *) request%threads
+               if (request%threads < 1 .or. request%threads > max_threads) error = input_error('--threads = ' &
+                  //quoted(value)//' is not allowed; allowed: 1 to '//to_text(max_threads)//', whole')
+            end if
          case default
             if (index(argument, '-') == 1) then
-               call get_suggestion(argument, known_options, suggestion)
+               call get_suggestion(trim(argument), known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: ' &
                   //join(known_options))
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one (commands such as run ' &
                   //'and predict belong to thud-driver)')
             else
-               request%case_file = argument
+               request%case_file = trim(argument)
             end if
          end select
          if (allocated(error) .or. allocated(request%information)) return
          i = i + 1
       end do
-      if (.not. allocated(request%case_file)) then
-         error = input_error('no case is given')
-      else if (request%samples == '' .and. allocated(number)) then
-         error = input_error('--threads does nothing without --samples; allowed: both')
-      else if (request%samples /= '' .and. request%options%write_all) then
-         error = input_error('--all does nothing with --samples; allowed: one of them')
-      else if (request%options%verbose .and. request%samples /= '') then
-         error = input_error('--verbose does nothing with --samples; allowed: one of them')
-      else if (request%options%verbose .and. request%quiet) then
-         error = input_error('--verbose contradicts --quiet; allowed: one of them')
-      end if
+      if (.not. allocated(request%case_file)) error = input_error('no case is given')
    end subroutine parse_arguments
-
-   !> Reads the value of an option.
-   subroutine take_value(i, option, allowed, value, error)
-      !> Index of the option; afterwards that of its value.
-      integer, intent(inout) :: i
-      character(len=*), intent(in) :: option
-      !> Allowed values.
-      character(len=*), intent(in) :: allowed
-      character(len=:), allocatable, intent(inout) :: value
-      !> Set if there is no value.
-      type(error_type), allocatable, intent(out) :: error
-
-      i = i + 1
-      value = ''
-      if (i <= command_argument_count()) value = get_argument(i)
-      if (value == '') error = input_error(option//' has no value; allowed: '//allowed)
-   end subroutine take_value
-
-   !> Reads a number of threads.
-   subroutine take_threads(text, threads, error)
-      character(len=*), intent(in) :: text
-      integer, intent(out) :: threads
-      !> Set if the number is not allowed.
-      type(error_type), allocatable, intent(out) :: error
-
-      threads = 0
-      if (verify(text, '0123456789') == 0 .and. len(text) <= 4) read (text, *) threads
-      if (threads < 1 .or. threads > max_threads) error = input_error('--threads = '//quoted(text) &
-         //' is not allowed; allowed: '//threads_allowed)
-   end subroutine take_threads
-
-   !> One argument of the command line.
-   function get_argument(i) result(argument)
-      !> Index of the argument.
-      integer, intent(in) :: i
-      character(len=:), allocatable :: argument
-      integer :: length
-
-      call get_command_argument(i, length=length)
-      allocate (character(len=length) :: argument)
-      call get_command_argument(i, value=argument)
-   end function get_argument
 
    !> The help text.
    pure function help() result(text)

@@ -13,17 +13,14 @@ module thud_progress_line
    !> Time before the first line and between two lines, s.
    real(wp), parameter :: min_interval = 0.5_wp
 
-   !> Clock at the beginning, clock at the latest line, and clock ticks per second.
-   integer(int64) :: first = 0, latest = 0, rate = 1
-
-   !> Length of a line: of a full one, some terminals begin a new line.
-   integer, parameter :: line_length = screen_width - 1
-
-   !> Amount of work done at the latest report.
-   real(wp) :: latest_done = 0.0_wp
+   !> Clock at the latest line, and clock ticks per second.
+   integer(int64) :: latest = 0, rate = 1
 
    !> A line is on the screen.
    logical :: shown = .false.
+
+   !> Length of a line: of a full one, some terminals begin a new line.
+   integer, parameter :: line_length = screen_width - 1
 
 contains
 
@@ -31,9 +28,6 @@ contains
    subroutine begin_progress()
       if (.not. is_terminal(standard_error)) return
       call system_clock(latest, rate)
-      first = latest
-      latest_done = 0.0_wp
-      shown = .false.
       show_progress => print_line
    end subroutine begin_progress
 
@@ -41,8 +35,8 @@ contains
    subroutine end_progress()
       integer :: status
 
-      show_progress => null()
       if (shown) call write_text(standard_error, achar(13)//repeat(' ', line_length)//achar(13), status)
+      show_progress => null()
       shown = .false.
    end subroutine end_progress
 
@@ -58,16 +52,12 @@ contains
       integer :: status
 
       call system_clock(now)
-      ! The next of several drops.
-      if (done < latest_done) first = now
-      latest_done = done
       if (real(now - latest, wp) < min_interval*real(rate, wp)) return
       latest = now
       line = 'thud: '//fixed(done, 0)//' '//unit//' computed'
-      if (whole > 0.0_wp .and. done > 0.0_wp) line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit &
-         //' computed, at most '//fixed(real(now - first, wp)/real(rate, wp)*(whole - done)/done, 0)//' s left'
+      if (whole > 0.0_wp) line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed'
       call write_text(standard_error, achar(13)//line, status)
-      shown = status == 0
+      shown = .true.
    end subroutine print_line
 
 end module thud_progress_line

@@ -179,7 +179,6 @@ def test_bad_tables_are_refused(
         (["--samples"], "--samples"),
         (["--samples", "none.csv"], "none.csv"),
         (["--samples", "."], "directory"),
-        (["--threads", "2"], naming("--threads", "--samples")),
         (["--samples", "table.csv", "--threads", "0"], naming("--threads", "'0'", 1, 1024)),
         (["--samples", "table.csv", "--threads", "1025"], naming("--threads", "'1025'", 1, 1024)),
         (["--samples", "table.csv", "--threads", "2x"], naming("--threads", "'2x'", 1, 1024)),

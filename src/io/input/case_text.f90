@@ -180,12 +180,13 @@ contains
       !> The texts: [n].
       character(len=*), intent(in) :: texts(:)
       character(len=:), allocatable, intent(out) :: list
-      character(len=len(texts)), allocatable :: once(:)
       integer :: i
 
-      ! In a variable: of the result of a function with allocatable shape, gfortran takes wrong lengths.
-      once = pack(texts, [(.not. any(texts(:i - 1) == texts(i)), i=1, size(texts))])
-      list = join_quoted(once)
+      list = ''
+      do i = 1, size(texts)
+         if (.not. any(texts(:i - 1) == texts(i))) list = list//', '//quoted(trim(texts(i)))
+      end do
+      list = list(3:)
    end subroutine list_distinct
 
    !> The input as the text of a namelist file; reading it gives the same case. Values of the standard ball for keys

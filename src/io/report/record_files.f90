@@ -3,7 +3,7 @@ module thud_record_files
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use thud_bundle, only: bundle_type, record_type
    use thud_kinds, only: wp
-   use thud_text, only: join, join_quoted, newline, to_text
+   use thud_text, only: join, join_quoted, newline, split, to_text
    use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
@@ -134,8 +134,13 @@ contains
       type(record_type), intent(in) :: record
       !> The cells, empty for NaN: [n].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
-      integer :: i, at, length
+      integer :: i
 
+      if (record%kind == 'text') then
+         call split(record%text//newline, newline, cells)
+         cells = cells(:size(cells) - 1)
+         return
+      end if
       allocate (cells(size(record%values)))
       do i = 1, size(cells)
          associate (value => record%values(i, 1, 1))
@@ -149,13 +154,6 @@ contains
                if (ieee_is_nan(value)) cells(i) = ''
             end select
          end associate
-      end do
-      if (record%kind /= 'text') return
-      at = 1
-      do while (at <= len(record%text) + 1)
-         length = index(record%text(at:)//newline, newline) - 1
-         cells = [character(len=cell_length) :: cells, record%text(at:at + length - 1)]
-         at = at + length + 1
       end do
    end subroutine get_cells
 
