@@ -1,7 +1,7 @@
 !> Results as a list of records: texts, numbers and arrays, each with a name. Files and callers in other languages get
 !> results from this list, which is made once (`thud_records`).
 module thud_bundle
-   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr
    use thud_error, only: error_type
    use thud_kinds, only: int64, wp
    use thud_text, only: newline, tab, to_text
@@ -54,13 +54,7 @@ contains
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name, text
 
-      call add_record(self, name, 't'//to_text(len(text)))
-      associate (record => self%records(self%n_record))
-         record%kind = 'text'
-         record%text = text
-         allocate (record%values(0, 1, 1))
-      end associate
-      self%text = self%text//text
+      call add_record(self, name, [len(text)], text)
    end subroutine add_text
 
    !> Adds a list of texts, as the lines of a text.
@@ -101,7 +95,7 @@ contains
       !> See `record_type` (default: no unit, `real`).
       character(len=*), intent(in), optional :: unit, kind
 
-      call add_record(self, name, get_form(extents))
+      call add_record(self, name, extents)
       associate (record => self%records(self%n_record))
          record%values = reshape(values(:product(extents)), [product(extents), 1, 1])
          if (present(unit)) record%unit = unit
@@ -116,25 +110,19 @@ contains
       !> The array, unallocated afterwards: [:, :, :].
       real(wp), allocatable, intent(inout) :: values(:, :, :)
 
-      call add_record(self, name, get_form(shape(values)))
+      call add_record(self, name, shape(values))
       call move_alloc(values, self%records(self%n_record)%values)
    end subroutine move_array
 
-   !> Extents of an array, each followed by a comma.
-   pure function get_form(extents) result(form)
-      !> The extents: [rank].
-      integer, intent(in) :: extents(:)
-      character(len=12*size(extents)) :: form
-
-      write (form, '(*(i0,","))') extents
-   end function get_form
-
-   !> Adds a record without values, and its line of the header.
-   subroutine add_record(self, name, form)
+   !> Adds a record without numbers, and its line of the header.
+   subroutine add_record(self, name, extents, text)
       class(bundle_type), intent(inout) :: self
       character(len=*), intent(in) :: name
-      !> See `header`.
-      character(len=*), intent(in) :: form
+      !> Extents of the array: [rank].
+      integer, intent(in) :: extents(:)
+      !> The text, if it is one.
+      character(len=*), intent(in), optional :: text
+      character(len=12*size(extents)) :: form
       type(record_type), allocatable :: more(:)
 
       if (.not. allocated(self%records)) then
@@ -147,8 +135,18 @@ contains
          call move_alloc(more, self%records)
       end if
       self%n_record = self%n_record + 1
-      self%records(self%n_record)%group = self%group
-      self%records(self%n_record)%name = name
+      write (form, '(*(i0,","))') extents
+      associate (record => self%records(self%n_record))
+         record%group = self%group
+         record%name = name
+         if (present(text)) then
+            record%kind = 'text'
+            record%text = text
+            allocate (record%values(0, 1, 1))
+            self%text = self%text//text
+            form = 't'//to_text(len(text))
+         end if
+      end associate
       if (self%group /= '') self%header = self%header//trim(self%group)//'.'
       self%header = self%header//trim(name)//tab//trim(form)//newline
    end subroutine add_record
@@ -218,10 +216,8 @@ contains
       !> Handle of a bundle, from `store`; valid once.
       integer(int64), intent(in) :: handle
       type(bundle_type), pointer, intent(out) :: bundle
-      type(c_ptr) :: address
 
-      address = transfer(int(handle, c_intptr_t), c_null_ptr)
-      call c_f_pointer(address, bundle)
+      call c_f_pointer(transfer(int(handle, c_intptr_t), c_null_ptr), bundle)
    end subroutine retrieve
 
 end module thud_bundle

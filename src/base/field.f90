@@ -6,7 +6,7 @@ module thud_field
    use thud_interval, only: get_range_text, interval_type, key_length, new_interval
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: is_number, join, join_quoted, lower_case, shortened, to_text
+   use thud_text, only: is_number, join, join_quoted, lower_case, quoted, shortened, to_text
    implicit none (type, external)
    private
 
@@ -40,10 +40,6 @@ module thud_field
 
    !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
-
-   !> Allowed texts of a logical value.
-   character(len=*), parameter :: flags(*) = [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', &
-      't', 'f']
 
    !> Description of one key and a pointer to its variable.
    type :: field_type
@@ -82,7 +78,6 @@ module thud_field
       procedure :: set_number
       procedure :: get_number
       procedure :: get_entries
-      procedure :: get_words
       procedure :: get_text
       procedure :: get_allowed
       procedure :: has_effect
@@ -229,7 +224,7 @@ contains
 
       select type (value => self%value)
       type is (logical)
-         valid = any(lower_case(text) == flags)
+         valid = any(lower_case(text) == [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', 't', 'f'])
          if (valid) value = scan(text, 'tT') > 0
       type is (list_type)
          call read_numbers(text, numbers, valid)
@@ -347,21 +342,6 @@ contains
       end select
    end function get_entries
 
-   !> Entries of a list of texts, or the only text: [n_entry].
-   pure subroutine get_words(self, words)
-      class(field_type), intent(in) :: self
-      character(len=name_length), allocatable, intent(out) :: words(:)
-
-      select type (value => self%value)
-      type is (text_list_type)
-         words = value%values(:value%count)
-      type is (character(len=*))
-         words = [character(len=name_length) :: value]
-      class default
-         allocate (words(0))
-      end select
-   end subroutine get_words
-
    !> Sets the variable from a number as `get_number` returns it.
    subroutine set_number(self, number, entry, error)
       class(field_type), intent(in) :: self
@@ -424,17 +404,17 @@ contains
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
       character(len=:), allocatable, intent(out) :: text
-      character(len=name_length), allocatable :: words(:)
 
-      select case (self%kind)
-      case ('choice', 'text', 'texts')
-         call self%get_words(words)
-         text = join_quoted(words)
-      case ('whole')
-         text = to_text(nint(self%get_number()))
-      case ('flag')
-         text = trim(merge('.true. ', '.false.', self%get_number() > 0.0_wp))
-      case default
+      select type (value => self%value)
+      type is (character(len=*))
+         text = quoted(value)
+      type is (text_list_type)
+         text = join_quoted(value%values(:value%count))
+      type is (integer)
+         text = to_text(value)
+      type is (logical)
+         text = trim(merge('.true. ', '.false.', value))
+      class default
          text = join(self%get_entries())
       end select
    end subroutine get_text

@@ -89,17 +89,17 @@ contains
       character(len=*), intent(in) :: directory
       !> Set if a path is too long.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: words(:)
       integer(int64) :: bytes
       integer :: i
 
       do i = 1, size(fields)
          if (fields(i)%trait /= 'path') cycle
-         call fields(i)%get_words(words)
-         if (words(1) == '' .or. words(1)(1:1) == '/') cycle
-         inquire (file=directory//trim(words(1)), size=bytes)
-         if (bytes < 0) cycle
-         call fields(i)%set_from_text(quoted(directory//trim(words(1))), error)
+         select type (path => fields(i)%value)
+         type is (character(len=*))
+            if (path == '' .or. path(1:1) == '/') cycle
+            inquire (file=directory//trim(path), size=bytes)
+            if (bytes >= 0) call fields(i)%set_from_text(quoted(directory//trim(path)), error)
+         end select
          if (allocated(error)) return
       end do
    end subroutine resolve_paths

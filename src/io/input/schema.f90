@@ -144,19 +144,16 @@ contains
       type(field_type), intent(in) :: field
       !> A JSON value.
       character(len=:), allocatable :: value
-      character(len=name_length), allocatable :: words(:)
 
       call field%get_text(value)
-      call field%get_words(words)
       select case (field%kind)
       case ('flag')
          value = trim(merge('true ', 'false', value == '.true.'))
-      case ('list')
+      case ('list', 'texts')
+         ! Lists of texts are empty by default.
          value = '['//value//']'
-      case ('texts')
-         value = list_of(words)
       case ('choice', 'text')
-         value = text_value(words(1))
+         value = text_value(value(2:len(value) - 1))
       case default
          continue
       end select
