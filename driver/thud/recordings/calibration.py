@@ -13,6 +13,7 @@ from scipy.special import fdtrc
 from thud.base.checks import refuse, refuse_value, require_number
 from thud.base.note import Note
 from thud.recordings.channel import regular_file, shown_path, shown_text
+from thud.recordings.config import Config
 from thud.recordings.force_units import (
     ALLOWED,
     Calibration,
@@ -181,7 +182,7 @@ def open_source(
         return record, "" if unit is None else require_unit(unit, record.name), ""
     path = regular_file(record)
     name = shown_path(path)
-    channels = choose_channels(read_channels(path), channel, name)
+    channels = choose_channels(read_channels(path), Config(channel=channel), name)
     if len(channels) != 1:
         refuse(
             f"{name}: has {len(channels)} channels of force",

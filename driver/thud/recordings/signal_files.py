@@ -68,7 +68,7 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
     config = config or Config()
     file = regular_file(path)
     channels = read_channels(file)
-    chosen = _choose(channels, config, shown_path(file))
+    chosen = choose_channels(channels, config, shown_path(file))
     stated = config.calibration
     calibrations = stated if isinstance(stated, tuple) else (stated,) * len(chosen)
     if len(calibrations) != len(chosen):
@@ -99,20 +99,32 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
     return [_with_missing(signals[0], file, others)]
 
 
-def _choose(channels: list[Channel], config: Config, name: str) -> list[Channel]:
-    """Return the stated channels, by default those of force; raise InputError if it is unclear."""
+def choose_channels(channels: list[Channel], config: Config, name: str) -> list[Channel]:
+    """Return the stated channels, by default those of force, or the only channel.
+
+    Raise InputError if it is unclear which, or a channel is not in the file.
+    """
+    forces = [channel for channel in channels if _is_force(channel)]
+    if config.channels is None and config.channel is None:
+        if not forces and len(channels) > 1:
+            refuse(
+                f"{name}: has {len(channels)} channels, none of them in a unit of force",
+                f'channel = one of {channel_choices(channels)}; or channels = "{SUM}" for load '
+                "cells of one plate",
+            )
+        return forces or channels
     if config.channels is None:
-        return choose_channels(channels, config.channel, name)
+        return [_find_channel(channels, config.channel, name)]
     if config.channel is not None:
         refuse(f"{name}: both channel and channels are stated", "one of them", subject="channel")
     if isinstance(config.channels, tuple):
-        cells = [choose_channels(channels, channel, name)[0] for channel in config.channels]
+        cells = [_find_channel(channels, channel, name) for channel in config.channels]
         if len({cell.number for cell in cells}) < len(cells):
             text = f"channels = {shown(config.channels)} names one channel twice"
             refuse(f"{name}: {text}", "each once")
         return cells
-    cells = [channel for channel in channels if _is_force(channel)] or channels
-    if len(cells) < 2 or len({cell.unit for cell in cells if not _is_force(cell)}) > 1:  # noqa: PLR2004
+    cells = forces or channels
+    if len(cells) < 2 or (not forces and len({cell.unit for cell in cells}) > 1):  # noqa: PLR2004
         refuse(
             f'{name}: channels = "{SUM}" needs two or more channels of force, or all in one unit',
             f"names of channels, some of {channel_choices(channels)}",
@@ -133,34 +145,21 @@ def channel_choices(channels: list[Channel]) -> str:
     )
 
 
-def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
-    """Return the channel of a number or name, by default those of force, or the only channel.
-
-    Raise InputError if none or several match.
-    """
-    if channel is None:
-        forces = [entry for entry in channels if _is_force(entry)]
-        if not forces and len(channels) > 1:
-            refuse(
-                f"{name}: has {len(channels)} channels, none of them in a unit of force",
-                f'channel = one of {channel_choices(channels)}; or channels = "{SUM}" for load '
-                "cells of one plate",
-            )
-        return forces or channels
+def _find_channel(channels: list[Channel], channel: int | str | None, name: str) -> Channel:
+    """Return the channel of a number or name; raise InputError if none or several match."""
     title = str(channel).strip().casefold()
-    matching = [entry for entry in channels if channel in {entry.number, entry.name}] or [
-        entry
-        for entry in channels
-        if title
-        in {str(entry.number), entry.name.casefold(), entry.name.casefold().rpartition("/")[2]}
-    ]
+    matching = [entry for entry in channels if channel in {entry.number, entry.name}]
+    for entry in channels if not matching else ():
+        own = entry.name.casefold()
+        if title in {str(entry.number), own, own.rpartition("/")[2]}:
+            matching.append(entry)
     if len(matching) != 1:
         refuse(
             f"{name}: channel = {shown(channel)} matches {len(matching)} channels",
             f"one of {channel_choices(channels)}",
             subject="channel",
         )
-    return matching
+    return matching[0]
 
 
 def _in_newtons(

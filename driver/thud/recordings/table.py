@@ -183,10 +183,6 @@ class _Layout:
         text = text.rstrip(TRAILING.replace(self.separator or " ", ""))
         return split_line(text, self.separator) if text else []
 
-    def rows(self) -> Iterator[tuple[int, str]]:
-        """Yield number and text of the lines from the first number on."""
-        return itertools.islice(enumerate(self.lines(), 1), self.first - 1, None)
-
     def refuse(self, line: int, reason: str, allowed: str = "") -> NoReturn:
         """Raise InputError for a line."""
         refuse(f"{self.name}: line {line}: {reason}", allowed or self.allowed)
@@ -528,7 +524,7 @@ def _find_decimal(layout: _Layout) -> tuple[str, int]:
     decides.
     """
     ambiguous: tuple[int, str] | None = None
-    for line, text in layout.rows():
+    for line, text in itertools.islice(enumerate(layout.lines(), 1), layout.first - 1, None):
         if "." not in text and "," not in text:
             continue
         # If commas separate columns, unquoted numbers have decimal points.
@@ -558,7 +554,7 @@ def _read_numbers(layout: _Layout) -> dict[int, NDArray[np.float64]]:
     """Return the columns of numbers and times of day by their index in the table."""
     columns = [*layout.used, *([] if layout.clock is None else [layout.clock])]
     blocks: list[NDArray[np.float64]] = []
-    rows = layout.rows()
+    rows = itertools.islice(enumerate(layout.lines(), 1), layout.first - 1, None)
     while block := list(itertools.islice(rows, BLOCK)):
         values = _convert([line for _, line in block], len(columns), layout)
         if values is None:
