@@ -13,7 +13,6 @@ import tracemalloc
 import zlib
 from dataclasses import fields
 from datetime import datetime, timedelta
-from functools import cache
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,6 @@ import scipy.io
 import soundfile
 from conftest import REPOSITORY, naming
 from recording_files import (
-    DURATION,
     PEAK,
     SOUND,
     WITH_UNIT,
@@ -35,7 +33,6 @@ from recording_files import (
 )
 
 from thud.base.errors import InputError
-from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, Instrument, Properties, ReportConfig, read_config
@@ -54,8 +51,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RATES = (2500.0, 8000.0, 44100.0, 48000.0, 51200.0, 96000.0)
-# Levels of the half sine of 1500 N and 20 ms, dB (physics, section 10).
-HALF_SINE = (38.3125, 30.6046, 19.2578, 8.9323, -0.4390)
 # Recorded values per newton, and what the user says about them.
 UNITS: dict[str, tuple[float, dict[str, Any]]] = {
     "N": (1.0, {}),
@@ -66,41 +61,6 @@ UNITS: dict[str, tuple[float, dict[str, Any]]] = {
 }
 FULL_SCALE = 1600.0
 LSB = {"pcm16": 2.0**-15, "pcm24": 2.0**-23, "pcm32": 2.0**-31, "float": 2.0**-24}
-
-
-@cache
-def sampled_levels(rate: float) -> tuple[float, ...]:
-    """Return the octave levels of the samples of the half sine, dB, by its spectrum and images.
-
-    |F(f)| of the half sine is 2 P T / pi |cos(pi f T) / (1 - 4 f2 T2)|; samples have the sum of
-    its images at multiples of the rate. Gauss-Legendre over each band.
-    """
-    start = math.ceil(0.01 * rate) / rate - 0.01
-    node, weight = np.polynomial.legendre.leggauss(60)
-    images = np.arange(-4000, 4001) * rate
-    levels = []
-    for lower, upper in zip(get_bands().lower, get_bands().upper, strict=True):
-        frequency = (upper - lower) / 2 * node + (upper + lower) / 2
-        f = frequency[:, np.newaxis] + images
-        spectrum = (
-            2 * PEAK * DURATION / np.pi * np.cos(np.pi * f * DURATION)
-            / (1 - 4 * f**2 * DURATION**2)
-            * np.exp(-1j * np.pi * f * DURATION + 2j * np.pi * f * start)
-        ).sum(axis=1)  # fmt: skip
-        energy = (upper - lower) / 2 * weight @ (2 * abs(spectrum) ** 2)
-        levels.append(10 * math.log10(energy))
-    return tuple(levels)
-
-
-def test_images_vanish_at_high_rates() -> None:
-    np.testing.assert_allclose(sampled_levels(1e6), HALF_SINE, atol=1e-3)
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_samples_have_the_levels_of_their_spectrum(rate: float) -> None:
-    # Of 8001 images the rest falls as the second power of their number.
-    found = force_exposure_levels(half_sine(rate), rate)
-    np.testing.assert_allclose(found, sampled_levels(rate), atol=5e-4)
 
 
 def codes(signal: Signal) -> list[str]:
@@ -124,8 +84,6 @@ def test_half_sine_is_read_in_every_unit(name: str, rate: float, tmp_path: Path)
         # Universal files hold the sampling interval to six digits.
         assert signal.sample_rate == pytest.approx(rate, rel=5e-6 if name.endswith("uff") else 1e-7)
         np.testing.assert_allclose(force, exact, atol=1e-9 * PEAK)
-        levels = force_exposure_levels(force, signal.sample_rate)
-        np.testing.assert_allclose(levels, sampled_levels(rate), atol=1e-3)
         assert signal.n_sample == exact.size
         assert signal.full_scale is None
         assert unit in signal.calibration
@@ -142,16 +100,8 @@ def test_half_sine_is_read_from_sound_files(name: str, rate: float, tmp_path: Pa
     assert signal.sample_rate == rate
     assert signal.full_scale == (pytest.approx(FULL_SCALE) if is_integer else None)
     digit = LSB.get(name.partition(".")[0], 0.0) * (FULL_SCALE if is_integer else PEAK)
-    error = force - exact
     # Rounded or cut off to the last digit.
-    assert abs(error).max() <= digit * 1.001
-    levels = force_exposure_levels(force, rate)
-    rounding = (
-        20 * np.log10(1 + 10 ** ((force_exposure_levels(error, rate) - levels) / 20))
-        if error.any()
-        else 0.0
-    )
-    assert (abs(levels - sampled_levels(rate)) <= 1e-3 + rounding).all()
+    assert abs(force - exact).max() <= digit * 1.001
 
 
 def write_pulse(path: Path, name: str, values: NDArray[np.float64] | None = None) -> Path:

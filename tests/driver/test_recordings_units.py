@@ -22,7 +22,7 @@ import pyuff
 import scipy.io
 import soundfile
 from conftest import REPOSITORY, naming
-from recording_files import WRITERS, half_sine, opened
+from recording_files import half_sine, opened
 
 from thud.base.errors import InputError
 from thud.recordings import formats
@@ -393,14 +393,6 @@ def test_calibration_of_a_file_with_a_factor_names_it(tmp_path: Path) -> None:
     found = calibrate(tmp_path / "a.h5", force=500.0)
     (note,) = found.notes
     assert (note.code, note.others) == ("stored_values_calibrated", {"factor": "gain = 10.0"})
-
-
-def test_every_writer_of_the_tests_is_read_without_a_note_on_factors(tmp_path: Path) -> None:
-    for name, write in WRITERS.items():
-        sound = name.startswith("pcm")
-        write(tmp_path / name, FORCE / 5000 if sound else FORCE, RATE, "N")
-        (signal,) = opened(tmp_path / name, calibration=5000.0 if sound else None)
-        assert "factor_not_applied" not in [note.code for note in signal.notes]
 
 
 def test_format_is_added_by_one_file_and_one_line(

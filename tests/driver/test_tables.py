@@ -49,16 +49,19 @@ def numbers(chance: random.Random, name: str, unit: str, values: np.ndarray) -> 
     base, size = UNITS[find_unit(unit)]
     kind = "time" if base == "s" else "force" if name[0] == "F" else "other"
     scale = SENSITIVITY if kind == "force" and base == "V" else 1.0
-    form = "{:.9f}" if kind == "time" else chance.choice(["{:.4f}", "{:.6e}", "{:.6E}", "{:.5f}"])
+    forms = ["{:.4f}", "{:.6e}", "{:.6E}", "{:.5f}", "{:,.4f}"]
+    form = "{:.9f}" if kind == "time" else chance.choice(forms)
     cells = [form.format(value / scale / size) for value in values]
-    exact = np.array(list(map(float, cells)))
+    exact = np.array([float(cell.replace(",", "")) for cell in cells])
     if "E" in form and chance.random() < 0.5:
         cells = [cell.replace("E", "D") for cell in cells]
     return Written(kind, name, unit, cells, exact)
 
 
-def draw_columns(chance: random.Random, decimal: str, place: str) -> list[Written]:
+def draw_columns(chance: random.Random, separator: str, decimal: str, place: str) -> list[Written]:
     """Return the columns of a table in a drawn order."""
+    groups = ["", "'", "\N{NO-BREAK SPACE}", ",.".replace(decimal, ""), " "]
+    group = chance.choice([mark for mark in groups if not mark or mark not in separator])
     force_unit = chance.choice(FORCE_UNITS)
     columns = [
         numbers(chance, f"F{i + 1}", force_unit, PULSE / (i + 1))
@@ -79,7 +82,8 @@ def draw_columns(chance: random.Random, decimal: str, place: str) -> list[Writte
     time = numbers(chance, chance.choice(["Time", "t", "Zeit"]), unit, np.arange(ROWS) / RATE)
     columns.insert(0 if chance.random() < 0.8 else chance.randrange(len(columns) + 1), time)
     for column in columns:
-        column.cells = [cell.replace(".", decimal) for cell in column.cells]
+        marks = str.maketrans({",": group, ".": decimal})
+        column.cells = [cell.translate(marks) for cell in column.cells]
     return columns
 
 
@@ -93,7 +97,7 @@ def draw_table(chance: random.Random) -> tuple[str, list[Written], bool]:
     separator = chance.choice(["\t", ";", ",", ", ", "; ", " ", "   "])
     decimal = "." if "," in separator else chance.choice([".", ","])
     place = chance.choice(["title"] * 5 + ["below", "above", "header", "lvm", "numbered", "none"])
-    columns = draw_columns(chance, decimal, place)
+    columns = draw_columns(chance, separator, decimal, place)
     if not separator.strip(" "):
         columns = [column for column in columns if column.kind not in {"words", "empty"}]
     over = separator if chance.random() < 0.7 else chance.choice(["\t", ";", ", ", "   "])

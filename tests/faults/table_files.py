@@ -22,7 +22,6 @@ from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
 from thud.floors.survey import levels_csv, rating_table, read_room_levels
 from thud.recordings.config import read_config
-from thud.recordings.formats.text import read_channels
 from thud.recordings.table import read_table, time_and_force
 from thud.recordings.times import read_record
 from thud.studies.compression_fit import fit_compression
@@ -40,8 +39,6 @@ PATIENCE = 60
 
 def attempt(chance: random.Random) -> tuple[str, str]:
     """Return what becomes of a table, and how to see it."""
-    if chance.random() < 0.3:
-        return _attempt_notation(chance)
     name = chance.choice(list(READERS))
     original = _originals()[name]
     if chance.random() < 0.6:
@@ -63,58 +60,8 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     return word, f"{name}: {wrong}: {content[:3000]!r}" if wrong else ""
 
 
-def _attempt_notation(chance: random.Random) -> tuple[str, str]:
-    """Return what becomes of numbers in a drawn notation: those that were written, or none."""
-    mark = chance.choice("\t;, ")
-    separator = chance.choice(["", "", " ", "  "]) + mark + chance.choice(["", " ", "  "])
-    end = chance.choice(["", "", " ", ";", " ; ", "\t", separator])
-    decimal = chance.choice(".,")
-    groups = ["", "", ".,".replace(decimal, ""), "'", "\N{NO-BREAK SPACE}"]
-    group = chance.choice([*groups, " "] if mark in "\t;" or separator == ", " else groups)
-    # A column with commas, or with blanks that group digits, alone looks like two.
-    alike = decimal == "," or group == " " or "," in end
-    shape = chance.randrange(8, 30), chance.randrange(1 + alike, 5)
-    width = chance.choice([0, 0, 16])
-    digits = [chance.choice([0, 2, 3, 3, 6]) for _ in range(shape[1])]
-    if mark == decimal:  # without quotes, numbers have decimal points
-        digits[0] = digits[0] or 2
-    table = np.empty(shape)
-    rows = []
-    for values in table:
-        row = [f"{chance.uniform(-1, 1) * 10 ** chance.uniform(0, 7):,.{n}f}" for n in digits]
-        values[:] = [float(cell.replace(",", "")) for cell in row]
-        row = [cell.translate({ord(","): group, ord("."): decimal}) for cell in row]
-        row = [f'"{cell}"' if mark in cell or chance.random() < 0.1 else cell for cell in row]
-        row = [cell.rjust(width) for cell in row]
-        rows.append(separator.join(row) + end)
-    path = Path("notation.csv")
-    path.write_text("\n".join(rows) + "\n")
-    recording = Path("recording.csv")
-    recording.write_text("fs: 8000\n" + "\n".join(rows) + "\n")
-    wrong, words = "", []
-    for file, read in ((path, _read_numbers), (recording, _read_recording)):
-        try:
-            same = np.array_equal(read(file), table)
-            words.append("read" if same else "wrong")
-        except thud.InputError as error:
-            wrong = wrong or fault_of(error, str(file), "")
-            words.append("raw" if wrong else "refused")
-            if "line " not in str(error):
-                wrong = wrong or f"names no line: {error}"
-        finally:
-            file.unlink()
-    word = next((one for one in ("wrong", "raw", "refused") if one in words), "read")
-    wrong = wrong or (word if word == "wrong" else "")
-    return ("raw" if wrong else word), f"notation: {wrong}: {rows}" if wrong else ""
-
-
 def _read_numbers(path: Path) -> np.ndarray:
     return np.column_stack([column.values for column in read_table(path).columns])
-
-
-def _read_recording(path: Path) -> np.ndarray:
-    channels = read_channels(path)
-    return np.column_stack([one.samples(0, one.n_sample) for one in channels])
 
 
 def _read_sets(path: Path, _: random.Random) -> str:
