@@ -176,7 +176,7 @@ def later(force: np.ndarray, share: float) -> np.ndarray:
     ("change", "present", "absent"),
     [
         (lambda f: median_filter(f, 25), "noise of the background ends", "clipped"),
-        (lambda f: np.repeat(f[::24], 24)[: len(f)], "24 samples each are equal", "clipped"),
+        (lambda f: np.repeat(f[::24], 24)[: len(f)], "dropouts", "clipped"),
         (lambda f: f / 150, "unit = 'kN'", "probably wrong"),
         (np.maximum.accumulate, "does not return", "unit"),
         (lambda f: np.minimum(f, 1200), "clipped", "equal"),

@@ -18,7 +18,7 @@ CAUSES = {
     "zero outside": "constant_background",
     "gate": "constant_background",
     "needles": "spikes",
-    "missing codes": "never occur",
+    "missing codes": "is held|constant_background",
     "multiplexed": "aliasing",
     "2 kHz": "noise_ends",
     "mean": "noise_ends",

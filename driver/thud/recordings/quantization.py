@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
+from thud.base.note import Note
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
 
 # Maximum length of the background on either side of the contact, s: a longer one lowers the noise
@@ -32,6 +35,9 @@ MAX_DEVIATION = 0.6
 MAX_FAST = 0.4
 # Maximum number of samples of the background that count as independent.
 MAX_COUNT = 1000
+# Standard deviation of the offset, as a fraction of the peak, from which a warning is raised: 0.03
+# dB at 250, 0.06 dB at 500 Hz.
+MAX_OFFSET = 5e-4
 # Grid of mean and standard deviation of a background before quantization, in steps.
 MEANS = np.linspace(-0.5, 0.5, 41)
 DEVIATIONS = np.geomspace(0.001, 1.0, 31)
@@ -137,3 +143,12 @@ def offset_deviation(background: NDArray[np.float64], step: float) -> float:
     posterior = np.exp(logarithm - logarithm.max())
     error = mean - (codes - middle) @ counts / counts.sum()
     return step * math.sqrt(float((posterior * error**2).sum() / posterior.sum()))
+
+
+def check(section: Section, contact: Contact) -> tuple[Note, ...]:
+    """Return a warning if the quantization of a background makes its offset uncertain."""
+    del section
+    step, offset = contact.background.quantization.step, contact.background.quantization.offset
+    if offset < MAX_OFFSET * contact.peak:
+        return ()
+    return (Note("coarse_steps", value=offset, unit="N", effect=0.0, others={"step": step}),)

@@ -17,11 +17,7 @@ from thud.base.checks import refuse
 from thud.base.note import Note, about
 from thud.recordings.assumptions import with_assumptions
 from thud.recordings.background import remove_background
-from thud.recordings.checks.copies import (
-    refuse_copy,
-    refuse_same_drops,
-    refuse_simultaneous_channels,
-)
+from thud.recordings.checks import copies
 from thud.recordings.config import Config, read_config
 from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, choose, cut_section, find_drops, require_chosen
@@ -38,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from thud.recordings.force_units import Calibration
 
@@ -136,19 +131,14 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     config = config.updated(height=height, mass=mass, calibration=calibration)
     origins: list[Origin] = []
     measured: list[tuple[Drop, ...]] = []
-    searched: dict[str, dict[str, NDArray[np.float64]]] = {}
     uncertainties: list[float | None] = []
     count = 0
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
         for signal in _open(paths, config):
-            refuse_copy(signal, origins)
             found, ignored = find_drops(
                 signal, config.begin or 0.0, config.end or math.inf, progress=progress
             )
-            # Small pulses may be what a channel picks up of another one.
-            own = [drop for drop in found if not drop.left_out]
-            refuse_simultaneous_channels(signal, own, searched)
             chosen, left_out = choose(found, count + 1, signal.sample_rate, config)
             count += len(found)
             stated = config.calibration_uncertainty
@@ -166,7 +156,7 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
         refuse("there are no recordings", "one file or more")
     drops = tuple(itertools.chain.from_iterable(measured))
     require_chosen(count, len(drops), config)
-    refuse_same_drops(origins, measured)
+    copies.check(origins, measured)
     name = Path(origins[0].path or origins[0].name).stem
     return Recording(name, drops, tuple(origins), config, common_uncertainty(uncertainties))
 

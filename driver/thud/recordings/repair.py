@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.checks import check_section
+from thud.recordings.checks import SECTION_CHECKS
 from thud.recordings.differences import (
     FROM_CUBIC,
     MEDIAN,
@@ -31,11 +31,10 @@ if TYPE_CHECKING:
 # Minimum length of the background on either side, s and samples.
 MIN_BACKGROUND = 1e-3
 MIN_SAMPLES = 4
-# Minimum jump into or out of the equal samples of a dropout, as a fraction of the peak force: no
-# flank rises as much between two samples at 20 kHz.
-MIN_JUMP = 0.04
-# Minimum number of equal samples of a dropout.
+# Minimum number of equal samples of a dropout, and minimum jump into or out of them, as a fraction
+# of the peak force: no flank rises as much between two samples at 20 kHz.
 MIN_FROZEN = 3
+MIN_JUMP = 0.04
 # Maximum total length of dropouts and spikes that are repaired, s.
 MAX_REPAIRED = 1e-3
 # A spike of one or two samples deviates from the cubic through samples 2 and 3 away and from the
@@ -59,23 +58,9 @@ CONTACT_MARGIN = 3e-3
 def repair(section: Section) -> Section:
     """Return a section with its dropouts and spikes filled, in each load cell, and with notes.
 
-    Raise InputError if the pulse is cut off, clipped or doubled, has long dropouts or spikes, or a
-    load cell is the sum of the others.
+    Raise InputError if the pulse is cut off, meets another one or is clipped, has long dropouts or
+    spikes, or a load cell is the sum of the others.
     """
-    _refuse_incomplete(section)
-    section = replace(section, quantization=find_quantization(section))
-    if section.cells:
-        section = _repair_cells(section)
-    return _fill(replace(section, notes=(*section.notes, *check_section(section))))
-
-
-def min_background(rate: float) -> int:
-    """Return the minimum number of background samples on each side of a contact."""
-    return max(math.ceil(MIN_BACKGROUND * rate), MIN_SAMPLES)
-
-
-def _refuse_incomplete(section: Section) -> None:
-    """Raise InputError if the pulse is cut off or meets another one."""
     rate, (first, stop) = section.sample_rate, section.contact
     lengths = first, len(section.force) - stop
     for length, edge, side in zip(lengths, ("begins", "ends"), ("before", "after"), strict=True):
@@ -87,34 +72,36 @@ def _refuse_incomplete(section: Section) -> None:
                 "1 ms or more, better 100 ms, on both sides of one impact; --leave-out (leave_out) "
                 "with the number of this drop, or --from and --to (begin, end), without it",
             )
-
-
-def _repair_cells(section: Section) -> Section:
-    """Return the sum of load cells whose dropouts and spikes are filled."""
-    peak = float(np.ptp(section.force[slice(*section.contact)]))
-    forces, notes = [], [*section.notes]
+    section = replace(section, quantization=find_quantization(section))
+    peak = float(median_filter(section.force[first:stop], MEDIAN).max())
+    peak -= float(np.median(section.background))
+    if not section.cells:
+        force, notes = _filled(section, peak)
+        return replace(section, force=force, notes=(*section.notes, *notes))
+    forces, said = [], [*section.notes]
     for cell in section.cells:
-        recorded = replace(cell, quantization=section.quantization)
-        filled = _fill(replace(recorded, notes=check_section(recorded)), peak)
-        forces.append(filled.force)
-        notes += (replace(note, others={**note.others, "part": cell.name}) for note in filled.notes)
-    notes += check_cells(section, forces)
-    return replace(section, force=np.sum(forces, axis=0), cells=(), notes=tuple(notes))
+        force, notes = _filled(replace(cell, quantization=section.quantization), peak)
+        forces.append(force)
+        said += (replace(note, others={**note.others, "part": cell.name}) for note in notes)
+    said += check_cells(section, forces)
+    return replace(section, force=np.sum(forces, axis=0), cells=(), notes=tuple(said))
 
 
-def _fill(section: Section, peak: float | None = None) -> Section:
-    """Return a section with dropouts and spikes interpolated, and notes on them.
+def min_background(rate: float) -> int:
+    """Return the minimum number of background samples on each side of a contact."""
+    return max(math.ceil(MIN_BACKGROUND * rate), MIN_SAMPLES)
 
-    A jump of a dropout is relative to the peak, N: that of the force, if None. Raise InputError if
-    dropouts and spikes last too long.
+
+def _filled(section: Section, peak: float) -> tuple[NDArray[np.float64], list[Note]]:
+    """Return the force, N, with lines in place of dropouts and spikes, and notes on all faults.
+
+    Jumps are relative to the peak, N. Raise InputError if dropouts and spikes last too long.
     """
-    rate, force, contact = section.sample_rate, section.force, slice(*section.contact)
-    offset = float(np.median(section.background))
-    if peak is None:
-        peak = float(median_filter(force[contact], MEDIAN).max()) - offset
-    dropouts = _find_dropouts(section, force, offset, peak)
-    spikes = _find_spikes(section, _interpolated(force, dropouts), peak)
-    notes = [
+    rate, (first, stop) = section.sample_rate, section.contact
+    notes = [note for entry in SECTION_CHECKS for note in entry.check(section)]
+    dropouts = _find_dropouts(section, peak)
+    spikes = _find_spikes(section, _interpolated(section.force, dropouts), peak)
+    repaired = [
         Note(
             code, value=1e3 * np.count_nonzero(bad) / rate, high=1e3 * MAX_REPAIRED, unit="ms",
             others={"count": len(np.flatnonzero(np.diff(bad, prepend=False)[bad]))},
@@ -122,54 +109,37 @@ def _fill(section: Section, peak: float | None = None) -> Section:
         for code, bad in (("dropouts", dropouts), ("spikes", spikes))
         if bad.any()
     ]  # fmt: skip
-    margin = int(CONTACT_MARGIN * rate)
-    near = slice(max(section.contact[0] - margin, 0), section.contact[1] + margin)
-    if np.count_nonzero((dropouts | spikes)[near]) > MAX_REPAIRED * rate:
-        group = int(np.median(runs(force[contact])[1]))
-        if group >= MIN_FROZEN:
-            refuse(
-                f"{section.name}: {group} samples each are equal: the record was drawn up from "
-                f"{rate / group:g} Hz",
-                f"each sample once, at {rate / group:g} Hz",
-            )
-        summaries = [f"{n.others['count']} {n.code} of {n.value:.3g} ms in all" for n in notes]
+    bad, margin = dropouts | spikes, int(CONTACT_MARGIN * rate)
+    if np.count_nonzero(bad[max(first - margin, 0) : stop + margin]) > MAX_REPAIRED * rate:
+        summaries = [f"{n.others['count']} {n.code} of {n.value:.3g} ms in all" for n in repaired]
         refuse(
             f"{section.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
         )
-    filled = _interpolated(force, dropouts | spikes)
-    return replace(section, force=filled, notes=(*section.notes, *notes))
+    return _interpolated(section.force, bad), notes + repaired
 
 
 def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return a force, N, with a line in place of bad samples."""
-    result = force.copy()
-    good = np.flatnonzero(~bad)
-    result[bad] = np.interp(np.flatnonzero(bad), good, force[good])
-    return result
+    index = np.arange(len(force))
+    return np.interp(index, index[~bad], force[~bad])
 
 
-def _find_dropouts(
-    section: Section, force: NDArray[np.float64], offset: float, peak: float
-) -> NDArray[np.bool_]:
-    """Return whether samples of a force, N, are lost: held, or zero between jumps."""
-    lost = np.zeros(len(force), dtype=bool)
+def _find_dropouts(section: Section, peak: float) -> NDArray[np.bool_]:
+    """Return whether samples are lost: equal, with jumps before and after them.
+
+    One jump is enough but next to the background, which may be constant beside a steep flank.
+    """
+    lost = np.zeros(len(section.force), dtype=bool)
     margin = int(MIN_BACKGROUND * section.sample_rate)
-    first, stop = section.contact[0] + margin, section.contact[1] - margin
-    pulse = force[first:stop] - offset
-    if not pulse.size:
-        return lost
+    inside = slice(section.contact[0] + margin, section.contact[1] - margin)
+    pulse = section.force[inside] - np.median(section.background)
     starts, lengths = runs(pulse)
-    before = np.abs(pulse[starts] - pulse[np.maximum(starts - 1, 0)])
-    ends = starts + lengths - 1
-    after = np.abs(pulse[np.minimum(ends + 1, len(pulse) - 1)] - pulse[ends])
     limit = max(MIN_JUMP * peak, MIN_STEPS * section.quantization.step)
-    zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    # A constant background next to a steep flank is no dropout: it has one jump.
-    is_background = np.abs(pulse[starts]) < limit / 2
-    jumps = (before > limit).astype(int) + (after > limit)
-    frozen = (lengths >= MIN_FROZEN) & (jumps > is_background)
-    lost[first:stop] = np.repeat(zero | frozen, lengths)
+    jumps = np.append(np.abs(np.diff(pulse, prepend=pulse[:1]))[starts] > limit, [False])
+    least = 1 + (np.abs(pulse[starts]) < limit / 2)
+    is_lost = (lengths >= MIN_FROZEN) & (jumps[:-1].astype(int) + jumps[1:] >= least)
+    lost[inside] = np.repeat(is_lost, lengths)
     return lost
 
 
@@ -183,9 +153,10 @@ def _find_spikes(section: Section, force: NDArray[np.float64], peak: float) -> N
     from_cubic = np.abs(np.convolve(padded, FROM_CUBIC, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
-    usual = robust_deviation(from_cubic)
     least = max(
-        MIN_SPIKE_DEVIATIONS * usual, MIN_SPIKE * peak, MIN_STEPS * section.quantization.step
+        MIN_SPIKE_DEVIATIONS * robust_deviation(from_cubic),
+        MIN_SPIKE * peak,
+        MIN_STEPS * section.quantization.step,
     )
     limit = np.maximum(MIN_SPIKE_RATIO * largest_beside(from_cubic, *CLEAN).max(axis=0), least)
     spikes[searched] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)

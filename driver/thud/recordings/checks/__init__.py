@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.recordings import load_cells, polarity
-from thud.recordings.checks import aliasing, clipping, continuity, copies, outliers, quantization
+from thud.recordings import load_cells, polarity, quantization
+from thud.recordings.checks import aliasing, clipping, copies, gaps, jumps, outliers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,8 +27,7 @@ class Check(NamedTuple):
     effect: str
 
 
-# Of the recorded force of a drop or of a load cell, in this order: values that never occur make
-# gaps.
+# Of the recorded force of a drop or of a load cell, before its repair: check(section).
 SECTION_CHECKS = (
     Check(
         clipping.check,
@@ -36,20 +35,16 @@ SECTION_CHECKS = (
         "at 1450 N 1.3 dB at 250 Hz, at 1200 N 3.9 dB at 125 Hz",
     ),
     Check(
-        quantization.check_codes,
-        "a converter without some of its values",
-        "without the bit of 32 N 0.4 dB at 250 Hz",
-    ),
-    Check(
-        continuity.check_gaps,
-        "samples that are held, filled by a line or gated",
-        "3 ms of the touch 16 dB at 500 Hz, a gate of 40 N 1 dB at 500 Hz",
+        gaps.check,
+        "samples that are held, clipped, filled by a line or gated, and missing codes",
+        "3 ms of the touch 16 dB at 500 Hz, a gate of 40 N 1 dB at 500 Hz, without the bit of 32 N "
+        "0.4 dB at 250 Hz",
     ),
 )
-# Of a contact, after the removal of the background.
+# Of a contact, after the removal of the background: check(section, contact).
 CONTACT_CHECKS = (
     Check(
-        continuity.check_jumps,
+        jumps.check,
         "packets that are lost, filled or exchanged",
         "of 2 ms 12 dB at 250 and 500 Hz",
     ),
@@ -59,7 +54,7 @@ CONTACT_CHECKS = (
         "the size in the warning, at 500 Hz",
     ),
     Check(
-        quantization.check_offset,
+        quantization.check,
         "an offset that is not known within a step of quantization",
         "an offset of 0.05 % of the peak 0.06 dB at 500 Hz; the uncertainty includes it",
     ),
@@ -73,7 +68,7 @@ OTHER_CHECKS = (
         "one of four cells 2.5 dB",
     ),
     Check(
-        copies.refuse_same_drops,
+        copies.check,
         "the same drop twice, and load cells that are averaged",
         "a scatter of zero, and for four cells 12 dB",
     ),
@@ -83,11 +78,6 @@ OTHER_CHECKS = (
         "they are marked, not left out",
     ),
 )
-
-
-def check_section(section: Section) -> tuple[Note, ...]:
-    """Return notes on the recorded force; raise InputError if it cannot be measured."""
-    return tuple(note for entry in SECTION_CHECKS for note in entry.check(section))
 
 
 def check_contact(section: Section, contact: Contact) -> tuple[Note, ...]:

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.differences import FROM_CUBIC, MEDIAN, MIN_NOISE, noise_deviation, runs
+from thud.recordings.differences import FROM_CUBIC, MEDIAN, MIN_NOISE, noise_deviation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -35,38 +35,21 @@ CLIPPED_FRACTION = 0.999
 def check(section: Section) -> tuple[Note, ...]:
     """Return a warning if the top of the force is flat.
 
-    Raise InputError if two of its samples reach full scale, or it is constant: samples that are
-    held have as many equal values elsewhere.
+    Raise InputError if two of its samples reach full scale.
     """
     force, rate = section.force[slice(*section.contact)], section.sample_rate
-    scale = section.full_scale or math.inf
-    length = int(np.count_nonzero(force >= CLIPPED_FRACTION * scale))
-    notes = _check_flat(section, median_filter(force, MEDIAN) - np.median(section.background))
-    starts, lengths = runs(force)
-    at_top = force[starts] == force.max()
-    beside = ~at_top & (force[starts] > (force.max() + force.min()) / 2)
-    longest = int(lengths[at_top].max())
-    is_constant = notes and 2e3 * longest > rate * float(notes[0].others["duration"])
-    if is_constant and longest > 2 * lengths[beside].max(initial=0):
-        length = max(length, longest)
-    if length > 1:
+    count = np.count_nonzero(force >= CLIPPED_FRACTION * (section.full_scale or math.inf))
+    if count > 1:
         refuse(
             f"{section.name}: the force is clipped at {force.max():.4g} N for "
-            f"{1e3 * length / rate:.3g} ms",
+            f"{1e3 * count / rate:.3g} ms",
             "a measuring range that includes the peak",
         )
-    return notes
-
-
-def _check_flat(section: Section, force: NDArray[np.float64]) -> tuple[Note, ...]:
-    """Return a warning if the top of a force without offset, N, is flat."""
-    rate = section.sample_rate
     width = max(1, round(SMOOTHING * rate))
     if len(force) < 2 * width + len(FROM_CUBIC):
         return ()
-    smooth = uniform_filter1d(force, width)
-    peak = smooth.max()
-    noise, step = noise_deviation(section.force[slice(*section.contact)]), section.quantization.step
+    smooth = uniform_filter1d(median_filter(force, MEDIAN) - np.median(section.background), width)
+    peak, noise, step = smooth.max(), noise_deviation(force), section.quantization.step
     # Noise averages the steps.
     least = max(noise / math.sqrt(width), step if noise < step / 2 else 0.0, MIN_NOISE * peak)
     lowest = MIN_FLAT * least / peak

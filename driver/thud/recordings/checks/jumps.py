@@ -1,4 +1,4 @@
-"""Continuity of the force: gaps of samples that are held, filled or gated, and jumps."""
+"""Jumps of the force or of its slope within a contact."""
 
 from __future__ import annotations
 
@@ -6,27 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.differences import (
-    FROM_CUBIC,
-    MIN_NOISE,
-    MIN_STEPS,
-    largest_beside,
-    noise_deviation,
-    runs,
-)
+from thud.recordings.differences import MIN_STEPS, largest_beside
 
 if TYPE_CHECKING:
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
 
-# Samples deviate from a cubic for MIN_GAP, s, by less than this fraction of the noise: one of
-# 10 000 does so by chance.
-MIN_GAP = 1e-3
-MAX_QUIET = 1e-4
-# Fraction of the background outside the contact from which constant samples are a gate, not a loss.
-MAX_CONSTANT = 0.5
 # Value and slope are compared between the lines through the samples of this time, s, or four at
 # least, on either side. Its curvature changes the slope of a force of 600 Hz by less than that of
 # a kink, which is a jump by MIN_RATIO times the largest change around it. First touch and
@@ -41,34 +27,7 @@ MIN_SIDE_RATIO = 6.0
 MIN_JUMP = 0.005
 
 
-def check_gaps(section: Section) -> tuple[Note, ...]:
-    """Return a warning if the background is constant, at least in part, and the contact noisy.
-
-    Raise InputError if the force is held over first touch or release.
-    """
-    rate, force, (first, stop) = section.sample_rate, section.force, section.contact
-    noise = noise_deviation(force[first:stop])
-    if not noise > max(section.quantization.step, MIN_NOISE * float(np.ptp(force[first:stop]))):
-        return ()
-    is_noisy = np.abs(np.convolve(force, FROM_CUBIC, mode="same")) > MAX_QUIET * noise
-    starts, lengths = runs(is_noisy.astype(float))
-    constant = ~is_noisy[starts] & (lengths > max(MIN_GAP * rate, len(FROM_CUBIC)))
-    if not constant.any():
-        return ()
-    starts, stops = starts[constant], (starts + lengths)[constant]
-    total = 1e3 * int((stops - starts).sum()) / rate
-    inside = (stops > first) & (starts < stop)
-    outside = len(force) - (stop - first)
-    if inside.any() and total < MAX_CONSTANT * 1e3 * outside / rate:
-        refuse(
-            f"{section.name}: the force is held, or filled by a line, for {total:.3g} ms at the "
-            "contact while the samples around it are noisy",
-            "a recording without lost samples",
-        )
-    return (Note("constant_background", value=total, unit="ms"),)
-
-
-def check_jumps(section: Section, contact: Contact) -> tuple[Note, ...]:
+def check(section: Section, contact: Contact) -> tuple[Note, ...]:
     """Return a warning if the force or its slope jumps within a contact, away from its ends.
 
     A jump is the distance between the lines through the samples before and after it, at the middle
@@ -85,7 +44,7 @@ def check_jumps(section: Section, contact: Contact) -> tuple[Note, ...]:
     margin = JUMP_MARGIN * rate + 3 * count
     start = contact.gate[0] + count
     first = max(int(contact.touch.value * rate + margin) - start, 0)
-    stop = int(contact.release.value * rate - margin) - start
+    inside = slice(first, max(int(contact.release.value * rate - margin) - start, first))
     least = max(MIN_JUMP * contact.peak, MIN_STEPS * contact.background.quantization.step)
     for what, before, after in (
         ("force", line, line[::-1]), ("slope of the force", slope, slope),
@@ -95,7 +54,6 @@ def check_jumps(section: Section, contact: Contact) -> tuple[Note, ...]:
         limit = MIN_RATIO * sides.max(axis=0)
         if what == "force":
             limit = np.minimum(limit, MIN_SIDE_RATIO * sides.min(axis=0))
-        inside = slice(first, max(stop, first))
         jumps = jump[inside][jump[inside] > np.maximum(limit, least)[inside]]
         if jumps.size:
             return (Note("jump", value=float(jumps.max()), unit="N", others={"what": what}),)
