@@ -58,15 +58,13 @@ class Quantization:
 
 def find_quantization(section: Section) -> Quantization:
     """Return the errors due to quantization of a recorded drop; of load cells, their sum."""
-    found = [_quantization(part) for part in section.cells or (section,)]
-    return Quantization(
-        max(entry.step for entry in found),
-        sum(entry.density for entry in found),
-        math.sqrt(sum(entry.offset**2 for entry in found)),
-    )
-
-
-def _quantization(section: Section) -> Quantization:
+    if section.cells:
+        found = [find_quantization(cell) for cell in section.cells]
+        return Quantization(
+            max(entry.step for entry in found),
+            sum(entry.density for entry in found),
+            math.hypot(*(entry.offset for entry in found)),
+        )
     force, rate, (first, stop) = section.force, section.sample_rate, section.contact
     length, margin = int(MAX_BACKGROUND * rate), int(MARGIN * rate)
     before = force[max(first - length, 0) : max(first - margin, 1)]
@@ -74,7 +72,7 @@ def _quantization(section: Section) -> Quantization:
     contact = force[first:stop]
     background = np.concatenate([before, after])
     step = find_step(np.concatenate([background, contact]))
-    offset = max(offset_deviation(background, step), slow_deviation(background, step))
+    offset = offset_deviation(background, step)
     # Floats with few digits are coarser at the peak.
     peak = float(contact.max() - np.median(background))
     top = find_step(contact[contact > contact.max() - peak / 3])
@@ -106,43 +104,38 @@ def find_step(values: NDArray[np.float64]) -> float:
     return step if step > MIN_STEP * np.abs(values).max() else 0.0
 
 
-def slow_deviation(background: NDArray[np.float64], step: float) -> float:
-    """Return the standard deviation of a slowly varying background by quantization.
+def offset_deviation(background: NDArray[np.float64], step: float) -> float:
+    """Return the standard deviation of the mean of a background by quantization, N.
 
     Hum and drift change the background over several steps, without averaging them like noise from
     sample to sample of deviation s: the factor exp(-2 pi**2 s**2 / step**2) is that of the first
-    harmonic of the error over the steps.
+    harmonic of the error over the steps. The true mean and standard deviation of a background with
+    few distinct values follow from their frequencies: uniform in the mean, and in the logarithm of
+    the standard deviation.
     """
-    if not step or np.ptp(background) < step / 2:
+    if not step or background.size < 2:  # noqa: PLR2004
         return 0.0
+    deviation, slow = float(background.std()) / step, 0.0
     variance = float(np.mean(np.diff(background) ** 2)) / 2 / step**2
-    fast = max(variance - 1 / 12, 0.0) if variance > 1 / 12 else 0.0
-    span = 1 + math.sqrt(8) * float(background.std()) / step
-    deviation = step / math.sqrt(12) * math.exp(-2 * np.pi**2 * fast) / math.sqrt(span)
-    return deviation if fast < MAX_FAST**2 else 0.0
-
-
-def offset_deviation(background: NDArray[np.float64], step: float) -> float:
-    """Return the standard deviation of the mean of a background by quantization.
-
-    The true mean and standard deviation of a background with few distinct values follow from their
-    frequencies: uniform in the mean, and in the logarithm of the standard deviation.
-    """
-    if not step or background.size < 2 or background.std() > MAX_DEVIATION * step:  # noqa: PLR2004
-        return 0.0
+    fast = max(variance - 1 / 12, 0.0)
+    if fast < MAX_FAST**2 and np.ptp(background) >= step / 2:
+        span = 1 + math.sqrt(8) * deviation
+        slow = step / math.sqrt(12) * math.exp(-2 * np.pi**2 * fast) / math.sqrt(span)
+    if deviation > MAX_DEVIATION:
+        return slow
     codes, counts = np.unique(np.rint((background - background[0]) / step), return_counts=True)
     middle = codes[np.argmax(counts)]
     weights = counts * min(1.0, MAX_COUNT / counts.sum())
-    mean, deviation = np.meshgrid(MEANS, DEVIATIONS, indexing="ij")
+    mean, width = np.meshgrid(MEANS, DEVIATIONS, indexing="ij")
     logarithm = np.zeros(mean.shape)
     for code, weight in zip(codes - middle, weights, strict=True):
-        upper, lower = ((code + side - mean) / deviation for side in (0.5, -0.5))
+        upper, lower = ((code + side - mean) / width for side in (0.5, -0.5))
         # The complement keeps the digits of small probabilities above the mean.
         probability = np.where(lower > 0, ndtr(-lower) - ndtr(-upper), ndtr(upper) - ndtr(lower))
         logarithm += weight * np.log(np.maximum(probability, 1e-300))
     posterior = np.exp(logarithm - logarithm.max())
     error = mean - (codes - middle) @ counts / counts.sum()
-    return step * math.sqrt(float((posterior * error**2).sum() / posterior.sum()))
+    return max(slow, step * math.sqrt(float((posterior * error**2).sum() / posterior.sum())))
 
 
 def check(section: Section, contact: Contact) -> tuple[Note, ...]:
