@@ -12,7 +12,6 @@ from conftest import REPOSITORY, codes
 from synthetic import coloured_noise, make_drop
 
 import thud
-from thud.recordings import ringing
 from thud.recordings.config import read_config
 from thud.recordings.plate import Plate
 from thud.recordings.response import Chain
@@ -161,19 +160,20 @@ def test_ringing_has_four_times_the_energy_of_the_quiet_before() -> None:
 
 
 @pytest.mark.parametrize("plate", [None, Plate(1600.0, 30.0)])
-def test_matched_energies_are_over_the_density_of_the_noise(plate: Plate | None) -> None:
-    contact = rung(0.0, 1000.0, 0.008, np.array([[3e-5, 2e-3, 0.5, 0, 0], [5e-5, 4e-3, 1.5, 0, 0]]))
-    force = np.random.default_rng(8).normal(size=500)
-    frequency, energy = ringing._matched(force, contact, chain(plate))  # noqa: SLF001
-    time = np.arange(500) / RATE
-    for k, decay in enumerate(ringing.DECAYS):
-        window = np.exp(-time / decay)
-        for place in (10, 57, 411):
-            f = frequency[place]
-            filtered = abs(np.sum(window * force * np.exp(-2j * np.pi * f * time))) ** 2
-            density = 4e-5 + 3e-3 / f + 1.0 / f**2
-            if plate:
-                # What the correction raises; what it takes away counts as it was.
-                density *= max(abs(1 / plate.response(np.array([f]))[0]) ** 2, 1.0)
-            expected = filtered / (density * RATE / 2 * np.sum(window**2))
-            assert energy[k, place] == pytest.approx(expected)
+@pytest.mark.parametrize(("factor", "expected"), [(0.9, True), (1.1, False)])
+def test_ringing_has_25_times_the_energy_of_the_noise(
+    plate: Plate | None, factor: float, *, expected: bool
+) -> None:
+    """The noise is that of the background, times what the correction raises."""
+    f, decay = 2800.0, 0.008
+    contact = rung(200.0, f, decay)
+    after = contact.force[contact.gate[1] + int(1e-3 * RATE) :]
+    time = np.arange(len(after)) / RATE
+    window = np.exp(-time / decay)
+    filtered = abs(np.sum(window * after * np.exp(-2j * np.pi * f * time))) ** 2
+    density = filtered / np.sum(window**2) / 25 / (RATE / 2)
+    if plate:
+        density *= abs(plate.response(np.array([f]))[0]) ** 2
+    draws = factor * density * np.array([[0.8, 0.1 * f, 0.1 * f**2, 0, 0]])
+    background = replace(contact.background, draws=draws)
+    assert bool(find_ringing(replace(contact, background=background), chain(plate))) == expected
