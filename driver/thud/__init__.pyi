@@ -24,6 +24,7 @@ from .comparison.comparison import (
 )
 from .export.floor_sound import (
     FloorSound as FloorSound,
+    SoundLevels as SoundLevels,
 )
 from .export.force_files import (
     BlockedForce as BlockedForce,
@@ -32,9 +33,6 @@ from .export.force_files import (
 from .export.room_sound import (
     RoomSound as RoomSound,
     listen as listen,
-)
-from .export.sound_levels import (
-    SoundLevels as SoundLevels,
 )
 from .floors.floor_comparison import (
     FloorComparison as FloorComparison,

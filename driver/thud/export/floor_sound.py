@@ -1,38 +1,38 @@
-"""Sound of one impact in the room below a floor, from its predicted levels."""
+"""Sound of one impact in the room below a floor from its predicted levels, and its own levels."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import butter, resample, sosfilt
+from scipy.signal import butter, lfilter, resample, sosfilt
 from scipy.special import exprel
 
 from thud.base.checks import refuse_value, require_whole
 from thud.base.immutable import Immutable
 from thud.base.note import Note
-from thud.export.sound_levels import (
-    RATE,
-    REFERENCE_PRESSURE,
-    SoundLevels,
-    band_sections,
-    fast_histories,
-    fast_history,
-    maximum_levels,
-    measured_levels,
-)
 from thud.floors.modal_room import positions_below
 from thud.floors.prediction import BANDS, RoomPrediction
-from thud.level.rating import rated_bands
+from thud.level.levels import get_bands
+from thud.level.rating import MAX_LEVEL, rated_bands, rating
+from thud.recordings.filters import band_filters
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
+# Samples per second of the levels, which contain frequencies up to 1 kHz.
+RATE = 6000
+# Time constant of the Fast detector, s, and reference sound pressure, Pa.
+TIME_CONSTANT = 0.125
+REFERENCE_PRESSURE = 2e-5
 # Samples per second of the sound, a multiple of those of its levels.
 RATIO = 8
 SAMPLE_RATE = RATIO * RATE
@@ -58,6 +58,38 @@ MAX_REALIZATIONS = 20
 MIN_CHANGE = 0.01
 # Deviation that raises a warning, dB.
 MAX_DEVIATION = 0.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SoundLevels(Immutable):
+    """Maximum Fast levels of a sound, dB re 20 uPa.
+
+    Attributes
+    ----------
+    third : ndarray, shape (12,)
+        Levels of the one-third-octave bands 50 to 630 Hz.
+    octave : ndarray, shape (4,)
+        Levels of the octaves 63 to 500 Hz; each is the maximum of the sum of its bands.
+    a_weighted : float
+        A-weighted level L_AFmax; as a reference, that of the modal sound and of bands of noise.
+    """
+
+    third: Array
+    octave: Array
+    a_weighted: float
+
+    @property
+    def shown(self) -> Array:
+        """Levels of the octaves and the A-weighted level, dB, shape (5,)."""
+        return np.append(self.octave, self.a_weighted)
+
+    def deviation(self, reference: SoundLevels) -> float:
+        """Return the largest difference of octaves and A-weighted levels, dB."""
+        return float(abs(self.shown - reference.shown).max())
+
+    def __repr__(self) -> str:
+        """Return the A-weighted level."""
+        return f"<SoundLevels: L_AFmax {self.a_weighted:.1f} dB>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -128,9 +160,9 @@ def new_floor_sound(
         position = None
     square = _mean_square(prediction, len(modal) + MARGIN)
     modal = np.append(modal, np.zeros(square.shape[1] - len(modal)))
-    target = np.vstack([fast_histories(modal, range(n_modal)), fast_history(square)])
+    target = np.vstack([_fast_histories(modal, range(n_modal)), _fast_history(square)])
     modal = _limited(modal, n_modal)
-    reference = maximum_levels(target, modal, n_modal)
+    reference = _maximum_levels(target, modal, n_modal)
     envelopes = np.sqrt(square)
     pressure, level = _realization(modal, envelopes, reference, seed)
     pressure = resample(pressure, RATIO * len(pressure))
@@ -141,10 +173,10 @@ def _realization(
     modal: Array, envelopes: Array, reference: SoundLevels, seed: int
 ) -> tuple[Array, SoundLevels]:
     """Return the pressure with noise whose levels are near the reference, Pa, and its levels."""
-    tried = []
+    n_band, tried = len(reference.third), []
     for i in range(MAX_REALIZATIONS if len(envelopes) else 1):
         pressure = _with_noise(modal, envelopes, reference, (seed, i))
-        level = measured_levels(pressure)
+        level = _maximum_levels(_fast_histories(pressure, range(n_band)), pressure, n_band)
         tried.append((level.deviation(reference), pressure, level))
         if tried[-1][0] < TOLERANCE:
             break
@@ -169,7 +201,7 @@ def _mean_square(prediction: RoomPrediction, count: int) -> Array:
     time = np.arange(1, count + 1) / RATE
     square = time * exprel(-(fast - slow) * time) * np.exp(-slow * time)
     level = REFERENCE_PRESSURE**2 * 10 ** (prediction.level[bands] / 10)
-    return np.asarray(square * level / fast_history(square).max(axis=1, keepdims=True))
+    return np.asarray(square * level / _fast_history(square).max(axis=1, keepdims=True))
 
 
 def _modal_pressure(
@@ -209,7 +241,7 @@ def _changed(modal: Array, frequency: Array, level: Array, change: Array) -> Arr
     for _ in range(ITERATIONS):
         response = _minimum_phase(np.interp(lines, np.log(frequency), gain) * np.log(10) / 20)
         changed = np.fft.irfft(spectrum * response, count)[: len(modal)]
-        maximum = fast_histories(changed, range(len(gain))).max(axis=1)
+        maximum = _fast_histories(changed, range(len(gain))).max(axis=1)
         gain += level + change - 10 * np.log10(maximum / REFERENCE_PRESSURE**2)
     return np.asarray(changed)
 
@@ -227,7 +259,7 @@ def _limited(modal: Array, n_modal: int) -> Array:
     """Return the modal pressure in its bands only: below 50 Hz it may be much louder."""
     if not n_modal:
         return modal
-    _, lower, upper = band_sections()
+    _, lower, upper = _band_sections()
     edges = HIGH_PASS * lower[0], LOW_PASS * upper[n_modal - 1]
     for edge, kind, order in zip(edges, ("highpass", "lowpass"), (ORDER // 2, ORDER), strict=True):
         modal = sosfilt(butter(order, edge, kind, fs=RATE, output="sos"), modal)
@@ -241,7 +273,7 @@ def _with_noise(
 
     `envelopes` are the root-mean-square pressures in these bands, Pa, shape (n_noise, n_sample).
     """
-    _, lower, upper = band_sections()
+    _, lower, upper = _band_sections()
     n_band, n_sample = len(lower), len(modal)
     indices = range(n_band - len(envelopes), n_band)
     white = np.fft.rfft(np.random.default_rng(seed).standard_normal(n_sample))
@@ -255,8 +287,67 @@ def _with_noise(
         noise[row] = sosfilt(start, envelopes[row] * samples / np.sqrt(np.mean(samples**2)))
     gain = np.ones(len(noise))
     for _ in range(ITERATIONS if len(noise) else 0):
-        maximum = fast_histories(modal + gain @ noise, indices).max(axis=1)
+        maximum = _fast_histories(modal + gain @ noise, indices).max(axis=1)
         gain *= 10 ** (reference.third[indices.start :] / 20) / np.sqrt(
             maximum / REFERENCE_PRESSURE**2
         )
     return np.asarray(modal + gain @ noise)
+
+
+def _fast_histories(pressure: Array, indices: Sequence[int]) -> Array:
+    """Return the squared pressure after the Fast detector in bands, Pa2, (n_band, n_sample)."""
+    sections, _, _ = _band_sections()
+    rows = [_fast_history(sosfilt(sections[band], pressure) ** 2) for band in indices]
+    return np.array(rows).reshape(-1, len(pressure))
+
+
+def _fast_history(square: Array) -> Array:
+    """Return a squared pressure after the Fast detector, Pa2, along the last axis."""
+    kept = math.exp(-1 / (TIME_CONSTANT * RATE))
+    return np.asarray(lfilter([1 - kept], [1, -kept], square))
+
+
+def _a_weighting(frequency: Array) -> Array:
+    """Return the factor of pressure of the A-weighting at frequencies, Hz (IEC 61672-1 annex E)."""
+
+    def response(frequency: Array) -> Array:
+        low, lower, upper, high = (
+            corner**2 + frequency**2 for corner in (20.6, 107.65, 737.86, 12194.22)
+        )
+        return np.asarray(frequency**4 / (low * np.sqrt(lower * upper) * high))
+
+    return np.asarray(response(frequency) / response(np.array(1000.0)))
+
+
+@lru_cache
+def _band_sections() -> tuple[Array, Array, Array]:
+    """Return the filters of the rated one-third-octave bands, and their lower and upper edges."""
+    bands = get_bands(BANDS)
+    rated = np.isin(bands.nominal, rated_bands(BANDS))
+    return band_filters(BANDS, RATE)[rated], bands.lower[rated], bands.upper[rated]
+
+
+@lru_cache
+def _weights() -> Array:
+    """Return the factors of the A-weighting in the rated one-third-octave bands."""
+    n_band = len(rated_bands(BANDS))
+    alone = np.where(np.eye(n_band) > 0, 0.0, -MAX_LEVEL)
+    return np.array([10 ** (rating(levels, BANDS).a_weighted / 10) for levels in alone])
+
+
+def _maximum_levels(histories: Array, pressure: Array, n_known: int) -> SoundLevels:
+    """Return the maximum levels of histories of the squared pressure, Pa2, (12, n_sample).
+
+    `pressure` is the sound pressure, Pa, shape (n_sample,), of the first `n_known` bands; the
+    A-weighting of the other bands is that at their mid frequencies.
+    """
+    gain = _a_weighting(np.asarray(np.fft.rfftfreq(len(pressure), 1 / RATE), float))
+    known = np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure))
+    weighted = _fast_history(known**2) + _weights()[n_known:] @ histories[n_known:]
+    octaves = histories.reshape(-1, 3, histories.shape[1]).sum(axis=1)
+    return SoundLevels(_level(histories), _level(octaves), float(_level(weighted)))
+
+
+def _level(history: Array) -> Array:
+    """Return the maximum levels of histories of the squared pressure, dB."""
+    return np.asarray(10 * np.log10(history.max(axis=-1) / REFERENCE_PRESSURE**2))

@@ -23,6 +23,8 @@ from thud.level.levels import RECORDED_BAND
 from thud.recordings.channel import library
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
     from thud.recordings.recording import ImpactResult
@@ -183,9 +185,8 @@ def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 
 def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     """Return a table of time, s, and force, N, in full precision."""
-    header = [*(f"# {line}" for line in force.header_lines()), "time_s,force_N"]
-    rows = zip(force.time.tolist(), force.force.tolist(), strict=True)
-    return {path: _lines([*header, *(f"{time!r},{value!r}" for time, value in rows)])}
+    columns = {"time_s": force.time, "force_N": force.force}
+    return {path: _table(force.header_lines(), columns)}
 
 
 def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
@@ -201,13 +202,11 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     name = _plain(force.name)[:UFF_NAME]
     data_set = {
         "type": 58,
-        "binary": 0,
         **{f"id{i}": _plain(line)[:UFF_LINE] or "NONE" for i, line in enumerate(lines, start=1)},
         "func_type": 1,  # time response
         "rsp_ent_name": name,
         "rsp_node": 1,
         "rsp_dir": -3,  # downwards
-        "ref_ent_name": "NONE",
         "ref_node": 0,
         "ref_dir": 0,
         "abscissa_spacing": 1,
@@ -218,7 +217,6 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
         "ordinate_axis_lab": "force",
         "ordinate_axis_units_lab": "N",
         "orddenom_spec_data_type": 0,
-        "z_axis_spec_data_type": 0,
         "x": force.time,
         "data": force.force,
     }
@@ -252,14 +250,14 @@ def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     """Return a table of the complex spectrum; see `BlockedForce.spectrum`."""
     frequency, spectrum = force.spectrum()
-    table = np.column_stack(
-        [frequency, spectrum.real, spectrum.imag, np.abs(spectrum), np.angle(spectrum)]
-    )
-    header = [
-        *(f"# {line}" for line in (*force.header_lines(), f"Spectrum: {CONVENTION}")),
-        "frequency_Hz,real_Ns,imaginary_Ns,magnitude_Ns,phase_rad",
-    ]
-    return {path: _lines([*header, *(",".join(map(repr, row)) for row in table.tolist())])}
+    columns = {
+        "frequency_Hz": frequency,
+        "real_Ns": spectrum.real,
+        "imaginary_Ns": spectrum.imag,
+        "magnitude_Ns": np.abs(spectrum),
+        "phase_rad": np.angle(spectrum),
+    }
+    return {path: _table((*force.header_lines(), f"Spectrum: {CONVENTION}"), columns)}
 
 
 # End of the file name, and function that returns the contents, by the option of the command.
@@ -272,7 +270,16 @@ EXPORTS = {
 }
 
 
-def _lines(lines: list[str] | tuple[str, ...]) -> bytes:
+def _table(comments: tuple[str, ...], columns: dict[str, NDArray[np.float64]]) -> bytes:
+    """Return comments, titles and columns as a table, in full precision."""
+    rows = np.column_stack(list(columns.values())).tolist()
+    return _lines(
+        [*(f"# {line}" for line in comments), ",".join(columns)]
+        + [",".join(map(repr, row)) for row in rows]
+    )
+
+
+def _lines(lines: Iterable[str]) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode("utf-8", "replace")
 
 

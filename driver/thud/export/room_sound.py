@@ -12,8 +12,7 @@ import numpy as np
 from thud.base.checks import refuse, refuse_value, require_kind, require_number, require_whole
 from thud.base.display import Displayed
 from thud.base.files import replace_file
-from thud.export.floor_sound import SAMPLE_RATE, FloorSound, new_floor_sound
-from thud.export.sound_levels import REFERENCE_PRESSURE
+from thud.export.floor_sound import REFERENCE_PRESSURE, SAMPLE_RATE, FloorSound, new_floor_sound
 from thud.export.wav import wav_file
 from thud.floors.prediction import RoomPrediction
 from thud.level.levels import get_bands
@@ -171,20 +170,14 @@ def listen(
 
 def _named(predictions: object) -> dict[str, RoomPrediction]:
     """Return predictions by name; unnamed ones are numbered."""
-    if isinstance(predictions, RoomPrediction):
-        predictions = [predictions]
-    if isinstance(predictions, Mapping):
-        named = dict(predictions)
-    elif isinstance(predictions, list | tuple):
-        named = {f"floor {i}": entry for i, entry in enumerate(predictions, start=1)}
-    else:
-        named = {}
-    if not named:
+    named = [predictions] if isinstance(predictions, RoomPrediction) else predictions
+    if isinstance(named, list | tuple):
+        named = {f"floor {i}": entry for i, entry in enumerate(named, start=1)}
+    if not isinstance(named, Mapping) or not named:
         refuse_value("predictions", predictions, "one or more objects of RoomPrediction")
     for name, entry in named.items():
-        require_kind("name", name, str)
         require_kind(name, entry, RoomPrediction)
-    return named
+    return dict(named)
 
 
 def _full_scale(peak: float) -> float:
