@@ -462,11 +462,3 @@ def test_construction_is_a_floor_of_a_prediction() -> None:
 def test_names_ignore_case_and_commas(name: str) -> None:
     assert thud.construction(name).name == "concrete 180, screed on 15 MN/m3"
     assert len(thud.constructions(name)) >= 1
-
-
-def test_construction_keeps_its_sides_if_those_of_the_case_are_not_allowed() -> None:
-    joists = thud.construction("joists, 1 board")
-    small = thud.Case(floor=thud.Plate(length=0.3, width=0.3), room=thud.Room(volume=50.0))
-    assert joists.case(small).floor == joists.floor
-    large = replace(small, floor=thud.Plate(length=4.5, width=6.0))
-    assert joists.case(large).floor == replace(joists.floor, length=4.5, width=6.0)  # type: ignore[call-arg]

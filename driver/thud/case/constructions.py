@@ -121,11 +121,10 @@ class Construction(Displayed):
         source
             Case whose ball, drop, model and room are used; by default the standard ball, and a room
             as large as the floor, 2.5 m high, with 0.5 s. A suspended ceiling of the room stays
-            unless the construction has its own. The floor takes length and width of its
-            room, or of its floor if the room does not state both or is in a corner of the floor,
-            unless the construction is not allowed with these. Joists span the length that the
-            construction states, else that of the joists of `source`, else the shorter side; the
-            room turns with them.
+            unless the construction has its own. The floor takes length and width of its room, or of
+            its floor if the room does not state both or is in a corner of the floor. Joists span
+            the length that the construction states, else that of the joists of `source`, else the
+            shorter side; the room turns with them.
 
         Raises
         ------
@@ -151,12 +150,7 @@ class Construction(Displayed):
                 )  # fmt: skip
             if "length" in self.sources:
                 length = self.floor.length
-        resized = replace(result, room=room, floor=replace(self.floor, length=length, width=width))
-        try:
-            check_case(resized)
-        except InputError:
-            return result
-        return resized
+        return replace(result, room=room, floor=replace(self.floor, length=length, width=width))
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and a row of text for each stated key."""
