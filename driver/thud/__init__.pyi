@@ -74,6 +74,7 @@ from .impact.ensemble import (
 from .impact.floor_impact import (
     FloorEnergy as FloorEnergy,
     FloorImpact as FloorImpact,
+    mobility as mobility,
 )
 from .impact.free_modes import (
     FreeModes as FreeModes,
@@ -81,7 +82,6 @@ from .impact.free_modes import (
     loss_factors as loss_factors,
 )
 from .impact.impact import Impact as Impact
-from .impact.mobility import mobility as mobility
 from .impact.motion import Motion as Motion
 from .impact.results import read_results as read_results
 from .impact.solve import solve as solve

@@ -97,7 +97,7 @@ def test_threads_do_not_disturb_each_other() -> None:
     [
         ({"model": "cube"}, naming("&model: name", "'cube'", "'hollow_sphere'")),
         ({"damping_law": "some"}, naming("&modal_ball: damping_law", "'some'", "'rising'")),
-        ({"stiffness": 1.0}, naming("'stiffness'", "HuntCrossley", "Oscillator")),
+        ({"stiffness": 1.0}, naming("'stiffness'", "hunt_crossley", "oscillator")),
         ({"sample_rate": 0.0}, naming("&sampling: sample_rate", 0.0, 2000)),
         ({"duration": 0.01}, naming("&sampling: duration", "0.01 s")),
         ({"substeps": 0}, naming("&sampling: substeps", 0, 1, 10000)),

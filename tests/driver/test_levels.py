@@ -117,7 +117,7 @@ def test_anything_like_an_array_is_a_record() -> None:
             {"sample_rate": 1000.0},
             naming("sample_rate", "1000.0 Hz", "1415.8915687682759 Hz"),
         ),
-        (PULSE, {"sample_rate": np.nan}, naming("sample_rate", "NaN", "1415.8915687682759 Hz")),
+        (PULSE, {"sample_rate": np.nan}, naming("sample_rate", "nan")),
         (PULSE, {"sample_rate": "fast"}, naming("sample_rate", "'fast'")),
         (PULSE, {"bands": "fifth"}, naming("bands", "'fifth'", "'octave'", "'third'")),
         (PULSE, {"method": "guess"}, naming("method", "'guess'", "'exact'", "'fft'")),

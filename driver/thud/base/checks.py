@@ -147,13 +147,14 @@ def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: 
         refuse_value(name, value, f"whole numbers from {low} to {high}")
 
 
-def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - of a user
-    """Raise InputError if a value is not a finite number."""
+def require_number(name: str, value: Any) -> float:  # noqa: ANN401 - of a user
+    """Return a number; raise InputError if a value is not a finite number."""
     kinds = int | float | np.integer | np.floating
     is_valid = isinstance(value, kinds) and not isinstance(value, bool)
     number = value if isinstance(value, int) or not is_valid else float(value)
     if not is_valid or not -MAX_NUMBER <= number <= MAX_NUMBER:
         refuse_value(name, value, "finite numbers")
+    return float(value)
 
 
 def shown(value: object) -> str:
@@ -170,12 +171,10 @@ def shown(value: object) -> str:
     return f"an object of {type(value).__name__}"
 
 
-def refuse_unknown(
-    label: str, words: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
-) -> None:
-    """Raise InputError for an unknown word; its message may also suggest one of `also`."""
+def refuse_unknown(label: str, words: Iterable[str], known: Iterable[str]) -> None:
+    """Raise InputError for an unknown word; its message suggests a known one."""
     allowed = list(known)
     for word in words:
         if word not in allowed:
-            hint = suggestion(word, [*allowed, *also])
+            hint = suggestion(word, allowed)
             refuse(f"{label}: {shown(word)} is not known{hint}", ", ".join(allowed))

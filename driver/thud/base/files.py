@@ -56,7 +56,7 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
     try:
         target = Path(path)
         if target.exists():
-            _require_regular(target.stat(), target)
+            _require_regular(target)
         part = unique_path(target)
         try:
             part.write_bytes(content)
@@ -189,19 +189,6 @@ def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
     return False
 
 
-def is_directory(path: Path) -> bool:
-    """Whether a path is a directory and not a symbolic link."""
-    return path.is_dir() and not path.is_symlink()
-
-
-def is_regular(path: Path) -> bool:
-    """Whether a path is a regular file and not a symbolic link; opening other files may block."""
-    try:
-        return stat.S_ISREG(path.lstat().st_mode)
-    except (OSError, ValueError):
-        return False
-
-
 def is_failure(error: BaseException) -> bool:
     """Whether a reading error is a failure of the system, not a missing or unsuitable file."""
     return isinstance(error, OSError) and error.errno not in (None, *_NO_FILE)
@@ -209,8 +196,21 @@ def is_failure(error: BaseException) -> bool:
 
 def read_input(path: Path) -> bytes:
     """Return the content of an input file; raise OSError if it is not a regular file."""
-    _require_regular(path.stat(), path)
+    _require_regular(path)
     return path.read_bytes()
+
+
+def _require_regular(path: Path) -> None:
+    """Raise OSError if a file is missing or is not a regular one: opening others may block."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
+
+
+def content_of(path: Path) -> bytes | None:
+    """Return the content of a regular file, None for anything else."""
+    with suppress(OSError):
+        return read_input(path)
+    return None
 
 
 def read_toml(path: Path) -> tuple[dict[str, Any], str]:
@@ -241,15 +241,3 @@ def inputs_folder() -> Path:
     if folder is None:
         refuse("this package has no inputs", "an installed package, or a clone")
     return folder
-
-
-def _require_regular(status: os.stat_result, path: Path) -> None:
-    if not stat.S_ISREG(status.st_mode):
-        raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
-
-
-def content_of(path: Path) -> bytes | None:
-    """Return the content of a regular file, None for anything else."""
-    with suppress(OSError):
-        return path.read_bytes() if is_regular(path) else None
-    return None

@@ -227,15 +227,16 @@ class Case(Displayed):
                 name = content.get(group, {}).get("name", next(iter(choices)))
                 require_choice(f"&{group}: name", name, choices)
                 kinds[group] = choices[name]
-        values: dict[str, dict[str, object]] = {group: {} for group in kinds}
-        for key, attribute in _ATTRIBUTES:
-            kind = kinds.get(attribute)
-            is_used = key.owner in {"", attribute, getattr(kind, "name", "")}
-            if kind and is_used and key.group in content and key.name in content[key.group]:
-                values[attribute][key.name] = content[key.group][key.name]
-        for group in ("model", "floor"):
-            values.get(group, {}).pop("name", None)
-        groups: dict[str, Any] = {group: kind(**values[group]) for group, kind in kinds.items()}
+        groups: dict[str, Any] = {}
+        for attribute, kind in kinds.items():
+            own = getattr(kind, "name", attribute)
+            groups[attribute] = kind(
+                **{
+                    option.name: content[group][option.name]
+                    for option in fields(kind)  # type: ignore[arg-type]
+                    if option.name in content.get(group := option.metadata.get("group", own), {})
+                }
+            )
         name = content.get("case", {}).get("name", cls.name)
         return cls(name=name, **{"model": None, **groups})
 

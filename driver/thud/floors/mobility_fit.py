@@ -29,7 +29,7 @@ from thud.base.extras import data_frame
 from thud.base.note import Note
 from thud.base.units import UNITS, find_unit
 from thud.case.case import Case
-from thud.impact.mobility import mobility
+from thud.impact.floor_impact import mobility
 from thud.level.levels import get_bands
 from thud.recordings.channel import guarded
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets

@@ -17,7 +17,6 @@ from thud.base.checks import (
     require_array,
     require_choice,
     require_kind,
-    require_real,
     require_whole,
 )
 from thud.base.display import Displayed
@@ -339,4 +338,4 @@ def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
             require_choice(key.name, str(word), key.choices)
         numbers = np.arange(1.0, len(key.choices) + 1)
         return np.select([words == word for word in key.choices], list(numbers))
-    return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")
+    return require_array(key.name, array, (0, 1), "b" if key.kind == "flag" else "iuf")

@@ -1,4 +1,4 @@
-"""Impact of a source on a mobile floor."""
+"""Mobility of floors, and the impact of a source on a mobile floor."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
-from thud.base.checks import require_choice, require_pair
+from thud.base.checks import refuse, require_array, require_choice, require_kind, require_pair
 from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact
@@ -16,9 +17,9 @@ from thud.level.levels import BANDWIDTHS, force_exposure_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, FloorOptions, LevelsMethod
+    from thud.base._schema import BandSet, LevelsMethod
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,3 +145,42 @@ class FloorImpact(Impact):
         from thud.plot.floor_figures import draw_floor
 
         return draw_floor(self)
+
+
+def mobility(
+    floor: FloorOptions, frequency: ArrayLike, point: tuple[float, float] | None = None
+) -> NDArray[np.complex128]:
+    """Return the mobility of a floor: velocity, at the source or a point, divided by the force.
+
+    Parameters
+    ----------
+    floor
+        An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate` or another floor.
+    frequency : array_like, shape (n,)
+        Frequencies, Hz.
+    point
+        Position along length and width of a rectangular floor, m; None: at the source.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Complex mobilities, m/(N s).
+
+    Raises
+    ------
+    InputError
+        If a key of the floor is out of range, the point is outside, or the floor has no sides.
+
+    Examples
+    --------
+    >>> import thud
+    >>> thud.mobility(thud.InfinitePlate(resistance=1600.0), [31.5]).real
+    array([0.000625])
+    """
+    require_kind("floor", floor, FloorOptions)
+    frequencies = np.atleast_1d(require_array("frequency", frequency, (0, 1), "iuf"))
+    if not np.isfinite(frequencies).all():
+        refuse("frequency has a value that is not finite", "finite numbers, Hz")
+    points = {} if point is None else {"point": np.array(require_pair("point", point))}
+    answer = ask("mobility", case=case_text(Case(floor=floor)), frequency=frequencies, **points)
+    return np.asarray(answer["real"] + 1j * answer["imaginary"])

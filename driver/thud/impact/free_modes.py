@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.bridge import ask, notes, without_units
-from thud.base.checks import refuse, require_array, require_kind, require_real
+from thud.base.checks import refuse, require_array, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
 from thud.case.case import Case, case_text
@@ -159,7 +159,7 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
         Loss modulus divided by storage modulus.
     """
     require_kind("model", model, FiniteElement)
-    frequencies = require_real("frequency", require_array("frequency", frequency, (1,)))
+    frequencies = require_array("frequency", frequency, (1,), "iuf")
     if not frequencies.size or not (frequencies > 0).all():
         refuse("frequency is not allowed", "a list of frequencies above 0, Hz")
     answer = ask("loss_factors", case=case_text(Case(model=model)), frequency=frequencies)

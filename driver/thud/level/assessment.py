@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import LIMITS, QUANTITIES, VERDICTS
-from thud.base.checks import refuse, require_choice
+from thud.base.checks import refuse, require_choice, require_number
 from thud.base.display import Displayed
 from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
-from thud.level.levels import BANDWIDTHS, SOURCES, get_bands, to_float
+from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -204,20 +204,30 @@ class Criterion(Outcome):
 
     def __repr__(self) -> str:
         """Return value, limits and result."""
-        name, value, _, limits, result = self._row()
+        _, (name, value, _, limits, result) = replace(self, range=None).rows()
         if self.range:
             value, result = self._shown_range() or value, self.conforms
         return f"<Criterion, {name}: {f'{value} {result}'.strip()}, allowed {limits}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        if self.range is None:
-            return [("criterion", "value", self.uncertainty_name, "limits", "result"), self._row()]
-        shown = self._shown_range()
-        probability = self._shown_interval() if shown else ""
-        values = (self.quantity.label, self.quantity.show(self.value), shown, self.shown_limits)
         result = Result(self.conforms, self.conforms)
-        return [_SPREAD_COLUMNS, (*values, probability, self.main_unknown, result)]
+        if self.range:
+            shown = self._shown_range()
+            interval = self._shown_interval() if shown else ""
+            values = (self.quantity.label, self.quantity.show(self.value), shown)
+            row = (*values, self.shown_limits, interval, self.main_unknown, result)
+            return [_SPREAD_COLUMNS, row]
+        header = ("criterion", "value", self.uncertainty_name, "limits", "result")
+        name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
+        limits = f"{self.lower:g} to {self.upper:g}"
+        if math.isnan(self.value):
+            return [header, (name, "", "", limits, "not known")]
+        value = f"{self.value:.4g} {self.unit}".strip()
+        expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
+        if result == VERDICTS[1]:
+            result = Result("too low" if self.value < self.lower else "too high", self.conforms)
+        return [header, (name, value, expanded.replace("nan", "unknown"), limits, result)]
 
     def _shown_range(self) -> str:
         """Return the range in the display unit; empty if its ends are equal."""
@@ -225,19 +235,6 @@ class Criterion(Outcome):
         digits = max(quantity.decimals - 1, 1)
         ends = [f"{end * quantity.display_scale:z.{digits}f}" for end in self.range or ()]
         return " to ".join(ends) if len(set(ends)) > 1 else ""
-
-    def _row(self) -> tuple[str, ...]:
-        name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
-        limits = f"{self.lower:g} to {self.upper:g}"
-        if math.isnan(self.value):
-            return name, "", "", limits, "not known"
-        value = f"{self.value:.4g} {self.unit}".strip()
-        expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
-        expanded = expanded.replace("nan", "unknown")
-        result = self.conforms
-        if result == VERDICTS[1]:
-            result = "too low" if self.value < self.lower else "too high"
-        return name, value, expanded, limits, Result(result, self.conforms)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -284,11 +281,9 @@ class Verdict(Outcome):
         """Return header and rows of text."""
         header, *_ = self.criteria[0].rows()
         rows = [criterion.rows()[1] for criterion in self.criteria]
+        interval = (self._shown_interval(), "") if self.counts else ()
         result = Result(self.conforms, self.conforms)
-        if not self.counts:
-            return [header, *rows, ("all criteria", "", "", "", result)]
-        all_of_them = ("all criteria", "", "", "", self._shown_interval(), "", result)
-        return [header, *rows, all_of_them]
+        return [header, *rows, ("all criteria", "", "", "", *interval, result)]
 
     def to_csv(self) -> str:
         """Return the criteria as CSV, SI units, levels in dB; the last row is that of all."""
@@ -358,9 +353,11 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     criteria = []
     for standard, value in zip(get_criteria(source), values, strict=True):
         name, unit = standard.name, standard.unit
-        estimate = value if isinstance(value, Estimate) else Estimate(to_float(name, value))
+        if not isinstance(value, Estimate):
+            is_unknown = isinstance(value, float) and math.isnan(value)
+            value = Estimate(math.nan if is_unknown else require_number(name, value))  # noqa: PLW2901
         lower, upper = (limits or {}).get(name, (standard.lower, standard.upper))
-        criteria.append(Criterion(name, replace(estimate, unit=unit), lower, upper))
+        criteria.append(Criterion(name, replace(value, unit=unit), lower, upper))
     return Verdict(source, tuple(criteria))
 
 

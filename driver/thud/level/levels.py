@@ -9,7 +9,7 @@ import numpy as np
 
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_choice
+from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_number
 from thud.base.display import Displayed
 
 if TYPE_CHECKING:
@@ -115,8 +115,8 @@ def force_exposure_levels(
     require_choice("bands", bands, BANDWIDTHS)
     require_choice("method", method, LEVEL_METHODS)
     record = require_array("force", force, (1,), "iuf")
-    rate = to_float("sample_rate", sample_rate)
-    answer = ask("levels", force=record, sample_rate=rate, bands=bands, method=method)
+    require_number("sample_rate", sample_rate)
+    answer = ask("levels", force=record, sample_rate=sample_rate, bands=bands, method=method)
     return np.asarray(answer["levels"])
 
 
@@ -140,10 +140,9 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     not positive.
     """
     record = finite_array("force", force)
-    rate = to_float("sample_rate", sample_rate)
-    if not 0 < rate < np.inf:
-        refuse_value("sample_rate", rate, "sample_rate > 0")
-    return int(ask("peak_count", force=record, sample_rate=rate)["peak_count"])
+    if not require_number("sample_rate", sample_rate) > 0:
+        refuse_value("sample_rate", sample_rate, "sample_rate > 0")
+    return int(ask("peak_count", force=record, sample_rate=sample_rate)["peak_count"])
 
 
 def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
@@ -153,12 +152,3 @@ def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         problem = "has a value that is not finite" if array.size else "is empty"
         refuse(f"{name} {problem}", "finite numbers")
     return array
-
-
-def to_float(name: str, value: object) -> float:
-    """Return a value as float; raise InputError if it is not a number."""
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (OverflowError, TypeError, ValueError) as error:
-        value_text = "a very large number" if isinstance(error, OverflowError) else repr(value)
-        refuse(f"{name} = {value_text} is not a number", "real numbers", error)

@@ -10,9 +10,9 @@ import numpy as np
 
 from thud.base._schema import CLASS_LIMITS, RATED_BANDS
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_choice
+from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_number
 from thud.base.display import Displayed
-from thud.level.levels import BANDWIDTHS, finite_array, to_float
+from thud.level.levels import BANDWIDTHS, finite_array
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 MAX_LEVEL = 1000.0
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, repr=False)
 class Rating(Displayed):
     """Single-number rating of the levels of a heavy/soft impact source in the room below.
 
@@ -272,7 +272,7 @@ def standardized_level(
 
 def require_volume(volume: object) -> float:
     """Return a volume, m3; raise InputError if it is not positive and finite."""
-    value = to_float("volume", volume)
-    if not 0 < value < np.inf:
+    value = require_number("volume", volume)
+    if not value > 0:
         refuse_value("volume", volume, "volume > 0, m3")
     return value

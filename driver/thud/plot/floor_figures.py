@@ -14,7 +14,7 @@ from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_kind, require_whole
 from thud.case.case import Case, case_text
-from thud.impact.mobility import mobility
+from thud.impact.floor_impact import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, low_pass
 from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (

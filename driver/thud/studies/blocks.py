@@ -19,7 +19,6 @@ from thud.base.checks import refuse
 from thud.base.errors import InputError
 from thud.base.files import (
     is_failure,
-    is_regular,
     read_input,
     replace_file,
     uninterrupted,
@@ -117,7 +116,7 @@ def read_identity(path: Path) -> dict[str, str] | None:
     """Return the identity of results; None if they have no finished block."""
     if path.suffix == ".partial":
         for file in path.iterdir():
-            if not is_regular(file) or not _FILES.fullmatch(file.name):
+            if not file.is_file() or not _FILES.fullmatch(file.name):
                 refuse(f"{file} does not belong to a study", "finished blocks of a study")
         if not block_paths(path) and not (path / IDENTITY).exists():
             return None

@@ -10,13 +10,7 @@ from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
-from thud.base.files import (
-    is_directory,
-    is_failure,
-    is_one_of,
-    refuse_foreign,
-    replace_file,
-)  # fmt: skip
+from thud.base.files import is_failure, is_one_of, refuse_foreign, replace_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -84,7 +78,7 @@ def open_directory(
     begun = any(map(os.path.lexists, readers))
     for path in (directory.folder / n for n in listed if figures or not n.endswith(FORMATS)):
         directory.require_no_input(path)
-        if is_directory(path) or (os.path.lexists(path) and not (begun or replace)):
+        if _is_directory(path) or (os.path.lexists(path) and not (begun or replace)):
             refuse_foreign(path)
     require_version(readers, study, directory, listed)
     return directory
@@ -111,7 +105,7 @@ def require_version(
         except (OSError, ValueError, LookupError, TypeError) as error:
             if is_failure(error):
                 raise
-            if is_directory(path) or not results.replace:
+            if _is_directory(path) or not results.replace:
                 refuse_foreign(path)
             outdated.append(path)
             continue
@@ -126,8 +120,12 @@ def require_version(
         _remove(path)
 
 
+def _is_directory(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
 def _remove(path: Path) -> None:
-    if is_directory(path):
+    if _is_directory(path):
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
