@@ -68,6 +68,13 @@ def assert_same_bits(
 
 def test_equals_the_single_solver() -> None:
     parameters = random_sets(80, 1)
+    near = {"outer_radius": 0.06105, "wall_thickness": 0.0244, "mass": 2.59, "height": 1.0,
+            "gauge_pressure": 17.8e3, "poisson_ratio": 0.5, "gravity": 9.81,
+            "ambient_pressure": 101325.0, "heat_capacity_ratio": 1.4,
+            "momentum_flux": "momentum_balance"}  # fmt: skip
+    for key, value in near.items():
+        parameters[key][:40] = value
+    parameters["youngs_modulus"][:40] = np.random.default_rng(5).uniform(1.9e6, 2.2e6, 40)
     ensemble = thud.solve_many(
         parameters, forces=True, bands="third", duration=0.2, model="hollow_sphere"
     )
@@ -87,8 +94,12 @@ def test_equals_the_single_solver() -> None:
         for name in ("contact_time", "peak_force", "peak_elastic_force", "max_deflection",
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
+        for force in ("elastic", "floor"):
+            met = getattr(ensemble, f"{force}_conforms")[i]
+            assert met == bool(impact.assess(force=force))  # type: ignore[arg-type]
         assert ensemble.conforms[i] == bool(impact.assess())
-        assert ensemble.elastic_conforms[i] == bool(impact.assess(force="elastic"))
+    # Small, heavy balls; some of them conform by the force on the floor.
+    assert 5 < np.count_nonzero(ensemble.floor_conforms) < 35
 
 
 def test_fails_where_the_single_solver_fails() -> None:
@@ -107,23 +118,6 @@ def test_fails_where_the_single_solver_fails() -> None:
             assert status == 2
         else:
             assert status == 0
-
-
-def test_a_conforming_source_conforms() -> None:
-    # By the force on the floor some small, heavy balls conform; the elastic force never does.
-    random = np.random.default_rng(5)
-    count = 40
-    parameters = {"youngs_modulus": random.uniform(1.9e6, 2.2e6, count),
-                  "outer_radius": np.full(count, 0.06105),
-                  "wall_thickness": np.full(count, 0.0244), "mass": np.full(count, 2.59),
-                  "gauge_pressure": np.full(count, 17.8e3)}  # fmt: skip
-    ensemble = thud.solve_many(parameters, model="hollow_sphere")
-    assert 5 < np.count_nonzero(ensemble.floor_conforms) < count - 5
-    for i in range(count):
-        ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
-        impact = thud.solve(ball, model="hollow_sphere")
-        assert ensemble.conforms[i] == bool(impact.assess())
-        assert ensemble.elastic_conforms[i] == bool(impact.assess(force="elastic"))
 
 
 def test_forces_beyond_the_memory_are_refused() -> None:
@@ -186,15 +180,6 @@ def test_invalid_samples_are_marked_and_leave_the_others() -> None:
     assert_same_bits(clean, ensemble, good, good)
 
 
-def test_forces_are_kept_of_records_of_one_length() -> None:
-    ensemble = thud.solve_many({"substeps": [1, 2]}, forces=True, model="hollow_sphere")
-    assert ensemble.elastic_force is not None
-    assert ensemble.elastic_force.shape == (
-        2,
-        thud.solve(model="hollow_sphere").force("elastic").size,
-    )
-
-
 def test_case_without_impact_is_refused() -> None:
     case = thud.Case(modes=thud.Modes(), model=None)
     with pytest.raises(thud.InputError, match=naming("case", "model")):
@@ -207,11 +192,6 @@ def test_forces_of_invalid_samples_are_nan() -> None:
     assert np.isnan(ensemble.elastic_force[1]).all()
     assert np.isfinite(ensemble.elastic_force[0]).all()
     assert ensemble.elastic_force.shape == (2, 2205)
-
-
-def test_too_few_samples() -> None:
-    ensemble = thud.solve_many({"youngs_modulus": 7e10}, substeps=200, model="hollow_sphere")
-    assert re.search(naming("&sampling: sample_rate", "44100.0 Hz"), ensemble.reason[0])
 
 
 def test_an_empty_batch_is_empty() -> None:
@@ -235,6 +215,8 @@ def test_without_levels_the_rest_is_the_same() -> None:
 def test_scalars_and_defaults() -> None:
     ensemble = thud.solve_many({}, model="hollow_sphere")
     assert len(ensemble) == 1
+    assert {"elastic_octave", "floor_octave"} <= ensemble.results.keys()
+    assert not {"elastic_third", "floor_third", "contact_octave"} & ensemble.results.keys()
     assert ensemble.contact_time[0] == pytest.approx(
         thud.solve(model="hollow_sphere").contact_time, rel=1e-12
     )
@@ -456,27 +438,6 @@ def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     assert sizes == [4, 4, 1]
 
 
-def test_levels_and_forces_are_kept_by_their_names() -> None:
-    found = thud.solve_many(
-        {"height": [0.8, 1.0]}, bands="third", forces=True, model="hollow_sphere"
-    )
-    for i, height in enumerate((0.8, 1.0)):
-        impact = thud.solve(drop=thud.Drop(height), model="hollow_sphere")
-        for force in ("elastic", "floor"):
-            for bands in ("octave", "third"):
-                levels = impact.levels(bands, force=force)  # type: ignore[arg-type]
-                kept = getattr(found, f"{force}_{bands}")[i]
-                assert kept == pytest.approx(levels, abs=1e-6)
-            kept = getattr(found, f"{force}_force")[i]
-            assert kept == pytest.approx(impact.force(force), abs=1e-6)  # type: ignore[arg-type]
-            met = getattr(found, f"{force}_conforms")[i]
-            assert met == bool(impact.assess(force=force))  # type: ignore[arg-type]
-    plain = thud.solve_many({"height": 1.0}, model="hollow_sphere").results
-    assert {"elastic_octave", "floor_octave"} <= plain.keys()
-    assert not {"elastic_third", "floor_third", "contact_octave"} & plain.keys()
-    assert found.sample_rate == 44100
-
-
 @pytest.mark.parametrize("bands", ["octave", "third", "both"])
 def test_numbers_below_a_floor_stand_in_their_columns(bands: Any) -> None:  # noqa: ANN401
     case = thud.Case(
@@ -536,15 +497,6 @@ def test_keywords_replace_those_of_the_case() -> None:
     assert thud.solve_many({}, case, model="modal_ball").case.model == thud.ModalBall()
     assert thud.solve_many({}, model="hollow_sphere").case.model == thud.HollowSphere()
     assert thud.solve_many({}, threads=1024, model="hollow_sphere").status.tolist() == [0]
-
-
-def test_choices_are_those_of_their_words() -> None:
-    words = np.array(["none", "retarding", "momentum_balance", "none"])
-    found = thud.solve_many({"momentum_flux": words}, model="hollow_sphere")
-    for word, peak in zip(words, found.peak_force, strict=True):
-        assert peak == pytest.approx(
-            thud.solve(momentum_flux=str(word), model="hollow_sphere").peak_force, rel=1e-9
-        )
 
 
 def test_columns_of_a_table_are_parameters() -> None:
