@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.level.estimate import Estimate
-from thud.recordings.background import uniform_bounds
+from thud.recordings.background import Background, uniform_bounds
 from thud.recordings.contact import Contact
 from thud.recordings.drops import Section, cut_section, find_drops
 from thud.recordings.measured_drop import Drop
-from thud.recordings.noise import Background
 
 if TYPE_CHECKING:
     from thud.recordings.signal import Signal
@@ -145,10 +144,10 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     if deviation:
         noise -= noise[quiet].mean()
     gate = (round(before * rate) - 4, round((before + 0.02) * rate) + 5)
-    draws = np.array([[max(density or 2 * deviation**2 / rate, 1e-30), 0, 0, 0, 0]])
+    variances = np.array([max(density or 2 * deviation**2 / rate, 1e-30), 0, 0, 0, 0])
     # The offset of white noise, from all the quiet.
     n_cell = len(uniform_bounds(*gate, rate)) - 1
-    offset = np.full((n_cell, n_cell), draws[0, 0] / 2 * rate / quiet.sum())
+    offset = np.full((n_cell, n_cell), variances[0] / 2 * rate / quiet.sum())
     touch, release = Estimate(before, 0), Estimate(before + 0.02, 0)
     force = half_sine(rate, before, len(time)) + noise
     return Drop(
@@ -157,7 +156,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         contact=Contact(
             touch, release, touch, release, 1500.0, (0, len(time)), force,
             np.zeros(len(time)), gate, offset, (before, after),
-            Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
+            Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 1500.0), rate,
         ),
         contact_time=Estimate(0.02, 0),
         restitution=Estimate.unknown(),
@@ -176,7 +175,6 @@ def with_force(drop: Drop, force: np.ndarray, white: float | None = None) -> Dro
     """Return a drop with another force, N, and another density of white noise, N2/Hz."""
     contact = replace(drop.contact, force=force)
     if white is not None:
-        draws = contact.background.draws.copy()
-        draws[:, 0] = white
-        contact = replace(contact, background=replace(contact.background, draws=draws))
+        variances = np.array([white, *contact.background.variances[1:]])
+        contact = replace(contact, background=replace(contact.background, variances=variances))
     return replace(drop, contact=contact)

@@ -17,10 +17,9 @@ from scipy import stats
 from scipy.linalg import toeplitz
 
 import thud
-from thud.recordings.noise import (
+from thud.recordings.background import (
     Background,
-    covariances_without_white,
-    fit_background,
+    fit_noise,
     unit_covariances,
 )
 from thud.studies.fitting import force_misfit, inference, record_noise, search
@@ -64,9 +63,8 @@ def pulls(fit: thud.Fit) -> NDArray[np.float64]:
 def test_covariance_on_the_grid_is_that_of_samples(kind: int) -> None:
     # The closed form of the double sum over samples against that sum.
     time = np.arange(300) / RATE
-    row = covariances_without_white((time[:1], time[:1] + 1 / RATE), (time, time + 1 / RATE))[
-        kind, 0
-    ]
+    samples = time, time + 1 / RATE
+    row = unit_covariances((time[:1], time[:1] + 1 / RATE), samples)[kind, 0]
     dense = to_grid(to_grid(toeplitz(row), 41).T, 41)
     found = grid_covariance(row, 41)
     np.testing.assert_allclose(found, dense, atol=1e-12 * np.abs(dense).max())
@@ -133,14 +131,15 @@ def test_weights_of_a_record_are_those_of_its_samples(
 ) -> None:
     n, count, rate = 301, 41, 3000.0
     quiet = BackgroundRecord(np.zeros(n), rate, (120, 170), 400.0)
-    draws = np.array([[2e-3, 0.4, 30.0, 1.5, 2.5], [4e-3, 0.2, 10.0, 0.5, 1.5]])
-    background = Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 900.0)
+    variances = np.array([3e-3, 0.3, 20.0, 1.0, 2.0])
+    background = Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 900.0)
     found = new_weights(
         quiet, count, background=background, noise=given, offset=True, tones=[70.0], mains=mains
     )
     time = (np.arange(n) - 145) / rate
     cells = time - 0.5 / rate, time + 0.5 / rate
-    white, pink, brown, fifty, sixty = draws.mean(axis=0)[:, None, None] * unit_covariances(cells)
+    pink, brown, fifty, sixty = variances[1:, None, None] * unit_covariances(cells, cells)[:4]
+    white = variances[0] * rate / 2 * np.eye(n)
     predicted = (fifty + sixty) * mains + (0.1 * 900) ** 2 * np.outer(time, time)
     noise = white + pink + brown if given is None else given**2 * np.eye(n)
     waves = np.stack([np.ones(n), np.cos(140 * np.pi * time), np.sin(140 * np.pi * time)], 1)
@@ -201,13 +200,14 @@ def test_pulse_is_found_in_means_of_a_millisecond() -> None:
 
 def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
     background = background_of(2).background()
-    other = replace(background, draws=2 * background.draws)
-    time = (background.cells[0] + background.cells[1]) / 2
-    trend = background.peak**2 * (1 + 0.01 * np.outer(time, time))
+    other = replace(background, variances=2 * background.variances)
+    begins, ends = background.cells
     values = [
         record_noise._log_likelihood(one)  # noqa: SLF001
         - stats.multivariate_normal.logpdf(
-            one.mean, cov=np.tensordot(one.variances, unit_covariances(one.cells), 1) + trend
+            one.mean,
+            cov=one.covariance(one.cells, one.cells)
+            + np.diag(one.variances[0] / 2 / (ends - begins) + (1e-6 * one.peak) ** 2),
         )
         for one in (background, other)
     ]
@@ -221,9 +221,9 @@ def test_noise_that_waves_have_taken_is_given_back() -> None:
     cells, mean = quiet._means  # noqa: SLF001
     waves = cell_waves(cells, tones)
     left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
-    fitted = fit_background(cells, left, plain.peak)
+    fitted, _ = fit_noise(cells, left, plain.peak)
     n = len(mean)
-    ratio = quiet.background(tones).variances / fitted.variances
+    ratio = quiet.background(tones).variances / fitted
     np.testing.assert_allclose(ratio, [n / (n - 8)] * 3 + [1, 1])
     # Eight tones that are not there take 8 of n, within the scatter of as many squares.
     assert quiet.background(tones).variances[0] == pytest.approx(

@@ -20,12 +20,11 @@ import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.recordings.assumptions import instrument_contributions
-from thud.recordings.background import cells_between, uniform_bounds
-from thud.recordings.band_noise import band_noise
+from thud.recordings.background import Background, cells_between, uniform_bounds
 from thud.recordings.budgets import average_estimates, find_deviant
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.config import Config
-from thud.recordings.noise import Background
+from thud.recordings.contact import band_noise
 from thud.recordings.plate import Plate, check_plate
 from thud.recordings.recorded_levels import (
     METHODS,
@@ -145,26 +144,12 @@ def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -
     assert (found <= expected * (1 + offset)).all()
 
 
-def test_many_drops_at_once_are_those_one_by_one() -> None:
-    """Gates of different lengths and rates share functionals, which must not change a level."""
-    drops = [make_drop(2.0, rate, seed=i) for i, rate in enumerate((25600.0, 8000.0, 25600.0))]
-    longer = (drops[0].gate[0] - 9, drops[0].gate[1])
-    contact = replace(drops[0].contact, gate=longer)
-    drops[0] = replace(drops[0], contact=contact)
-    together = measure_levels(drops, "third")
-    for drop, found in zip(drops, together, strict=True):
-        (alone,) = measure_levels([drop], "third")
-        np.testing.assert_allclose(found.level, alone.level, rtol=0, atol=1e-12)
-        np.testing.assert_allclose(found.background, alone.background, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(found.uncertainty, alone.uncertainty, rtol=1e-9)
-
-
 def test_uncertain_density_adds_to_the_energy_of_a_band() -> None:
     drop, bands = make_drop(5.0), thud.get_bands()
     background = drop.contact.background
-    # Two draws of the white noise, an eighth to either side of their mean.
-    draws = background.draws * np.array([[7 / 8], [9 / 8]])
-    contact = replace(drop.contact, background=replace(background, draws=draws))
+    # White noise that is known to an eighth.
+    uncertain = replace(background, log_covariance=np.diag([1 / 64, 0, 0, 0, 0]))
+    contact = replace(drop.contact, background=uncertain)
     exact, doubtful = band_noise([drop, replace(drop, contact=contact)], bands)
     np.testing.assert_allclose(doubtful[:, 0], exact[:, 0])
     np.testing.assert_allclose(doubtful[:, 1], np.hypot(exact[:, 1], exact[:, 0] / 8))
@@ -180,7 +165,7 @@ def test_noise_that_rises_towards_0_hz() -> None:
     both = tuple(np.concatenate(pair) for pair in zip(*cells, strict=True))
     inner = uniform_bounds(*drop.gate, rate)
     contact = cells_between(inner, rate, middle)
-    draws = np.array([[1e-9, 0, density, 0, 0]])
+    variances = np.array([1e-9, 0, density, 0, 0])
     rng = np.random.default_rng(3)
     # Increments of the variance 2 pi**2 S f**2 / rate give the density S.
     deviation = math.sqrt(2 * np.pi**2 * density / rate)
@@ -188,15 +173,15 @@ def test_noise_that_rises_towards_0_hz() -> None:
     for _ in range(count):
         noise = np.cumsum(rng.normal(scale=deviation, size=len(drop.time)))
         means = [np.add.reduceat(noise[: e[-1]], e[:-1]) / np.diff(e) for e in quiet]
-        background = Background(both, np.concatenate(means), draws, 1500.0)
+        background = Background(both, np.concatenate(means), variances, 1500.0)
         under = np.interp(
             (np.arange(*drop.gate)) / rate - middle,
             (contact[0] + contact[1]) / 2,
-            background.predict_mean(contact),
+            background.predict(contact),
         )
         left = noise[slice(*drop.gate)] - under
         energies.append(10 ** (thud.force_exposure_levels(left, rate) / 10))
-    _, covariance = background.predict(contact)
+    covariance = background.error_covariance(contact)
     drop = replace(
         drop, contact=replace(drop.contact, background=background, covariance=covariance)
     )

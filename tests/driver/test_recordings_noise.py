@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import codes, noted
 from scipy import stats
 from scipy.integrate import quad
 from synthetic import coloured_noise, make_drop, noise_density
 
 import thud
-from thud.recordings import noise as module
-from thud.recordings.band_noise import band_functionals, band_noise
-from thud.recordings.noise import (
+from thud.recordings import background as module
+from thud.recordings.background import (
     Background,
-    covariances_without_white,
-    fit_background,
+    fit_noise,
     unit_covariances,
 )
+from thud.recordings.contact import band_functionals, band_noise
 
 if TYPE_CHECKING:
-    from thud.recordings.noise import Cells
+    from thud.recordings.background import Cells
 
 # Of docs/recordings_theory.md, section 2.
 MAINS, UNCERTAIN, N_HARMONIC = (50.0, 60.0), 0.1, 5
@@ -44,7 +44,7 @@ QUIET: Cells = tuple(  # type: ignore[assignment]
     )
 )
 CONTACT = cells_of(np.linspace(-0.0115, 0.008, 6).tolist())
-DRAWS = np.array([[0.02, 3.0, 40.0, 2.0, 1.0], [0.03, 1.0, 90.0, 0.5, 8.0], [0.01, 9.0, 5.0, 3, 1]])
+VARIANCES = np.array([[0.02, 3.0, 40.0, 2.0, 8.0], [0.03, 1.0, 90.0, 0.5, 8.0], [0.01, 9, 5, 3, 1]])
 
 
 def middle(cells: Cells) -> np.ndarray:
@@ -53,9 +53,9 @@ def middle(cells: Cells) -> np.ndarray:
 
 def test_noise_between_two_frequencies_is_the_integral_of_its_spectrum() -> None:
     cells = np.array([0.0]), np.array([1.0])
-    noise = Background(cells, np.zeros(1), np.array([[0.3, 7.0, 50.0, 0.0, 0.0]]), 1.0)
-    assert noise.spectrum(4.0) == pytest.approx(0.3 + 7 / 4 + 50 / 16)
-    power, _ = quad(noise.spectrum, 3, 700, limit=200)
+    noise = Background(cells, np.zeros(1), np.array([0.3, 7.0, 50.0, 0.0, 0.0]), 1.0)
+    assert noise.density(4.0) == pytest.approx(0.3 + 7 / 4 + 50 / 16)
+    power, _ = quad(noise.density, 3, 700, limit=200)
     assert noise.deviation_between(3, 700) == pytest.approx(np.sqrt(power))
 
 
@@ -77,7 +77,7 @@ def test_covariances_are_means_over_cells(brown: bool) -> None:  # noqa: FBT001
     begins = np.array([0.0, 1e-3, 2e-3, 5e-3, 9e-3, 0.1])
     ends = np.array([1e-3, 2e-3, 4e-3, 6e-3, 12e-3, 0.103])
     cells = begins, ends
-    found = covariances_without_white(cells, cells)[int(brown)]
+    found = unit_covariances(cells, cells)[int(brown)]
     for i, k in product(range(6), range(6)):
         one, other = ((begins[j], ends[j]) for j in (i, k))
         assert found[i, k] == pytest.approx(mean_of_lags(one, other, brown), rel=1e-7)
@@ -87,7 +87,7 @@ def test_covariances_belong_to_spectra_of_density_1() -> None:
     """Differences of autocovariances are integrals of S(f) (cos(2 pi f t1) - cos(2 pi f t2))."""
     points = np.array([0.0, 0.01, 0.03])
     cells = points, points + 1e-6
-    pink, brown = covariances_without_white(cells, cells)[:2, 0, 1:]
+    pink, brown = unit_covariances(cells, cells)[:2, 0, 1:]
     f = np.linspace(1e-3, 1e4, 1_000_000)
     change = np.cos(2 * np.pi * f * 0.01) - np.cos(2 * np.pi * f * 0.03)
     step = f[1] - f[0]
@@ -97,7 +97,7 @@ def test_covariances_belong_to_spectra_of_density_1() -> None:
 
 
 def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None:
-    found = covariances_without_white(QUIET, CONTACT)[2:]
+    found = unit_covariances(QUIET, CONTACT)[2:4]
     nodes, weights = np.polynomial.legendre.leggauss(12)
     time, other = (
         middle(cells)[:, None] + (cells[1] - cells[0])[:, None] / 2 * nodes
@@ -113,14 +113,14 @@ def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None
         np.testing.assert_allclose(one, expected, atol=1e-12)
 
 
-def dense(draw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def dense(variances: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return covariances of quiet, quiet and contact, and contact for some variances."""
     both = tuple(np.concatenate(pair) for pair in zip(QUIET, CONTACT, strict=True))
     time = middle(both)  # type: ignore[arg-type]
-    whole = np.tensordot(draw[1:], covariances_without_white(both, both), 1)  # type: ignore[arg-type]
+    whole = np.tensordot(variances[1:], unit_covariances(both, both)[:4], 1)  # type: ignore[arg-type]
     whole += PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
     n = len(QUIET[0])
-    quiet = whole[:n, :n] + draw[0] / 2 * np.diag(1 / (QUIET[1] - QUIET[0]))
+    quiet = whole[:n, :n] + variances[0] / 2 * np.diag(1 / (QUIET[1] - QUIET[0]))
     return quiet, whole[:n, n:], whole[n:, n:]
 
 
@@ -130,48 +130,45 @@ def background() -> Background:
     time = middle(QUIET)
     noise = np.random.default_rng(2).normal(size=len(time))
     mean = 20 + 300 * time + 3 * np.sin(2 * np.pi * 60 * time) + noise
-    return Background(QUIET, mean, DRAWS, PEAK)
+    return Background(QUIET, mean, VARIANCES[0], PEAK)
 
 
 def test_prediction_is_the_normal_distribution_given_the_quiet(background: Background) -> None:
-    means, total = [], np.zeros(())
-    for draw in DRAWS:
-        quiet, across, contact = dense(draw)
-        weights = np.linalg.solve(quiet, across)
-        means.append(weights.T @ background.mean)
-        total = total + (contact - across.T @ weights) / len(DRAWS)
-    mean, covariance = background.predict(CONTACT)
+    quiet, across, contact = dense(VARIANCES[0])
+    weights = np.linalg.solve(quiet, across)
     # Offset and drift of 1500 N are known to 1e-3 of them.
-    np.testing.assert_allclose(mean, np.mean(means, axis=0), rtol=1e-6)
-    np.testing.assert_allclose(background.predict_mean(CONTACT), mean, rtol=1e-9)
-    expected = total + np.cov(np.transpose(means), ddof=0)
-    np.testing.assert_allclose(covariance, expected, rtol=1e-4, atol=1e-4 * expected.max())
+    np.testing.assert_allclose(background.predict(CONTACT), weights.T @ background.mean, rtol=1e-6)
+    expected = contact - across.T @ weights
+    found = background.error_covariance(CONTACT)
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * expected.max())
 
 
-def test_drift_and_hum_are_means_given_the_quiet(background: Background) -> None:
+@pytest.mark.parametrize("code", ["drift_removed", "hum_removed"])
+def test_drift_and_hum_are_told_from_three_deviations_on(background: Background, code: str) -> None:
+    """They are means given the quiet, and proportional to it."""
     time, prior = middle(QUIET), (DRIFT * PEAK) ** 2
-    slopes, variances, hums = [], [], []
-    for draw in DRAWS:
-        quiet, *_ = dense(draw)
-        slopes.append(prior * time @ np.linalg.solve(quiet, background.mean))
-        variances.append(prior - prior**2 * time @ np.linalg.solve(quiet, time))
-        hum = draw[4] * covariances_without_white(QUIET, QUIET)[3]
-        hums.append(hum @ np.linalg.solve(quiet, background.mean))
-    assert background.drift == pytest.approx(
-        (np.mean(slopes), np.sqrt(np.mean(variances) + np.var(slopes))), rel=1e-4
-    )
-    frequency, amplitude, deviation = background.hum
-    # 60 Hz has the larger mean variance; white noise of the cells makes as much by chance.
-    assert frequency == 60
-    assert amplitude == pytest.approx(np.sqrt(2) * np.std(np.mean(hums, axis=0)), rel=0.05)
-    assert amplitude == pytest.approx(np.sqrt(2 * np.mean(np.mean(hums, axis=0) ** 2)), rel=1e-6)
-    white = DRAWS[:, 0].mean() / 2 * np.mean(1 / (QUIET[1] - QUIET[0]))
-    assert deviation == pytest.approx(np.sqrt(2 * white / len(time)))
+    quiet, *_ = dense(VARIANCES[0])
+    if code == "drift_removed":
+        value = prior * time @ np.linalg.solve(quiet, background.mean)
+        deviation = np.sqrt(prior - prior**2 * time @ np.linalg.solve(quiet, time))
+    else:
+        # 60 Hz has the larger variance; white noise of the cells makes as much by chance.
+        hum = VARIANCES[0, 4] * unit_covariances(QUIET, QUIET)[3]
+        value = np.sqrt(2 * np.mean((hum @ np.linalg.solve(quiet, background.mean)) ** 2))
+        white = VARIANCES[0, 0] / 2 * np.mean(1 / (QUIET[1] - QUIET[0]))
+        deviation = np.sqrt(2 * white / len(time))
+    for ratio in (2.99, 3.01):
+        scale = ratio * deviation / value
+        notes = replace(background, mean=scale * background.mean).notes
+        assert (code in codes(notes)) == (ratio > 3)
+    assert noted(notes, code).value == pytest.approx(scale * value, rel=1e-4)
+    assert code == "drift_removed" or noted(notes, code).others["frequency"] == 60
 
 
-def test_density_is_that_of_the_draws(background: Background) -> None:
-    values = DRAWS[:, 0] + DRAWS[:, 1] / 20 + DRAWS[:, 2] / 400
-    assert background.density(20.0) == pytest.approx((values.mean(), values.std()))
+def units_of_quiet() -> np.ndarray:
+    """Return unit covariances of white noise and of what has a variance."""
+    white = np.diag(0.5 / (QUIET[1] - QUIET[0]))
+    return np.array([white, *unit_covariances(QUIET, QUIET)[:4]])
 
 
 def log_posterior(
@@ -179,13 +176,13 @@ def log_posterior(
 ) -> tuple[float, np.ndarray, np.ndarray]:
     time = middle(QUIET)
     trend = PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
-    units = unit_covariances(QUIET)
+    units = units_of_quiet()
     return module._log_posterior(phi, units, trend, background.mean, np.full(5, large))  # noqa: SLF001
 
 
 def test_posterior_is_likelihood_times_priors(background: Background) -> None:
     values = []
-    for draw in DRAWS:
+    for draw in VARIANCES:
         likelihood = stats.multivariate_normal.logpdf(background.mean, cov=dense(draw)[0])
         prior = SLOPE @ np.log(draw) - np.log(1 + draw / 1e3).sum()
         values.append(log_posterior(background, np.log(draw), 1e3)[0] - likelihood - prior)
@@ -194,7 +191,7 @@ def test_posterior_is_likelihood_times_priors(background: Background) -> None:
 
 
 def test_derivatives_of_the_posterior(background: Background) -> None:
-    phi, step = np.log(DRAWS[1]), 1e-4
+    phi, step = np.log(VARIANCES[1]), 1e-4
     _, score, curvature = log_posterior(background, phi, 10.0)
     ends = [
         [log_posterior(background, phi + side * change, 10.0)[0] for side in (-1, 1)]
@@ -203,26 +200,23 @@ def test_derivatives_of_the_posterior(background: Background) -> None:
     slopes = np.diff(ends)[:, 0] / (2 * step)
     np.testing.assert_allclose(score, slopes, rtol=1e-4, atol=1e-5)
     # Average information of the likelihood (Gilmour, Thompson and Cullis 1995), and the priors'.
-    inverse = np.linalg.inv(dense(DRAWS[1])[0])
+    inverse = np.linalg.inv(dense(VARIANCES[1])[0])
     turned = [theta * part @ inverse @ background.mean for theta, part in zip(
-        DRAWS[1], unit_covariances(QUIET), strict=True)]  # fmt: skip
+        VARIANCES[1], units_of_quiet(), strict=True)]  # fmt: skip
     expected = 0.5 * np.array(turned) @ inverse @ np.transpose(turned) + np.diag(SLOPE)
     np.testing.assert_allclose(curvature, expected, rtol=1e-4)
 
 
-def test_draws_are_two_deviations_from_a_maximum_without_slope(background: Background) -> None:
-    found = fit_background(QUIET, background.mean, PEAK)
-    logarithms = np.log(found.draws)
-    likely = logarithms.mean(axis=0)
+def test_variances_are_the_means_of_a_maximum_without_slope(background: Background) -> None:
+    variances, covariance = fit_noise(QUIET, background.mean, PEAK)
+    # The mean of a log-normal variable.
+    likely = np.log(variances) - np.diagonal(covariance) / 2
     scale = np.array([np.mean(0.5 / (QUIET[1] - QUIET[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
     large = (0.03 * PEAK) ** 2 / scale
     _, score, curvature = log_posterior(background, likely, large)
     # The search ends where a step gains less than 0.02: half of the square of the slope.
     assert score @ np.linalg.solve(curvature, score) < 2 * module.TOLERANCE
-    # Ten draws of the covariance 4/5 of the inverse of the curvature.
-    np.testing.assert_allclose(logarithms[:5] + logarithms[5:], 2 * np.tile(likely, (5, 1)))
-    steps = logarithms[:5] - likely
-    np.testing.assert_allclose(steps.T @ steps / 4 @ curvature, np.eye(5), atol=0.02)
+    np.testing.assert_allclose(covariance @ curvature, np.eye(5), atol=0.02)
 
 
 @pytest.mark.parametrize("colour", ["white", "pink", "brown"])
@@ -235,9 +229,11 @@ def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
     for seed in range(8):
         noise = coloured_noise(1900, rate, 5.0, colour, np.random.default_rng(seed))
         means = [np.add.reduceat(noise[i : i + 800], edges[:-1]) / 8 for i in (960, 0)]
-        found = fit_background(quiet, np.concatenate(means), PEAK)
+        cell_means = np.concatenate(means)
+        variances, covariance = fit_noise(quiet, cell_means, PEAK)
+        found = Background(quiet, cell_means, variances, PEAK, covariance)
         frequency = {"white": 400.0, "pink": 60.0, "brown": 20.0}[colour]
-        density, deviation = found.density(frequency)
+        density, deviation = found.density(frequency), found.density_deviation(frequency)
         true = noise_density(rate, 5.0, colour) / frequency**order
         ratios.append((np.log(density / true), deviation / density))
     error, stated = np.transpose(ratios)
@@ -249,10 +245,11 @@ def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
 def test_background_in_reversed_time_has_the_same_noise() -> None:
     amplitude = np.where(middle(QUIET) < 0, 1.0, 8.0)
     mean = 20 + amplitude * np.random.default_rng(4).normal(size=len(amplitude))
-    found = fit_background(QUIET, mean, PEAK)
+    found = fit_noise(QUIET, mean, PEAK)
     begins, ends = QUIET
-    reverse = fit_background((-ends[::-1], -begins[::-1]), mean[::-1], PEAK)
-    np.testing.assert_allclose(reverse.draws, found.draws, rtol=1e-6)
+    reverse = fit_noise((-ends[::-1], -begins[::-1]), mean[::-1], PEAK)
+    for one, other in zip(reverse, found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("rate", [2500.0, 25600.0])
@@ -274,10 +271,11 @@ def test_energy_of_the_noise_follows_its_formula() -> None:
     contact = drop.contact
     n_cell = len(contact.covariance)
     root = np.random.default_rng(5).normal(size=(n_cell, n_cell))
-    draws = np.array([[2e-3, 0.1, 3.0, 0, 0], [4e-3, 0.3, 9.0, 0, 0]])
-    contact = replace(
-        contact, covariance=root @ root.T, background=replace(contact.background, draws=draws)
-    )
+    variances = np.array([3e-3, 0.2, 6.0, 0, 0])
+    logarithms = np.random.default_rng(6).normal(size=(5, 5))
+    logarithms = 0.01 * logarithms @ logarithms.T
+    background = replace(contact.background, variances=variances, log_covariance=logarithms)
+    contact = replace(contact, covariance=root @ root.T, background=background)
     rate, bands = drop.sample_rate, thud.get_bands()
     force = drop.force[slice(*drop.gate)]
     count = len(force)
@@ -293,7 +291,8 @@ def test_energy_of_the_noise_follows_its_formula() -> None:
         squares = np.trace(form @ covariance @ form @ covariance)
         variance = 4 * force @ form @ covariance @ form @ force - 2 * squares
         f = (lower + upper) / 2
-        density = draws @ [1, 1 / f, 1 / f**2, 0, 0]
-        variance = max(variance, 2 * squares) + (expected * density.std() / density.mean()) ** 2
+        change = variances * [1, 1 / f, 1 / f**2, 0, 0]
+        density = change @ logarithms @ change / change.sum() ** 2
+        variance = max(variance, 2 * squares) + expected**2 * density
         assert noise == pytest.approx(expected, rel=1e-6)
         assert deviation == pytest.approx(np.sqrt(variance), rel=1e-6)

@@ -13,9 +13,9 @@ from synthetic import cut_drops, half_sine
 
 import thud
 from thud.level.levels import force_exposure_levels
-from thud.recordings.band_noise import band_noise
 from thud.recordings.budgets import average_mass
 from thud.recordings.config import Config
+from thud.recordings.contact import band_noise
 from thud.recordings.quantization import (
     find_quantization,
     find_step,

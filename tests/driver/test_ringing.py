@@ -89,11 +89,11 @@ def test_short_quiet_tells_nothing(force: np.ndarray) -> None:
     assert find_ringing(short, Chain((Plate(1100.0, 25.0),))) is None
 
 
-DRAWS = np.array([[4e-5, 0.0, 0.0, 0, 0]])
+VARIANCES = np.array([4e-5, 0.0, 0.0, 0, 0])
 
 
 def rung(
-    amplitude: float, frequency: float, decay: float, draws: np.ndarray = DRAWS, **how: float
+    amplitude: float, frequency: float, decay: float, noise: np.ndarray = VARIANCES, **how: float
 ) -> Contact:
     """Return a contact of 1500 N behind the gate of which an oscillation dies away."""
     contact = make_drop(0.0, RATE, **how).contact  # type: ignore[arg-type]
@@ -102,7 +102,7 @@ def rung(
     time = np.arange(len(force) - contact.gate[1]) / RATE
     wave = amplitude * np.exp(-time / decay) * np.cos(2 * np.pi * frequency * time + 0.4)
     force[contact.gate[1] :] += wave
-    background = replace(contact.background, draws=draws)
+    background = replace(contact.background, variances=noise)
     return replace(contact, force=force, background=background)
 
 
@@ -124,7 +124,7 @@ def test_free_oscillation_is_told_by_frequency_and_amplitude(
 
 def test_ringing_begins_where_it_is_clear_large_and_long_enough() -> None:
     # As part of the peak of 1500 N: 3e-4 where no plate is stated, 1e-3 of what is corrected.
-    quiet = np.array([[1e-9, 0.0, 0.0, 0, 0]])
+    quiet = np.array([1e-9, 0.0, 0.0, 0, 0])
     for plate, part in ((None, 3e-4), (Plate(1600.0, 30.0), 1e-3)):
         for factor, expected in ((0.93, False), (1.07, True)):
             contact = rung(factor * part * 1500 * np.exp(1e-3 / 0.008), 1000.0, 0.008, quiet)
@@ -174,6 +174,6 @@ def test_ringing_has_25_times_the_energy_of_the_noise(
     density = filtered / np.sum(window**2) / 25 / (RATE / 2)
     if plate:
         density *= abs(plate.response(np.array([f]))[0]) ** 2
-    draws = factor * density * np.array([[0.8, 0.1 * f, 0.1 * f**2, 0, 0]])
-    background = replace(contact.background, draws=draws)
+    variances = factor * density * np.array([0.8, 0.1 * f, 0.1 * f**2, 0, 0])
+    background = replace(contact.background, variances=variances)
     assert bool(find_ringing(replace(contact, background=background), chain(plate))) == expected

@@ -16,7 +16,7 @@ import pytest
 from conftest import REPOSITORY
 
 import thud
-from thud.recordings.flanks import _table
+from thud.recordings.flanks import _shapes
 
 SOURCES = REPOSITORY / "src"
 
@@ -176,5 +176,5 @@ def test_caches_of_functions_with_arguments_are_bounded() -> None:
 
 
 def test_tables_of_flanks_are_kept_for_few_rates() -> None:
-    sizes = [_table(1 / rate, None).nbytes for rate in np.linspace(8.0, 64.0, 8)]
-    assert _table.cache_info().currsize * max(sizes) <= 12e6
+    sizes = [_shapes(1 / rate)[0].nbytes for rate in np.linspace(8.0, 64.0, 8)]
+    assert _shapes.cache_info().currsize * max(sizes) <= 12e6

@@ -16,6 +16,7 @@ from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
+from unittest import mock
 
 import numpy as np
 
@@ -24,11 +25,9 @@ from thud.base.errors import InputError
 from thud.impact.contact_time import THRESHOLD, contact_span
 from thud.level.estimate import Estimate
 from thud.recordings import background as background_module
-from thud.recordings.band_noise import band_functionals
-from thud.recordings.contact import Contact, find_contact
+from thud.recordings.background import MAINS, Background
+from thud.recordings.contact import Contact, band_functionals, find_contact
 from thud.recordings.drops import Section
-from thud.recordings.flanks import FLANK
-from thud.recordings.noise import MAINS, Background
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
 from thud.recordings.signal import Signal
 
@@ -58,6 +57,10 @@ BANDS = thud.get_bands()
 # Deviations that hold 95 %, and the bound below which an error of 0.1 dB is two of it.
 COVERAGE = 1.96
 REACHABLE = 0.05
+# Length of a flank whose slope and curvature are known, s, and bounds of cells of the whole
+# background, s from the contact.
+FLANK = 3e-3
+ALL_DISTANCES = np.concatenate([background_module.DISTANCES, np.arange(0.104, 1.0, 4e-3)])
 QUANTITIES = (*(f"{band:g} Hz" for band in BANDS.nominal), "e", "t_c", "t_c smooth")
 
 
@@ -197,15 +200,11 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     peak = float(clean.max())
     variances[3 + MAINS.index(draw.mains)] = (draw.hum * peak) ** 2 / 2
     middle = (first + last) / 2 / rate
-    saved = background_module.BACKGROUND_CELLS
-    background_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
-    try:
+    with mock.patch.object(background_module, "DISTANCES", ALL_DISTANCES):
         quiet, mean = background_module.background_means(clean, first, last, rate, middle)
-    finally:
-        background_module.BACKGROUND_CELLS = saved
-    background = Background(quiet, mean, variances[None], peak)
+    background = Background(quiet, mean, variances, peak)
     edges = background_module.uniform_bounds(first, last, rate)
-    _, covariance = background.predict(background_module.cells_between(edges, rate, middle))
+    covariance = background.error_covariance(background_module.cells_between(edges, rate, middle))
     contact = Contact(
         Estimate(onset, 0),
         Estimate(onset + contact_time, 0),
@@ -238,12 +237,8 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     rate, contact = draw.rate, oracle.contact
     touch, release = contact.touch.value, contact.release.value
     section = Section("record", record, rate, 0, contact.span)
-    saved = background_module.BACKGROUND_CELLS
-    background_module.BACKGROUND_CELLS = (*saved, (4e-3, 1.0))
-    try:
+    with mock.patch.object(background_module, "DISTANCES", ALL_DISTANCES):
         force, background = background_module.remove_background(section, contact.background)
-    finally:
-        background_module.BACKGROUND_CELLS = saved
     found = find_contact(section, force, background)
     spread = math.hypot(found.begin.uncertainty, found.end.uncertainty)
     if draw.shape != "half sine":
@@ -254,7 +249,8 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     slope = np.pi * contact.peak / (release - touch)
     shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
     begin = touch - sum(contact.span) / 2 / rate
-    _, covariance = contact.background.predict((begin + edges[:-1], begin + edges[1:]))
+    cells = begin + edges[:-1], begin + edges[1:]
+    covariance = contact.background.error_covariance(cells)
     covariance += np.eye(count) * contact.background.variances[0] / 2 / (edges[1] - edges[0])
     normal = shapes @ np.linalg.solve(covariance, shapes.T)
     unit = 1 / np.sqrt(np.diagonal(normal))

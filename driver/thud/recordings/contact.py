@@ -8,33 +8,30 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import toeplitz
+from numpy.polynomial.legendre import leggauss
 from scipy.special import comb
 
 from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.impact.contact_time import THRESHOLD
 from thud.level.levels import low_pass
-from thud.recordings.background import cell_means, cells_between, uniform_bounds
+from thud.recordings.background import MAINS, N_HARMONIC, cells_between, uniform_bounds
 from thud.recordings.differences import robust_deviation
-from thud.recordings.flanks import FLANK, SMOOTHING, find_touch
-from thud.recordings.noise import MAINS, N_HARMONIC
-from thud.recordings.quantization import MARGIN, MAX_BACKGROUND
+from thud.recordings.flanks import find_edge
+from thud.recordings.quantization import MAX_BACKGROUND
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.level.estimate import Estimate
+    from thud.level.levels import Bands
+    from thud.recordings.background import Background
     from thud.recordings.drops import Section
-    from thud.recordings.noise import Background
+    from thud.recordings.measured_drop import Drop
 
-# Maximum time from the start of the pulse that the search for drops returns to the touch, s.
-MAX_DELAY = 1e-3
-# Width of the cells of a flank, s.
-FLANK_CELL = 4e-5
-# Number of frequencies at which the noise after a correction is evaluated.
-N_FREQUENCY = 200
 # The gate of the levels extends this many samples beyond the contact, and (GATE_RATE / rate)**2
 # more at low rates, at which the anti-aliasing filter is close to the octave of 500 Hz.
 GATE_SAMPLES = 8
@@ -57,8 +54,10 @@ MIN_NOISE_SAMPLES = 50
 MIN_INCREASE = 4.0
 # Band in which the noise of the background is compared with its fit, Hz.
 NOISE_BAND = (100.0, 600.0)
-# Minimum drift and hum that are noted, in standard deviations.
-MIN_DEVIATIONS = 3.0
+# Minimum number of sections of the background whose energy is compared with that of the fitted
+# noise, and standard deviations by which it exceeds it.
+MIN_GATES = 3
+CHANCE = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,15 +117,7 @@ class Contact(Immutable):
         """What was removed with the background."""
         first, stop = (index - self.span[0] for index in self.gate)
         offset = float(self.removed[first:stop].mean())
-        notes = [*self.background.tones, Note("offset_removed", value=offset, unit="N")]
-        drift, deviation = self.background.drift
-        if abs(drift) > MIN_DEVIATIONS * deviation:
-            notes.append(Note("drift_removed", value=drift, unit="N/s"))
-        frequency, amplitude, deviation = self.background.hum
-        if amplitude > MIN_DEVIATIONS * deviation:
-            others = {"frequency": frequency}
-            notes.append(Note("hum_removed", value=amplitude, unit="N", others=others))
-        return tuple(notes)
+        return (*self.background.notes, Note("offset_removed", value=offset, unit="N"))
 
     @property
     def gated(self) -> NDArray[np.float64]:
@@ -175,7 +166,7 @@ class Contact(Immutable):
         frequency = np.fft.rfftfreq(gates.shape[1], 1 / self.sample_rate)[1:]
         window = np.hanning(gates.shape[1] + 2)[1:-1]
         power = (np.abs(np.fft.rfft(window * gates, axis=1)[:, 1:]) ** 2).mean(axis=0)
-        ratio = power / self.background.spectrum(frequency)
+        ratio = power / self.background.density(frequency)
         reference = np.median(ratio[(frequency > NOISE_BAND[0]) & (frequency < NOISE_BAND[1])])
         return float(ratio.sum() / reference * frequency[0]) if reference > 0 else math.inf
 
@@ -224,8 +215,8 @@ class Contact(Immutable):
 def find_contact(section: Section, force: NDArray[np.float64], background: Background) -> Contact:
     """Return the contact of a section; `force` is that without its background, N, shape (n,)."""
     rate, chain = section.sample_rate, section.chain
-    touch, begin = _find_edge(section, force, background, side=1)
-    release, end = _find_edge(section, force, background, side=-1)
+    touch, begin = find_edge(section, force, background, side=1)
+    release, end = find_edge(section, force, background, side=-1)
     # Samples into which filters spread the flanks belong to the gate.
     margin = GATE_SAMPLES + int((GATE_RATE / rate) ** 2)
     margin += int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
@@ -252,52 +243,11 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
         force[slice(*span)],
         (section.force - force)[slice(*span)],
         gate,
-        background.predict(cells)[1],
+        background.error_covariance(cells),
         (background.ends[0], len(force) / rate - background.ends[1]),
         background,
         rate,
     )
-
-
-def _find_edge(
-    section: Section, force: NDArray[np.float64], background: Background, side: int
-) -> tuple[Estimate, Estimate]:
-    """Return first touch and begin of a contact (side 1), or its release and end (side -1), s.
-
-    For the release, times are reversed.
-    """
-    rate, chain = section.sample_rate, section.chain
-    index = section.contact[0 if side > 0 else 1]
-    end = background.ends[0 if side > 0 else 1]
-    search = side * end, side * index / rate + MARGIN
-    stop = index + side * (MAX_DELAY + FLANK) * rate
-    step = side * max(1, round(FLANK_CELL * rate))
-    bounds = np.arange(round(end * rate), int(stop), step)[::side]
-    bounds = bounds[(bounds >= 0) & (bounds <= len(force))]
-    cells = cells_between(bounds, rate, background.middle)
-    # The posterior of the variances matters little beside that of the flank.
-    fixed = replace(background, draws=background.variances[None])
-    _, covariance = fixed.predict(cells)
-    covariance += background.quantization.offset**2
-    if chain is None:
-        covariance += np.diag(background.variances[0] / 2 / (cells[1] - cells[0]))
-    else:
-        lags = cells[0] - cells[0][0]
-        frequency = np.linspace(0, 2 * chain.highest, N_FREQUENCY)
-        gain = chain.noise_gain(frequency) * chain.passed(frequency) ** 2
-        waves = np.cos(2 * np.pi * np.multiply.outer(lags, frequency))
-        covariance += toeplitz(waves @ gain * background.variances[0] * frequency[1])
-    smooth = np.convolve(force, SMOOTHING, mode="same")
-    touch, begin = find_touch(
-        side * ((cells[0] + cells[1]) / 2 + background.middle)[::side],
-        (cell_means(smooth, bounds) / background.peak)[::side],
-        covariance[::side, ::side] / background.peak**2,
-        search,
-        1 / rate,
-        chain,
-        release=side < 0,
-    )
-    return replace(touch, value=side * touch.value), replace(begin, value=side * begin.value)
 
 
 def _step_errors(
@@ -317,3 +267,77 @@ def _step_errors(
     inside = above[(above > begin) & (above < end)]
     first, last = (inside[0], inside[-1]) if inside.size else (end, begin)
     return offset / step * float(first - begin), offset / step * float(end - last)
+
+
+def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
+    """Return functionals of samples whose squares add up to the energy in a band, [n, count].
+
+    They are the Fourier integrals at the nodes of a Gauss quadrature over the band.
+    """
+    time = np.arange(count) / rate
+    nodes, weights = leggauss(12 + int(2 * (upper - lower) * count / rate))
+    phase = np.multiply.outer(np.pi * (lower + upper + (upper - lower) * nodes), time)
+    scale = np.sqrt((upper - lower) * weights)[:, None] / rate
+    return np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
+
+
+def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
+    """Return energies of the noise within the gates in bands, N2 s, [n_drop, n_band, 3].
+
+    The last axis holds the expected energy of the noise, and the standard deviations of the force's
+    energy after its subtraction: by noise, and by quantization with a quiet background.
+    """
+    edges = list(zip(bands.lower, bands.upper, strict=True))
+    energies = np.empty((len(drops), len(edges), 3))
+    for i, drop in enumerate(drops):
+        quiet, errors = drop.contact.quiet_gates, drop.contact.quantization_errors
+        for k, edge in enumerate(edges):
+            energies[i, k] = _energies(drop.contact, quiet, errors, *edge)
+    return energies
+
+
+def _energies(
+    contact: Contact,
+    quiet: NDArray[np.float64],
+    errors: NDArray[np.float64],
+    lower: float,
+    upper: float,
+) -> tuple[float, float, float]:
+    """Return the energy of the noise in a band, N2 s, and the deviations of that of the force.
+
+    `quiet` are sections of the background, `errors` those of the force by quantization, N.
+    """
+    force, rate, background = contact.gated, contact.sample_rate, contact.background
+    rows = band_functionals(len(force), rate, lower, upper)
+    values, covariance = rows @ force, contact.covariance_of(rows)
+    # What the contact has beyond the background may be the force: it is not subtracted.
+    further = contact.white_variance - background.variances[0] * rate / 2
+    further *= float((rows**2).sum())
+    excess = _excess(quiet, covariance, rows)
+    noise = excess * (float(np.trace(covariance)) - further)
+    covariance *= excess
+    squares = float((covariance**2).sum())
+    # The noise in `values` makes the first term too large by twice the second, on average.
+    variance = max(4 * float(values @ covariance @ values) - 2 * squares, 2 * squares)
+    frequency = (lower + upper) / 2
+    relative = background.density_deviation(frequency) / float(background.density(frequency))
+    variance += (noise * relative) ** 2 + further**2
+    # An error e changes the energy by 2 (R f)' R e + |R e|**2.
+    changes = errors @ rows.T
+    quantized = ((changes + 2 * values) * changes).sum(axis=1)
+    return noise, math.sqrt(variance), float(quantized.std()) if len(quantized) else 0.0
+
+
+def _excess(
+    gates: NDArray[np.float64], covariance: NDArray[np.float64], rows: NDArray[np.float64]
+) -> float:
+    """Return the energy of the background in sections over that of the fitted noise in the gate.
+
+    It is 1 unless the former is larger by more than chance: the background is no noise of the fit.
+    """
+    if len(gates) < MIN_GATES:
+        return 1.0
+    expected = float(np.trace(covariance))
+    deviation = math.sqrt(2 * float((covariance**2).sum()) / len(gates))
+    energy = float(((gates @ rows.T) ** 2).sum()) / len(gates)
+    return energy / expected if energy > expected + CHANCE * deviation else 1.0

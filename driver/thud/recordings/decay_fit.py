@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
+from thud.recordings.background import MAINS
 from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy
-from thud.recordings.noise import MAINS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -277,7 +277,7 @@ def _peak(contact: Contact) -> Estimate:
     index = int(np.argmax(low)) * len(force) // len(low) - margin
     cell = min(max(index, 0), len(contact.gated) - 1) * len(contact.covariance)
     cell //= len(contact.gated)
-    density, _ = contact.background.density(RECORDED_BAND)
+    density = float(contact.background.density(RECORDED_BAND))
     deviation = math.sqrt(density * contact.sample_rate / 2)
     # The low-pass is linear: that of noise is added to that of the force.
     size = NOISE_LENGTH * math.ceil(len(force) / NOISE_LENGTH)

@@ -15,8 +15,8 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Budget, Size
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.background import step_errors
-from thud.recordings.band_noise import band_noise
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
+from thud.recordings.contact import band_noise
 from thud.recordings.filters import filter_levels
 
 if TYPE_CHECKING:

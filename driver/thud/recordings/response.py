@@ -13,7 +13,6 @@ from thud.level.levels import get_bands
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.base._schema import BandSet
     from thud.recordings.drops import Section
     from thud.recordings.plate import Plate
     from thud.recordings.recorder_filter import RecorderFilter
@@ -49,19 +48,19 @@ class Chain:
 
 
 def correct_force(
-    force: NDArray[np.float64], sample_rate: float, chain: Chain, bands: BandSet = "third"
+    force: NDArray[np.float64], sample_rate: float, chain: Chain
 ) -> NDArray[np.float64]:
     """Return the applied force, N, shape (n_sample,), from the measured one, by Fourier transform.
 
     This is exact up to the highest corrected frequency; above, it would only amplify noise, and is
     reduced to zero within an octave. The measured force, N, has background at both ends; the rate
     is in Hz. Raise InputError if a response does not allow a correction up to the highest edge of
-    the bands.
+    the one-third-octave bands.
     """
     from scipy.fft import next_fast_len
 
     for instrument in chain.instruments:
-        instrument.require_above(get_bands(bands).upper[-1])
+        instrument.require_above(get_bands("third").upper[-1])
     # The impulse response decays within some periods of the highest corrected frequency.
     margin = math.ceil(20 * sample_rate / chain.highest)
     padded = np.pad(force, margin, mode="edge")

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from thud.base.note import Note
+from thud.level.estimate import RECTANGULAR
 from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, resonance
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
         return None
     frequencies, energies = matched_energy(after, rate, DECAYS)
     frequencies, energies = frequencies[1:], energies[:, 1:]
-    noise = contact.background.spectrum(frequencies) * rate / 2
+    noise = contact.background.density(frequencies) * rate / 2
     if chain is not None:
         noise *= chain.noise_gain(frequencies)
     k, index = np.unravel_index(np.argmax(energies / noise), energies.shape)
@@ -149,7 +150,7 @@ def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | No
     near, low, high = (
         spectra[:, (frequency >= begin) & (frequency <= end)].mean(axis=1) for begin, end in edges
     )
-    noise = contact.background.density(plate.f0)[0] / 2 * count / rate
+    noise = float(contact.background.density(plate.f0)) / 2 * count / rate
     if min(near[0], low[0], high[0]) < MIN_SIGNAL * noise:
         return None
     excess = np.abs(np.log(near / np.sqrt(low * high)))
@@ -163,8 +164,13 @@ def with_plate(drop: Drop, recorded: Section, config: Config) -> Drop:
     `recorded` is the section before the correction of the plate.
     """
     ringing, plate = find_ringing(drop.contact, config.chain), config.resonance
+    contact_time = drop.contact_time
+    if ringing and not ringing.corrected:
+        # A resonance spreads an edge over a quarter of its period.
+        contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
     return replace(
         drop,
+        contact_time=contact_time,
         ringing=ringing,
         plate_recorded=None if plate is None else is_in_record(recorded, drop.contact, plate),
         notes=(*drop.notes, ringing.note) if ringing else drop.notes,

@@ -29,7 +29,7 @@ from thud.studies.fitting.record_noise import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.noise import Background
+    from thud.recordings.background import Background
     from thud.recordings.times import Record
     from thud.studies.fitting.force_target import ForceTarget
 

@@ -14,17 +14,16 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from thud.base.immutable import freeze
-from thud.recordings.background import cells_between
-from thud.recordings.drops import CELL, FOOT, MARGIN
-from thud.recordings.noise import (
+from thud.recordings.background import (
     DRIFT,
     MAINS,
     N_HARMONIC,
-    OFFSET,
-    covariances_without_white,
-    fit_background,
+    Background,
+    cells_between,
+    fit_noise,
     unit_covariances,
 )
+from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.quantization import MAX_BACKGROUND
 from thud.studies.fitting.inference import UNLIKELY
 
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.noise import Background, Cells
+    from thud.recordings.background import Cells
 
     Array = NDArray[np.float64]
 
@@ -170,10 +169,10 @@ class BackgroundRecord:
         waves = cell_waves(cells, tones)
         residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        result = fit_background(cells, residual, peak)
+        variances, log_covariance = fit_noise(cells, residual, peak)
         # The waves have absorbed part of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        return replace(result, draws=scale * result.draws)
+        return Background(cells, residual, scale * variances, peak, log_covariance)
 
     def tones(self) -> tuple[float, ...]:
         """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
@@ -214,7 +213,7 @@ class BackgroundRecord:
         cells, mean = self._means
         tone = MAINS[int(np.argmax(background.variances[3:]))]
         others = np.append(background.variances[:3], np.zeros(len(MAINS)))
-        whiten = _whitening(replace(background, draws=others[np.newaxis]))
+        whiten = _whitening(replace(background, variances=others))
         basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone, *tones])[:, 1:])
         inverse = np.linalg.inv(triangle)
         value, covariance = inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T
@@ -263,17 +262,9 @@ def _trendless(cells: Cells) -> Array:
     return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
 
 
-def _covariance(background: Background) -> Array:
-    """Return the covariance of background cells, offset and drift included, N2."""
-    middle = (background.cells[0] + background.cells[1]) / 2
-    trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
-    parts = np.tensordot(background.variances, unit_covariances(background.cells), 1)
-    return np.asarray(parts + background.peak**2 * trend, dtype=np.float64)
-
-
 def _whitening(background: Background) -> Array:
     """Return the matrix that makes background cells independent and of unit variance."""
-    factor = np.linalg.cholesky(_covariance(background))
+    factor = background.factor
     whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
     return np.asarray(whiten, dtype=np.float64)
 
@@ -361,15 +352,14 @@ def new_weights(  # noqa: PLR0913 - components of the noise
     white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
     drift = 0.0
     if background is not None:
-        rows = covariances_without_white((time[:1], time[:1] + 1 / rate), (time, time + 1 / rate))[
-            :, 0
-        ]
+        samples = time, time + 1 / rate
+        rows = unit_covariances((time[:1], time[:1] + 1 / rate), samples)[:, 0]
         variances = background.variances
         if noise is None:
             white = variances[0] * rate / 2
             colored = variances[1:3] @ rows[:2]
         if mains:
-            humming = variances[3:] @ rows[2:]
+            humming = variances[3:] @ rows[2:4]
         drift = DRIFT * background.peak if offset else 0.0
     slope = to_grid(drift * time[:, np.newaxis], count)
     predicted = grid_covariance(humming, count) + slope @ slope.T
