@@ -188,7 +188,7 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
         expanded = [one.expanded for one in quantities]
         np.testing.assert_array_equal(found["octave_level_expanded"], expanded)
         np.testing.assert_array_equal(found["third_level"], recording.levels("third"))
-        np.testing.assert_array_equal(found["octave_drop_level"], recording.average().drops)
+        np.testing.assert_array_equal(found["octave_drop_level"], recording.average().drops.level)
         assert list(found["file_sha256"].values) == [one.checksum for one in recording.origins]
         assert found.attrs["verdict"] == recording.assess().conforms
         assert found.attrs["thud"] == thud.__version__

@@ -18,7 +18,7 @@ from synthetic import half_sine, make_drop
 import thud
 from thud import cli
 from thud.base.errors import InputError
-from thud.level.estimate import Budget, Estimate
+from thud.level.estimate import Estimate
 from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config
 from thud.recordings.config_values import require_channels
@@ -335,17 +335,15 @@ def test_repeatability_is_not_below_the_noise(count: int) -> None:
 
 
 def test_noise_counts_in_bands_where_it_exceeds_the_scatter() -> None:
-    budget = Budget.of_mean([0.2, 0.2], {}, [0.1, 1.0], 5)
-    assert budget.counted[budget.names.index("noise")].tolist() == [
-        stats.t.ppf(0.975, 4) * 0.1 < 1.96 * 0.2, False,
-    ]  # fmt: skip
-    (entry,) = measure_levels([make_drop(3.0, seed=1)])
-    average = average_levels([entry, entry, entry])
-    noise = entry.contributions["noise"] / math.sqrt(3)
-    np.testing.assert_allclose(average.budget["noise"], noise)
-    np.testing.assert_allclose(average.uncertainty, noise)
+    for scatter, expected in ((0.1, stats.t.ppf(0.975, 4) * 0.1 < 1.96 * 0.2), (1.0, False)):
+        repeated, noise = Estimate.of_mean(39.0, 0.2, scatter, 5).contributions
+        assert (repeated.counted, noise.counted) == (not expected, expected)
+    entry = measure_levels([make_drop(3.0, seed=1)] * 3)
+    average = average_levels(entry)
+    noise = entry.contributions["noise"][0] / math.sqrt(3)
     for estimate, expected in zip(average.estimates, noise, strict=True):
         counted = {part.name: part.counted for part in estimate.contributions}
         assert counted["noise"]
         assert not counted["repeatability"]
+        assert estimate.uncertainty == pytest.approx(expected)
         assert estimate.expanded == pytest.approx(1.96 * expected, rel=1e-3)

@@ -155,8 +155,7 @@ def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
     force = record(15.625, 0.5, 4)
     force[40_000:] += np.rint(half_sine(RATE, 0.05, force.size - 40_000) / 20) * 15.625
     drop = one_drop(force)
-    conditions = Config(height=1.0).conditions(None)
-    mass = average_mass([drop], conditions)
+    mass = average_mass([drop], Config(height=1.0), None)
     (part,) = (part for part in mass.contributions if part.name == "quantization")
     relative = drop.contact.quantization_impulse / drop.impulse.value
     assert part.uncertainty == pytest.approx(mass.value * relative)

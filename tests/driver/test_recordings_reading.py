@@ -38,9 +38,8 @@ from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, Instrument, Properties, ReportConfig, read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
-from thud.recordings.plate import Plate
+from thud.recordings.instruments import Plate, RecorderFilter
 from thud.recordings.polarity import check_peak, find_peaks
-from thud.recordings.recorder_filter import RecorderFilter
 from thud.recordings.signal import Signal
 from thud.recordings.times import uniform_grid
 

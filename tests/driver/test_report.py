@@ -29,8 +29,8 @@ from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, ReportConfig, read_config
+from thud.recordings.instruments import Plate
 from thud.recordings.picture import read_picture
-from thud.recordings.plate import Plate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.recording import Recording
@@ -109,7 +109,7 @@ def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
     force[first:stop] = drop.force[first:stop]
     assert 0 < first < stop < len(force)
     disturbed = replace(one, drops=(with_force(drop, force),))
-    (found,), (expected,) = (measure_levels(r.drops) for r in (disturbed, one))
+    found, expected = (measure_levels(r.drops) for r in (disturbed, one))
     np.testing.assert_array_equal(found.measured, expected.measured)
     # The gate contains the contact, with a margin of less than 3 ms on either side.
     contact_time = drop.contact_time.value

@@ -148,15 +148,15 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
         recording = thud.read_recording(Signal.from_array(record, rate), height=HEIGHT, mass=MASS)
     except InputError as error:
         return draw, str(error)
-    drop, levels = recording.drops[0], measure_levels(recording.drops)[0]
-    np.testing.assert_allclose(levels.level, recording.levels(), rtol=0, atol=1e-9)
+    drop, levels = recording.drops[0], measure_levels(recording.drops)
+    np.testing.assert_allclose(levels.level[0], recording.levels(), rtol=0, atol=1e-9)
     oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
     pairs = zip(BANDS.lower, BANDS.upper, strict=True)
     energy, bounds = np.array([band_bound(oracle, *edges) for edges in pairs]).T
-    found = 10 ** (levels.measured / 10) - 10 ** (levels.background / 10)
-    decibels = levels.level - 10 * np.log10(energy)
-    pull = decibels / levels.uncertainty
-    upper = levels.flag == "background"
+    found = 10 ** (levels.measured[0] / 10) - 10 ** (levels.background[0] / 10)
+    decibels = levels.level[0] - 10 * np.log10(energy)
+    pull = decibels / levels.uncertainty[0]
+    upper = levels.flag[0] == "background"
     pull = np.where(upper, np.maximum(-pull, 0), pull)
     begin, end = contact_span(force, FINE)
     late = drop.contact_time.value - (end - begin)

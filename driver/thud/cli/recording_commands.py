@@ -39,7 +39,7 @@ MAX_PRINTED = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings.read_recording import first_stages, read_recording
+    from thud.recordings.read_recording import read_recording
     from thud.report import recording_files
     from thud.report.notes import sentences
 
@@ -57,7 +57,7 @@ def measure(options: argparse.Namespace) -> int:
     progress = shows_progress(quiet=options.quiet)
     recording = read_recording(options.recordings, config=config, progress=progress)
     verdict = recording.assess()
-    stages = first_stages(options.recordings, config) if options.stages else None
+    stages = recording.stages if options.stages else None
     recording_files.save(recording, files, figures=figures, stages=stages)
     if not options.quiet:
         rows = recording_files.drop_table(recording)

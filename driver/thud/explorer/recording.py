@@ -15,8 +15,8 @@ from thud.explorer.criteria import largest_contribution, recording_headline
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import TABLES
 from thud.plot.impact_figures import contact_force
-from thud.recordings.assumptions import ASSUMED_SHARE
 from thud.recordings.config import config_from
+from thud.recordings.instruments import ASSUMED_SHARE
 from thud.recordings.read_recording import read_recording
 from thud.recordings.signal_files import open_signals
 from thud.report.contents import criteria_data, report_data

@@ -17,6 +17,7 @@ import numpy as np
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
 from thud.base.files import content_of, refuse_foreign, replace_file
+from thud.base.note import Note
 from thud.export.wav import wav_file
 from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.level.levels import RECORDED_BAND
@@ -71,7 +72,7 @@ class BlockedForce(DropForce):
             f"Sample rate: {self.sample_rate:.10g} Hz",
             f"Origin: {self.origin}",
             f"SHA-256: {self.checksum}",
-            *self.notes,
+            *map(str, self.notes),
             f"{SIGNATURE}{version()}",
         )
         # Names of files may not be UTF-8, and notes of a laboratory may have several lines.
@@ -156,10 +157,10 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
     band = np.arange(1, min(RECORDED_BAND, old_frequency[-1], new_frequency[-1]))
     old, new = np.interp(band, old_frequency, old), np.interp(band, new_frequency, new)
     error = float(np.abs(new - old).max() / np.abs(old).max())
-    note = (
-        f"Resampled from {original.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
-        f"spectrum has changed by up to {error:.1e} of its maximum"
-    )
+    note = Note(
+        "resampled", value=original.sample_rate, high=RECORDED_BAND, unit="Hz",
+        others={"change": error},
+    )  # fmt: skip
     return replace(result, notes=(*original.notes, note))
 
 

@@ -14,6 +14,8 @@ from thud.base.immutable import Immutable
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.base.note import Note
+
 
 class ImpactOrRecording(Displayed):
     """Base of `Impact` and `Recording`, which have force, levels and verdict by the same names.
@@ -48,8 +50,8 @@ class DropForce(Immutable):
         SHA-256 of the case as `thud.write_case` writes it, or of the file.
     date : str
         Date of the measurement; empty if unknown.
-    notes : tuple of str
-        Sentences on the processing of the force.
+    notes : tuple of Note
+        Processing of the force.
     """
 
     name: str
@@ -60,7 +62,7 @@ class DropForce(Immutable):
     origin: str
     checksum: str
     date: str = ""
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     @property
     def time(self) -> NDArray[np.float64]:

@@ -1,20 +1,16 @@
-"""Values with a measurement uncertainty, and the table of what contributes to it (JCGM 100)."""
+"""Values with a measurement uncertainty, and its budget of contributions (JCGM 100)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple, Self
-
-import numpy as np
+from typing import TYPE_CHECKING, Self
 
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from numpy.typing import ArrayLike, NDArray
+    from collections.abc import Iterable
 
 CONFIDENCE = 0.95
 # Name of the contribution of a computed value; see `Estimate.computed`.
@@ -128,6 +124,36 @@ class Estimate(Immutable):
         return cls.from_budget(value, Contribution(NUMERICAL_ERROR, error / NORMAL_FACTOR))
 
     @classmethod
+    def of_mean(  # noqa: PLR0913 - a mean and what contributes to its uncertainty
+        cls,
+        value: float,
+        noise: float,
+        scatter: float,
+        count: int,
+        shared: Iterable[Contribution] = (),
+        *,
+        upper_bound: bool = False,
+        not_stated: tuple[str, ...] = (),
+    ) -> Self:
+        """Return a mean over a number of drops with its budget.
+
+        `noise` and `scatter` are standard uncertainties of the mean by the noise of each drop and
+        by the scatter between several drops, which includes the noise. That with the larger
+        expanded uncertainty counts: a scatter of few drops may be small by chance. Drops share the
+        contributions `shared`, which their mean does not reduce.
+        """
+        random = [Contribution(NOISE, noise)]
+        if count > 1:
+            repeated = Contribution(REPEATABILITY, scatter, count - 1, divisor=math.sqrt(count))
+            is_noise = NORMAL_FACTOR * noise > cls.from_budget(value, repeated).expanded
+            random = [
+                replace(repeated, counted=not is_noise),
+                Contribution(NOISE, noise, counted=is_noise),
+            ]
+        lines = (*random, *shared)
+        return cls.from_budget(value, *lines, upper_bound=upper_bound, not_stated=not_stated)
+
+    @classmethod
     def unknown(cls) -> Self:
         """Return an unknown value."""
         return cls(math.nan, math.nan)
@@ -152,113 +178,3 @@ class Estimate(Immutable):
     def expanded(self) -> float:
         """Expanded uncertainty: half the width of the interval with 95 % coverage."""
         return self.coverage_factor * self.uncertainty if self.uncertainty else 0.0
-
-
-class Size(NamedTuple):
-    """Size of what contributes to an uncertainty: see `Contribution`."""
-
-    size: float = math.nan
-    unit: str = ""
-    divisor: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Budget(Immutable):
-    """Contributions to the uncertainty of the mean of a quantity over drops, in each of its bands.
-
-    A quantity without bands has one.
-
-    Attributes
-    ----------
-    names : tuple of str, shape (n_contribution,)
-        Sources of uncertainty.
-    uncertainty : ndarray, shape (n_contribution, n_band)
-        Standard uncertainties, in the unit of the quantity.
-    counted : ndarray of bool, shape (n_contribution, n_band)
-        Whether the combined uncertainty includes it.
-    freedom : ndarray, shape (n_contribution,)
-        Degrees of freedom.
-    sizes : dict of str to Size
-        Sizes of those that have another unit or divisor, by name.
-    """
-
-    names: tuple[str, ...]
-    uncertainty: NDArray[np.float64]
-    counted: NDArray[np.bool_]
-    freedom: NDArray[np.float64]
-    sizes: dict[str, Size]
-
-    @classmethod
-    def of_mean(
-        cls,
-        noise: ArrayLike,
-        shared: Mapping[str, ArrayLike],
-        scatter: ArrayLike = 0.0,
-        count: int = 1,
-        sizes: Mapping[str, Size] | None = None,
-    ) -> Budget:
-        """Return the budget of a mean over a number of drops.
-
-        `noise` and `scatter` are standard uncertainties of the mean, shape (n_band,), by the noise
-        of each drop and by the scatter between several drops, which includes the noise. That with
-        the larger expanded uncertainty counts: a scatter of few drops may be small by chance. Drops
-        share the contributions `shared`, which their mean does not reduce.
-        """
-        rows = {NOISE: noise, **shared}
-        if count > 1:
-            rows = {REPEATABILITY: scatter, **rows}
-        names = tuple(rows)
-        uncertainty = np.array([np.atleast_1d(row) for row in rows.values()], dtype=np.float64)
-        counted = np.ones(uncertainty.shape, dtype=bool)
-        freedom = np.full(len(names), math.inf)
-        known = dict(sizes or {})
-        if count > 1:
-            from scipy.special import stdtrit
-
-            freedom[0] = count - 1
-            factor = stdtrit(count - 1, (1 + CONFIDENCE) / 2)
-            counted[1] = NORMAL_FACTOR * uncertainty[1] > factor * uncertainty[0]
-            counted[0] = ~counted[1]
-            known[REPEATABILITY] = Size(divisor=math.sqrt(count))
-        return cls(names, uncertainty, counted, freedom, known)
-
-    def __getitem__(self, name: str) -> NDArray[np.float64]:
-        """Return a contribution by its name, shape (n_band,)."""
-        return np.asarray(self.uncertainty[self.names.index(name)])
-
-    def estimates(
-        self,
-        values: ArrayLike,
-        bounds: ArrayLike = False,  # noqa: FBT002 - an array
-        not_stated: Sequence[str] = (),
-    ) -> tuple[Estimate, ...]:
-        """Return values with their budgets, shape (n_band,).
-
-        `bounds` is whether a value is an upper bound; `not_stated` as in `Estimate`.
-        """
-        levels = np.atleast_1d(values)
-        return tuple(
-            Estimate.from_budget(
-                float(value),
-                *self._column(band),
-                upper_bound=bool(is_bound),
-                not_stated=tuple(not_stated),
-            )
-            for band, (value, is_bound) in enumerate(
-                zip(levels, np.broadcast_to(bounds, levels.shape), strict=True)
-            )
-        )
-
-    def _column(self, band: int) -> tuple[Contribution, ...]:
-        """Return the contributions in a band; only noise and repeatability may be zero in all."""
-        return tuple(
-            Contribution(
-                name,
-                float(self.uncertainty[row, band]),
-                float(self.freedom[row]),
-                bool(self.counted[row, band]),
-                *self.sizes.get(name, Size()),
-            )
-            for row, name in enumerate(self.names)
-            if self.uncertainty[row].any() or name in {REPEATABILITY, NOISE}
-        )

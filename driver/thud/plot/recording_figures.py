@@ -116,9 +116,9 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
             verdict.source.replace("_", " ") + ", own limits" * own,
         )
     x = np.arange(len(average.level), dtype=float)
-    _draw_drops(axes, x, average.drops, recording)
+    _draw_drops(axes, x, average.drops.level, recording)
     expanded = np.array([estimate.expanded for estimate in average.estimates])
-    label = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
+    label = "average, 95 %" if len(recording.drops) > 1 else "drop, 95 %"
     axes.errorbar(
         x, average.level, yerr=_bar(expanded), label=label, marker="o", markersize=3, **BARS,
     )  # fmt: skip

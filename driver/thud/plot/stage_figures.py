@@ -38,7 +38,7 @@ def draw_stages(stages: Stages) -> Figure:
     _draw_section(recorded, stages.section)
     _draw_changes(changed, stages)
     _draw_contact(background, stages.drop.contact)
-    _draw_levels(levels, measure_levels([stages.drop])[0])
+    _draw_levels(levels, measure_levels([stages.drop]))
     return figure
 
 
@@ -56,7 +56,7 @@ def draw_contact(contact: Contact) -> Figure:
 
 @own_style()
 def draw_levels(levels: DropLevels) -> Figure:
-    """Draw the levels of a drop with their standard uncertainty, and the background."""
+    """Draw the levels of drops with their standard uncertainties, and the background."""
     return _draw_alone(_draw_levels, levels)
 
 
@@ -66,7 +66,7 @@ def draw_drop(drop: Drop) -> Figure:
     figure = new_figure(HEIGHT, 2 * WIDTH)
     force, levels = figure.subplots(1, 2)
     _draw_contact(force, drop.contact)
-    _draw_levels(levels, measure_levels([drop])[0])
+    _draw_levels(levels, measure_levels([drop]))
     return figure
 
 
@@ -130,12 +130,14 @@ def _draw_contact(axes: Axes, contact: Contact) -> None:
 
 
 def _draw_levels(axes: Axes, levels: DropLevels) -> None:
-    x = np.arange(len(levels.level))
+    x, count = np.arange(levels.level.shape[1]), len(levels.names)
     axes.errorbar(
-        x, levels.level, yerr=np.nan_to_num(levels.uncertainty), color=COLORS[0], marker="o",
-        markersize=3, linestyle="none", capsize=2.5, label="drop",
+        np.tile(x, count), levels.level.ravel(), yerr=np.nan_to_num(levels.uncertainty.ravel()),
+        color=COLORS[0], marker="o", markersize=3, linestyle="none", capsize=2.5,
+        label="drop" if count == 1 else f"{count} drops",
     )  # fmt: skip
-    axes.plot(x, levels.background, color="black", linestyle=":", marker="_", label="background")
+    background = levels.background.max(axis=0)
+    axes.plot(x, background, color="black", linestyle=":", marker="_", label="background")
     octave_axis(axes, levels.bands)
     axes.set_ylabel(LEVEL)
     axes.legend()

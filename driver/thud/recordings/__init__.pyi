@@ -16,21 +16,22 @@ from .drops import (
     cut_section as cut_section,
     find_drops as find_drops,
 )
+from .instruments import (
+    Plate as Plate,
+    RecorderFilter as RecorderFilter,
+)
 from .measured_drop import (
     Drop as Drop,
     measure_drop as measure_drop,
 )
-from .plate import Plate as Plate
 from .read_recording import (
     Stages as Stages,
-    first_stages as first_stages,
     measure_stages as measure_stages,
 )
 from .recorded_levels import (
     average_levels as average_levels,
     measure_levels as measure_levels,
 )
-from .recorder_filter import RecorderFilter as RecorderFilter
 from .repair import repair as repair
 from .response import (
     Chain as Chain,

@@ -9,13 +9,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.note import Note
-from thud.level.estimate import RECTANGULAR, Budget, Contribution, Estimate, Size
+from thud.level.estimate import RECTANGULAR, Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
-from thud.recordings.restitution import BOUNCES, IMPULSE, MASS, RESTITUTION, DropConditions
+from thud.recordings.restitution import (
+    BOUNCES,
+    DIFFERENCE,
+    IMPULSE,
+    MASS,
+    RESTITUTION,
+    shared_causes,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
@@ -35,14 +42,12 @@ SEARCHED = (
 
 
 def average_estimates(
-    estimates: Sequence[Estimate],
-    shared: Mapping[str, float] | None = None,
-    sizes: Mapping[str, Size] | None = None,
+    estimates: Sequence[Estimate], shared: Iterable[Contribution] = ()
 ) -> Estimate:
     """Return the mean of one quantity over drops, without unknown values, with its budget.
 
-    The uncertainty of each estimate is its noise. `shared` are standard uncertainties that all
-    drops share (calibration, drop height), by name, with their `sizes`.
+    The uncertainty of each estimate is its noise. `shared` is what all drops share (calibration,
+    drop height).
     """
     known = [estimate for estimate in estimates if math.isfinite(estimate.value)]
     if not known:
@@ -51,8 +56,8 @@ def average_estimates(
     values = [estimate.value for estimate in known]
     noise = math.hypot(*(estimate.uncertainty for estimate in known)) / count
     scatter = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else math.nan
-    budget = Budget.of_mean(noise, shared or {}, scatter, count, sizes)
-    return budget.estimates(np.mean(values))[0]
+    stated = [contribution for contribution in shared if contribution.uncertainty]
+    return Estimate.of_mean(float(np.mean(values)), noise, scatter, count, stated)
 
 
 def drop_estimates(
@@ -69,20 +74,19 @@ def drop_estimates(
     times = [drop.contact_time for drop in drops]
     # The flanks of all drops have the same shape: its error does not average out.
     common = min(time.uncertainty for time in times)
-    edges = {"edges of the pulse": common} if len(times) > 1 else {}
-    conditions = config.conditions(calibration)
-    mass = _stated(config.mass, config.mass_uncertainty)
+    edges = [Contribution("edges of the pulse", common)] if len(times) > 1 else []
     by_impulse = any(IMPULSE in drop.restitutions for drop in drops)
     causes = {
         "restitution": ("drop height", *(("calibration", "mass") if by_impulse else ())),
         "mass": ("calibration", "drop height") if config.mass is None else ("mass",),
         "drop_height": ("drop height",),
     }
+    mass = _stated(config.mass, config.mass_uncertainty)
     estimates = {
         "contact_time": average_estimates(times, edges),
-        "restitution": average_restitution(drops, conditions)[0],
+        "restitution": average_restitution(drops, config, calibration)[0],
         "peaks": Estimate(float(np.max([_count_peaks(drop) for drop in drops]))),
-        "mass": average_mass(drops, conditions) if config.mass is None else mass,
+        "mass": average_mass(drops, config, calibration) if config.mass is None else mass,
         "drop_height": _stated(config.height, config.height_uncertainty),
     }
     return {
@@ -94,12 +98,14 @@ def drop_estimates(
     }
 
 
-def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tuple[Note, ...]:
+def check_restitution(
+    drops: Sequence[Drop], config: Config, calibration: float | None
+) -> tuple[Note, ...]:
     """Return a warning if the restitution is impossible, or impulse and bounces differ by more.
 
     They may differ by the expanded uncertainty of their difference.
     """
-    mean, difference = average_restitution(drops, conditions)
+    mean, difference = average_restitution(drops, config, calibration)
     outside = max(-mean.value, mean.value - 1)
     if outside > 0 and outside > mean.expanded:
         return (Note("restitution_impossible", value=mean.value, low=0, high=1, effect=0.0),)
@@ -107,13 +113,13 @@ def check_restitution(drops: Sequence[Drop], conditions: DropConditions) -> tupl
         return ()
     note = Note(
         "restitutions_differ", value=difference.value, high=difference.expanded, effect=0.0,
-        others={"mass": average_mass(drops, conditions).value},
+        others={"mass": average_mass(drops, config, calibration).value},
     )  # fmt: skip
     return (note,)
 
 
 def average_restitution(
-    drops: Sequence[Drop], conditions: DropConditions
+    drops: Sequence[Drop], config: Config, calibration: float | None
 ) -> tuple[Estimate, Estimate]:
     """Return the restitution, and that by impulse minus that by bounces; NaN if unknown.
 
@@ -121,35 +127,41 @@ def average_restitution(
     wrong: a rectangular distribution with the difference as half width enters the budget of the
     mean, whose interval then includes both.
     """
-    differences = []
-    effects = []
-    for drop in drops:
-        if {IMPULSE, BOUNCES} <= set(drop.restitutions):
-            impulse, bounces = (drop.restitutions[name] for name in (IMPULSE, BOUNCES))
-            combined = math.hypot(impulse.uncertainty, bounces.uncertainty)
-            differences.append(Estimate(impulse.value - bounces.value, combined))
-            one, other = (drop.shared_effects.get(name, {}) for name in (IMPULSE, BOUNCES))
-            effects.append({key: one.get(key, 0.0) - other.get(key, 0.0) for key in one | other})
-    difference = average_estimates(differences, _mean_sizes(effects), conditions.sizes)
+    both = [drop for drop in drops if {IMPULSE, BOUNCES} <= set(drop.restitutions)]
+    pairs = [(drop.restitutions[IMPULSE], drop.restitutions[BOUNCES]) for drop in both]
+    differences = [
+        Estimate(one.value - other.value, math.hypot(one.uncertainty, other.uncertainty))
+        for one, other in pairs
+    ]
+    difference = average_estimates(differences, _shared(both, DIFFERENCE, config, calibration))
     known = [drop for drop in drops if drop.restitutions]
-    shared = _mean_sizes([drop.shared_effects.get(RESTITUTION, {}) for drop in known])
+    shared = _shared(known, RESTITUTION, config, calibration)
     if abs(difference.value) > difference.expanded:
-        shared[DISAGREEMENT] = abs(difference.value) / RECTANGULAR
-    sizes = conditions.sizes | {DISAGREEMENT: Size(divisor=RECTANGULAR)}
-    return average_estimates([drop.restitution for drop in known], shared, sizes), difference
+        half_width = abs(difference.value)
+        shared.append(Contribution(DISAGREEMENT, half_width / RECTANGULAR, divisor=RECTANGULAR))
+    return average_estimates([drop.restitution for drop in known], shared), difference
 
 
-def average_mass(drops: Sequence[Drop], conditions: DropConditions) -> Estimate:
+def average_mass(drops: Sequence[Drop], config: Config, calibration: float | None) -> Estimate:
     """Return the effective mass with its budget, kg; NaN if bounces or height are unknown."""
     known = [drop for drop in drops if math.isfinite(drop.effective_mass.value)]
-    shared = _mean_sizes([drop.shared_effects.get(MASS, {}) for drop in known])
-    return average_estimates([drop.effective_mass for drop in known], shared, conditions.sizes)
+    shared = _shared(known, MASS, config, calibration)
+    return average_estimates([drop.effective_mass for drop in known], shared)
 
 
-def _mean_sizes(effects: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the magnitude of the mean of each effect over drops, some of which may lack it."""
-    names = dict.fromkeys(name for entry in effects for name in entry)
-    return {name: abs(sum(e.get(name, 0.0) for e in effects)) / len(effects) for name in names}
+def _shared(
+    drops: Sequence[Drop], quantity: str, config: Config, calibration: float | None
+) -> list[Contribution]:
+    """Return what drops share in the uncertainty of the mean of a restitution or a mass."""
+    effects = [drop.shared_effects.get(quantity, {}) for drop in drops]
+    causes = shared_causes(config, calibration)
+    return [
+        replace(
+            causes.get(name, Contribution(name, 0.0)),
+            uncertainty=abs(sum(effect.get(name, 0.0) for effect in effects)) / len(effects),
+        )
+        for name in dict.fromkeys(name for effect in effects for name in effect)
+    ]
 
 
 def find_deviant(drops: Sequence[Drop]) -> tuple[Note, ...]:

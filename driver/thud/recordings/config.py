@@ -31,19 +31,17 @@ from thud.recordings.config_values import (
     to_reasons,
 )
 from thud.recordings.force_units import Calibration, require_unit
+from thud.recordings.instruments import Plate, RecorderFilter, check_plate
 from thud.recordings.picture import read_picture
-from thud.recordings.plate import Plate, check_plate
 from thud.recordings.polarity import POLARITIES
-from thud.recordings.recorder_filter import RecorderFilter
 from thud.recordings.response import Chain
-from thud.recordings.restitution import DropConditions
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
     from thud.base._schema import LimitsSource
-    from thud.recordings.plate import PlateCheck
+    from thud.recordings.instruments import PlateCheck
 
 
 @dataclass(frozen=True)
@@ -188,16 +186,6 @@ class Config(Table):
         stated = (self.resonance, self.recorder_filter)
         instruments = tuple(instrument for instrument in stated if instrument is not None)
         return Chain(instruments) if instruments else None
-
-    def conditions(self, calibration: float | None) -> DropConditions:
-        """Return the conditions of the drops; an unknown uncertainty counts as zero."""
-        return DropConditions(
-            self.height,
-            self.mass,
-            calibration or 0.0,
-            self.mass_uncertainty or 0.0,
-            self.height_uncertainty or 0.0,
-        )
 
     def check_dates(self, file_dates: Iterable[str]) -> list[Note]:
         """Return a warning for each date that contradicts another one.

@@ -12,6 +12,7 @@ from scipy.signal import find_peaks, peak_widths
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.recordings.config_values import parse_numbers
 from thud.recordings.differences import robust_deviation
@@ -103,7 +104,7 @@ class Pulse:
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
+class Section(Immutable):
     """Samples of a signal around one drop or bounce.
 
     `thud.recordings.repair.repair` and `thud.recordings.response.correct` take a section and return

@@ -6,8 +6,8 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from scipy.signal import resample
 
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable
-from thud.base.note import Note
+from thud.base.note import Note, about
 from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import find_offset_step, remove_background, step_errors
@@ -25,20 +25,25 @@ from thud.recordings.differences import robust_deviation
 from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import min_background
-from thud.recordings.restitution import GRAVITY, DropConditions
+from thud.recordings.restitution import (
+    BOUNCES,
+    GRAVITY,
+    IMPULSE,
+    MASS,
+    RESTITUTION,
+    measure_rebound,
+)
+from thud.recordings.ringing import find_ringing, is_in_record
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
+    from thud.recordings.config import Config
     from thud.recordings.drops import Section
     from thud.recordings.ringing import Ringing
 
-# Number of draws of noise for its effect on the maximum.
-PEAK_DRAWS = 32
-# The length of this noise in samples is a multiple of this one.
-NOISE_LENGTH = 1024
 # Minimum rate of the force in which the peak is searched, Hz, and length of zeros on either side of
 # the contact for the interpolation to it, s. At this rate a peak of a 500 Hz ripple is 0.05 % of
 # the ripple too low at most.
@@ -144,7 +149,7 @@ class Drop(Immutable):
         The arguments are those of `thud.recordings.recorded_levels.measure_levels`, which has their
         uncertainties too.
         """
-        return measure_levels([self], bands, method)[0].level.copy()
+        return np.array(measure_levels([self], bands, method).level[0])
 
     def plot(self) -> Figure:
         """Draw the force without background, its gate, and the levels."""
@@ -153,14 +158,39 @@ class Drop(Immutable):
         return draw_drop(self)
 
 
-def measure_drop(section: Section, contact: Contact, conditions: DropConditions) -> Drop:
+def measure_drop(
+    section: Section,
+    contact: Contact,
+    config: Config,
+    calibration: float | None = None,
+    recorded: Section | None = None,
+) -> Drop:
     """Return contact time, peak, impulse, restitution and effective mass of a drop.
 
-    `section` is that of the contact, with its bounces. Raise InputError if the contact cannot be
-    distinguished from the noise.
+    `section` is that of the contact, with its bounces, and `recorded` the same before the
+    correction of the instruments, which shows whether the resonance of a stated plate is in it.
+    `calibration` is the relative standard uncertainty of the force. Raise InputError if the contact
+    cannot be distinguished from the noise.
     """
-    notes = [*section.notes, *contact.notes, *_check_contact(section, contact)]
-    impulse, peak_force = _impulse(contact), _peak(contact)
+    contact_time = _between(contact.begin, contact.end)
+    if not contact_time.value > MIN_CONTACT_RATIO * contact_time.uncertainty:
+        refuse(
+            f"{section.name}: the contact cannot be distinguished from the noise: "
+            f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
+            f"{1e3 * contact_time.uncertainty:.2g} ms",
+            f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
+        )
+    notes = [*section.notes, *contact.notes]
+    notes += (
+        Note("short_background", value=1e3 * length, low=1e3 * SHORT_BACKGROUND, unit="ms",
+             others={"side": side})
+        for side, length in zip(("before", "after"), contact.background_lengths, strict=True)
+        if length < SHORT_BACKGROUND
+    )  # fmt: skip
+    ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
+    variance = contact.covariance_of(ones)[0, 0]
+    impulse = Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
+    peak_force = _peak(contact)
     offset_step = find_offset_step(contact.background, impulse.value)
     if offset_step:
         notes.append(Note("offset_step", value=offset_step, unit="N", effect=0.0))
@@ -169,78 +199,58 @@ def measure_drop(section: Section, contact: Contact, conditions: DropConditions)
         impulse = impulse.widened(float(np.abs(error_impulses).max()) / RECTANGULAR)
         peak_force = peak_force.widened(float(np.abs(errors).max()) / RECTANGULAR)
     # The first flight gives the restitution; without the height two flights are compared.
-    landings = _landings(section, contact, 1 if conditions.height else 2)
-    no_bounce = _check_bounce(section, contact, landings, conditions)
-    landings = [] if no_bounce else landings
+    landings = _landings(section, contact, 1 if config.height else 2)
+    if config.height and landings:
+        # The force of a bounce follows its velocity, and so does the flight before it.
+        flight = _between(contact.release, landings[0][0]).value
+        bounce = section.bounces[0]
+        peak = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
+        ratio = peak / contact.peak
+        expected = GRAVITY * flight / (2 * math.sqrt(2 * GRAVITY * config.height))
+        if not ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
+            landings, others = [], {"ratio": ratio, "height": config.height}
+            notes.append(
+                Note("no_bounce", value=1e3 * flight, unit="ms", effect=0.0, others=others)
+            )
     ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
-    duration = _between(contact.touch, contact.release)
-    rebound = conditions.rebound(impulse, duration, flights, contact.quantization_impulse)
-    notes += (*no_bounce, *check_contact(section, contact), *rebound.notes)
+    estimates, shared = measure_rebound(
+        impulse, _between(contact.touch, contact.release), flights[0] if flights else None, config,
+        calibration, contact.quantization_impulse,
+    )  # fmt: skip
+    notes += check_contact(section, contact)
+    if len(flights) > 1:
+        ratio = flights[1].value / flights[0].value
+        notes.append(Note("restitution_second", value=ratio, effect=0.0))
+    ringing, plate = find_ringing(contact, section.chain), config.resonance
+    notes += [ringing.note] if ringing else []
+    if ringing and not ringing.corrected:
+        # A resonance spreads an edge over a quarter of its period.
+        contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
     return Drop(
         name=section.name,
         onset=section.start / section.sample_rate + contact.touch.value,
         contact=contact,
-        contact_time=_between(contact.begin, contact.end),
-        restitution=rebound.restitution,
+        contact_time=contact_time,
+        restitution=estimates.get(RESTITUTION, Estimate.unknown()),
         peak_force=peak_force,
         impulse=impulse,
-        effective_mass=rebound.mass,
-        restitutions=rebound.restitutions,
-        shared_effects=rebound.shared,
+        effective_mass=estimates.get(MASS, Estimate.unknown()),
+        restitutions={name: estimates[name] for name in (IMPULSE, BOUNCES) if name in estimates},
+        shared_effects=shared,
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
-        notes=tuple(notes),
+        notes=about(section.name, notes),
         offset_step=offset_step,
+        ringing=ringing,
+        plate_recorded=is_in_record(recorded, contact, plate) if recorded and plate else None,
     )
-
-
-def _check_contact(section: Section, contact: Contact) -> list[Note]:
-    """Return warnings on a short background.
-
-    Raise InputError if the contact cannot be distinguished from the noise.
-    """
-    time = _between(contact.begin, contact.end)
-    if not time.value > MIN_CONTACT_RATIO * time.uncertainty:
-        refuse(
-            f"{section.name}: the contact cannot be distinguished from the noise: "
-            f"{1e3 * time.value:.3g} ms with a standard uncertainty of "
-            f"{1e3 * time.uncertainty:.2g} ms",
-            f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
-        )
-    return [
-        Note(
-            "short_background", value=1e3 * length, low=1e3 * SHORT_BACKGROUND, unit="ms",
-            others={"side": side},
-        )
-        for side, length in zip(("before", "after"), contact.background_lengths, strict=True)
-        if length < SHORT_BACKGROUND
-    ]  # fmt: skip
-
-
-def _check_bounce(
-    section: Section,
-    contact: Contact,
-    landings: list[tuple[Estimate, Estimate]],
-    conditions: DropConditions,
-) -> tuple[Note, ...]:
-    """Return a warning if the force of a bounce contradicts its flight."""
-    if not (conditions.height and landings):
-        return ()
-    flight = _between(contact.release, landings[0][0]).value
-    bounce = section.bounces[0]
-    peak = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
-    ratio, expected = peak / contact.peak, GRAVITY * flight / (2 * conditions.speed)
-    if ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
-        return ()
-    others = {"ratio": ratio, "height": conditions.height}
-    return (Note("no_bounce", value=1e3 * flight, unit="ms", effect=0.0, others=others),)
 
 
 def _between(start: Estimate, end: Estimate) -> Estimate:
     return Estimate(end.value - start.value, math.hypot(end.uncertainty, start.uncertainty))
 
 
-def _landings(section: Section, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
+def _landings(section: Section, contact: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
     """Return first touch and release of each of the first bounces, s from the start."""
     landings = []
     for bounce in section.bounces[:count]:
@@ -248,57 +258,32 @@ def _landings(section: Section, drop: Contact, count: int) -> list[tuple[Estimat
         minimum = min_background(bounce.sample_rate)
         if first < minimum or len(bounce.force) - stop < minimum:
             break
-        landing = find_contact(bounce, *remove_background(bounce, drop.background))
+        landing = find_contact(bounce, *remove_background(bounce, contact.background))
         delay = (bounce.start - section.start) / section.sample_rate
-        begin, end = (
-            Estimate(delay + edge.value, edge.uncertainty)
-            for edge in (landing.touch, landing.release)
-        )
-        landings.append((begin, end))
+        touch, release = landing.touch, landing.release
+        landings.append((
+            replace(touch, value=delay + touch.value),
+            replace(release, value=delay + release.value),
+        ))  # fmt: skip
     return landings
 
 
-def _impulse(contact: Contact) -> Estimate:
-    """Return the time integral of the force over the gate, N s."""
-    ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
-    variance = contact.covariance_of(ones)[0, 0]
-    return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
-
-
 def _peak(contact: Contact) -> Estimate:
-    """Return the maximum of the force below 1.25 kHz, N, corrected for the bias due to noise.
+    """Return the maximum of the force below 1.25 kHz, N.
 
-    The bias is estimated as the increase of the maximum by additional noise of the same density
-    (bootstrap). The estimate is too low for strong noise, so it is also a standard uncertainty.
+    Noise increases a maximum by about its standard deviation, which is subtracted; the uncertainty
+    has it twice.
     """
-    margin = math.ceil(PEAK_MARGIN * contact.sample_rate)
-    force = np.pad(contact.gated, margin)
-    low = _interpolated(force, contact.sample_rate)
-    index = int(np.argmax(low)) * len(force) // len(low) - margin
-    cell = min(max(index, 0), len(contact.gated) - 1) * len(contact.covariance)
-    cell //= len(contact.gated)
+    rate, margin = contact.sample_rate, math.ceil(PEAK_MARGIN * contact.sample_rate)
+    low = low_pass(np.pad(contact.gated, margin), rate)
+    # The peak may lie between samples.
+    factor = math.ceil(PEAK_RATE / rate)
+    low = resample(low, factor * len(low)) if factor > 1 else low
+    index = int(np.clip(np.argmax(low) // factor - margin, 0, len(contact.gated) - 1))
+    cell = index * len(contact.covariance) // len(contact.gated)
     density = float(contact.background.density(RECORDED_BAND))
-    deviation = math.sqrt(density * contact.sample_rate / 2)
-    # The low-pass is linear: that of noise is added to that of the force.
-    size = NOISE_LENGTH * math.ceil(len(force) / NOISE_LENGTH)
-    noise = deviation * _unit_noise(size, contact.sample_rate)[:, : len(low)]
-    bias = max(float((low + noise).max(axis=1).mean() - low.max()), 0.0)
-    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + bias**2
-    variance += (SAMPLE_ERROR * contact.peak) ** 2
+    noise = math.sqrt(density * min(RECORDED_BAND, rate / 2))
+    variance = 2 * noise**2 + (SAMPLE_ERROR * contact.peak) ** 2
     # The top stays within a step for some time: its error is that of the offset again.
     variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
-    return Estimate(float(low.max()) - bias, math.sqrt(variance))
-
-
-@lru_cache(maxsize=4)
-def _unit_noise(count: int, rate: float) -> NDArray[np.float64]:
-    """Return draws of white noise of unit deviation, interpolated like a force of a length."""
-    draws = np.random.default_rng(0).normal(size=(PEAK_DRAWS, count))
-    return np.array([_interpolated(noise, rate) for noise in draws])
-
-
-def _interpolated(force: NDArray[np.float64], rate: float) -> NDArray[np.float64]:
-    """Return the force below 1.25 kHz at PEAK_RATE or more: the peak may lie between samples."""
-    low = low_pass(force, rate)
-    factor = math.ceil(PEAK_RATE / rate)
-    return np.asarray(resample(low, factor * len(low))) if factor > 1 else low
+    return Estimate(float(low.max()) - noise, math.sqrt(variance))

@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.base.checks import refuse
+from thud.base.immutable import Immutable
 from thud.base.note import Note, about
-from thud.recordings.assumptions import with_assumptions
 from thud.recordings.background import remove_background
 from thud.recordings.checks import copies
 from thud.recordings.config import Config, read_config
@@ -26,7 +26,6 @@ from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
-from thud.recordings.ringing import with_plate
 from thud.recordings.signal import Signal, common_uncertainty
 from thud.recordings.signal_files import open_signals
 
@@ -41,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Stages:
+class Stages(Immutable):
     """One drop after each stage of its measurement.
 
     Attributes
@@ -77,18 +76,14 @@ def measure_stages(section: Section, config: Config, calibration: float | None =
     repaired = repair(section)
     corrected = correct(repaired, config.chain)
     try:
-        force, background = remove_background(corrected)
-        contact = find_contact(corrected, force, background)
+        contact = find_contact(corrected, *remove_background(corrected))
     except np.linalg.LinAlgError as error:
         allowed = "a background of noise, drift and hum"
         refuse(f"{section.name}: the background is not noise", allowed, error)
-    drop = measure_drop(corrected, contact, config.conditions(calibration))
-    drop = with_plate(drop, repaired, config)
-    drop = with_assumptions(drop, config)
+    drop = measure_drop(corrected, contact, config, calibration, repaired)
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(contact, background=replace(contact.background))
-    drop = replace(drop, contact=contact, notes=about(drop.name, drop.notes))
-    return Stages(section, repaired, corrected, drop)
+    return Stages(section, repaired, corrected, replace(drop, contact=contact))
 
 
 def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
@@ -132,6 +127,7 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     origins: list[Origin] = []
     measured: list[tuple[Drop, ...]] = []
     uncertainties: list[float | None] = []
+    stages: Stages | None = None
     count = 0
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
@@ -142,35 +138,37 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
             chosen, left_out = choose(found, count + 1, signal.sample_rate, config)
             count += len(found)
             stated = config.calibration_uncertainty
-            uncertainty = signal.calibration_uncertainty if stated is None else stated
-            uncertainties.append(uncertainty)
-            bar = tqdm(chosen, unit="drop", desc=signal.name, disable=not progress, leave=False)
-            drops = tuple(
-                measure_stages(cut_section(signal, pulse), config, uncertainty).drop
-                for pulse in bar
-            )
-            measured.append(drops)
-            notes = (*_section(signal, config), *ignored, *left_out)
-            origins.append(Origin.of(signal, len(drops), notes))
+            uncertainties.append(signal.calibration_uncertainty if stated is None else stated)
+            drops = []
+            for pulse in tqdm(
+                chosen, unit="drop", desc=signal.name, disable=not progress, leave=False
+            ):
+                shown = measure_stages(cut_section(signal, pulse), config, uncertainties[-1])
+                stages = stages or shown
+                drops.append(shown.drop)
+            measured.append(tuple(drops))
+            notes = [*ignored, *left_out]
+            begin, end = config.begin or 0.0, config.end or math.inf
+            length = signal.n_sample / signal.sample_rate
+            if begin > 0 or end < length:
+                note = Note("section_searched", low=begin, high=min(end, length), unit="s")
+                notes.insert(0, note)
+            origins.append(Origin(
+                signal.name, signal.path, signal.checksum, signal.date, signal.calibration,
+                signal.sample_rate, (*signal.notes, *about(signal.name, notes)), len(drops),
+            ))  # fmt: skip
     if not origins:
         refuse("there are no recordings", "one file or more")
-    drops = tuple(itertools.chain.from_iterable(measured))
-    require_chosen(count, len(drops), config)
+    require_chosen(count, sum(map(len, measured)), config)
     copies.check(origins, measured)
-    name = Path(origins[0].path or origins[0].name).stem
-    return Recording(name, drops, tuple(origins), config, common_uncertainty(uncertainties))
-
-
-def first_stages(paths: Source | Iterable[Source], config: Config) -> Stages:  # noqa: RET503
-    """Return the stages of the first measured drop; the arguments are those of `read_recording`."""
-    count = 0
-    for signal in _open(paths, config):
-        found, _ = find_drops(signal, config.begin or 0.0, config.end or math.inf)
-        chosen, _ = choose(found, count + 1, signal.sample_rate, config)
-        count += len(found)
-        if chosen:
-            return measure_stages(cut_section(signal, chosen[0]), config)
-    refuse("every drop is left out", "at least one drop")
+    return Recording(
+        Path(origins[0].path or origins[0].name).stem,
+        tuple(itertools.chain.from_iterable(measured)),
+        tuple(origins),
+        config,
+        common_uncertainty(uncertainties),
+        stages,
+    )
 
 
 def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
@@ -183,12 +181,3 @@ def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
         else:
             notes = check_peak(*find_peaks(item), item.name)
             yield replace(item, notes=(*item.notes, *notes))
-
-
-def _section(signal: Signal, config: Config) -> tuple[Note, ...]:
-    """Return a note if a section of a signal is searched, not all of it."""
-    length = signal.n_sample / signal.sample_rate
-    begin, end = config.begin or 0.0, min(config.end or math.inf, length)
-    if begin == 0 and end == length:
-        return ()
-    return (Note("section_searched", low=begin, high=end, unit="s"),)

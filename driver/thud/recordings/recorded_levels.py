@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.signal import czt
 
 from thud.base.checks import require_choice
 from thud.base.immutable import Immutable
-from thud.level.estimate import NOISE, RECTANGULAR, Budget, Size
+from thud.level.estimate import NOISE, RECTANGULAR, Contribution, Estimate
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.background import step_errors
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
@@ -20,14 +19,13 @@ from thud.recordings.contact import band_noise
 from thud.recordings.filters import filter_levels
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
     from thud.base.note import Note
-    from thud.level.estimate import Estimate
     from thud.recordings.measured_drop import Drop
 
 METHODS = ("exact", "fft", "filter")
@@ -41,30 +39,33 @@ ENERGY_DECIBEL = 10 / math.log(10)
 PADDING, N_SCALING = 4, 5
 # Contributions that drops share: half widths of rectangular distributions.
 METHOD, OFFSET_STEP = "method", "offset step"
+DIVISORS = {METHOD: RECTANGULAR, OFFSET_STEP: RECTANGULAR}
 
 
 @dataclass(frozen=True, eq=False)
 class DropLevels(Immutable):
-    """Levels of one drop.
+    """Levels of drops.
 
     Attributes
     ----------
-    name, bands, method : str
-        Name of the drop, ``"octave"`` or ``"third"``, and method of measurement.
-    level : ndarray, shape (n_band,)
+    names : tuple of str, shape (n_drop,)
+        Names of the drops.
+    bands, method : str
+        ``"octave"`` or ``"third"``, and method of measurement.
+    level : ndarray, shape (n_drop, n_band)
         Force exposure levels, dB, corrected for the background.
-    measured, background : ndarray, shape (n_band,)
+    measured, background : ndarray, shape (n_drop, n_band)
         Levels before the correction, and levels of the noise within the same gate, dB.
-    flag : ndarray of str, shape (n_band,)
+    flag : ndarray of str, shape (n_drop, n_band)
         ``""``: more than 15 dB above the background; ``"corrected"``: 6 to 15 dB above it;
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
-    contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties, dB: noise, method, offset step, and quantization if the background
-        lies within a step.
+    contributions : dict of ndarray, shape (n_drop, n_band)
+        Standard uncertainties, dB, by noise, method, offset step, and quantization if the
+        background lies within a step.
     """
 
-    name: str
+    names: tuple[str, ...]
     bands: BandSet
     method: str
     level: NDArray[np.float64]
@@ -75,7 +76,7 @@ class DropLevels(Immutable):
 
     @property
     def uncertainty(self) -> NDArray[np.float64]:
-        """Combined standard uncertainty by `contributions`, dB, shape (n_band,)."""
+        """Combined standard uncertainty by `contributions`, dB, shape (n_drop, n_band)."""
         squares = [value**2 for value in self.contributions.values()]
         return np.asarray(np.sqrt(np.sum(squares, axis=0)))
 
@@ -92,47 +93,32 @@ class AverageLevels(Immutable):
 
     Attributes
     ----------
-    bands, method : str
-        As in `DropLevels`.
-    names : tuple of str, shape (n_drop,)
-        Names of the drops.
-    drops : ndarray, shape (n_drop, n_band)
-        Level of each drop, dB.
+    drops : DropLevels
+        Levels of each drop.
     level, background : ndarray, shape (n_band,)
         Level of the mean energy, corrected for the background, and the mean background, dB.
     flag : ndarray of str, shape (n_band,)
         As in `DropLevels`, from the mean energies.
     spread : ndarray, shape (n_band,)
         Standard deviation of the drops' levels, dB; NaN for a single drop.
-    budget : Budget
-        Contributions to the uncertainty of the average, dB.
     estimates : tuple of Estimate, shape (n_band,)
-        The levels with this budget.
+        The levels with their uncertainty budgets.
     outliers : tuple of Note
         Drops that differ from the others.
     """
 
-    bands: BandSet
-    method: str
-    names: tuple[str, ...]
-    drops: NDArray[np.float64]
+    drops: DropLevels
     level: NDArray[np.float64]
     background: NDArray[np.float64]
     flag: NDArray[np.str_]
     spread: NDArray[np.float64]
-    budget: Budget
     estimates: tuple[Estimate, ...]
     outliers: tuple[Note, ...]
-
-    @property
-    def uncertainty(self) -> NDArray[np.float64]:
-        """Combined standard uncertainty of `estimates`, dB, shape (n_band,)."""
-        return np.array([estimate.uncertainty for estimate in self.estimates])
 
 
 def measure_levels(
     drops: Sequence[Drop], bands: BandSet = "octave", method: str = "exact"
-) -> list[DropLevels]:
+) -> DropLevels:
     """Return the levels of drops, corrected for the background, with their uncertainty.
 
     The force is set to zero outside the gate of each drop. ``"exact"`` is its band energy,
@@ -141,126 +127,125 @@ def measure_levels(
     are unknown.
     """
     require_choice("method", method, METHODS)
-    noise = band_noise(drops, get_bands(bands))
-    return [
-        _drop_levels(drop, bands, method, energies)
-        for drop, energies in zip(drops, noise, strict=True)
-    ]
-
-
-def _drop_levels(drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64]) -> DropLevels:
-    """Return the levels of a drop from the energies of its noise, [n_band, 3]."""
-    force, rate = drop.contact.gated, drop.sample_rate
-    exact = _levels(force, rate, bands, "exact")
-    measured = exact if method == "exact" else _levels(force, rate, bands, method)
-    expected, deviation, offset = noise.T
+    # Shape (3, n_drop, n_band).
+    expected, deviation, quantized = np.moveaxis(band_noise(drops, get_bands(bands)), 2, 0)
+    exact = _levels(drops, bands, "exact")
+    measured = exact if method == "exact" else _levels(drops, bands, method)
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(expected)
     level, flag = _corrected(measured, background)
     contributions = {
         NOISE: ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         METHOD: np.abs(measured - exact) / RECTANGULAR,
-        OFFSET_STEP: _step_uncertainty(drop, bands, exact),
+        OFFSET_STEP: np.zeros(level.shape),
     }
-    if offset.any():
-        contributions["quantization"] = ENERGY_DECIBEL * offset / 10 ** (level / 10)
-    return DropLevels(drop.name, bands, method, level, measured, background, flag, contributions)
+    for i, drop in enumerate(drops):
+        if drop.offset_step:
+            contributions[OFFSET_STEP][i] = _step_uncertainty(drop, bands, exact[i])
+    if quantized.any():
+        contributions["quantization"] = ENERGY_DECIBEL * quantized / 10 ** (level / 10)
+    names = tuple(drop.name for drop in drops)
+    return DropLevels(names, bands, method, level, measured, background, flag, contributions)
+
+
+def compare_methods(
+    drops: Sequence[Drop], bands: BandSet = "octave"
+) -> dict[str, NDArray[np.float64]]:
+    """Return the levels of drops by each method, background included, dB, [n_drop, n_band]."""
+    return {method: _levels(drops, bands, method) for method in METHODS}
+
+
+def _levels(drops: Sequence[Drop], bands: BandSet, method: str) -> NDArray[np.float64]:
+    """Return levels by a method, dB, [n_drop, n_band]; NaN if a rate is too low for a band."""
+    contacts = [drop.contact for drop in drops]
+    return np.array([
+        filter_levels(contact.gated, contact.sample_rate, bands) if method == "filter"
+        else force_exposure_levels(
+            contact.gated, contact.sample_rate, bands, "fft" if method == "fft" else "exact"
+        )
+        for contact in contacts
+    ])  # fmt: skip
 
 
 def _step_uncertainty(
     drop: Drop, bands: BandSet, exact: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the standard uncertainty due to a step of the offset during the contact, dB."""
-    if not drop.offset_step:
-        return np.zeros(len(exact))
-    force = drop.contact.gated
+    force, rate = drop.contact.gated, drop.contact.sample_rate
     changed = [
-        _levels(force + error, drop.sample_rate, bands, "exact")
+        force_exposure_levels(force + error, rate, bands)
         for error in step_errors(drop.offset_step, len(force))
     ]
     return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / RECTANGULAR)
 
 
-def compare_methods(drop: Drop, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
-    """Return the levels of a drop by each method, dB, shape (n_band,), background included."""
-    force = drop.contact.gated
-    return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
-
-
 def average_levels(
-    levels: Sequence[DropLevels],
-    shared: Mapping[str, NDArray[np.float64]] | None = None,
-    sizes: Mapping[str, Size] | None = None,
+    drops: DropLevels,
+    shared: Sequence[Sequence[Contribution]] = (),
     not_stated: Sequence[str] = (),
 ) -> AverageLevels:
     """Return the energy average of the levels of drops, its budget, and outliers.
 
-    `shared` are standard uncertainties that all drops share, dB, shape (n_band,), by name, with
-    their `sizes`; `not_stated` are uncertainties that are not stated.
+    `shared` are contributions that all drops share, dB, by band; `not_stated` are uncertainties
+    that are not stated.
     """
-    first, count = levels[0], len(levels)
-    drops = np.array([entry.level for entry in levels])
-    energies = np.array([10 ** (entry.measured / 10) for entry in levels])
+    count, energies = len(drops.names), 10 ** (drops.measured / 10)
     with np.errstate(divide="ignore"):
-        noise = np.mean([10 ** (entry.background / 10) for entry in levels], axis=0)
-        background = 10 * np.log10(noise)
+        background = 10 * np.log10(np.mean(10 ** (drops.background / 10), axis=0))
     level, flag = _corrected(10 * np.log10(energies.mean(axis=0)), background)
-    weights = 10 ** (drops / 10)
+    weights = 10 ** (drops.level / 10)
     weights /= weights.sum(axis=0)
-    none = np.zeros(len(level))
-    weighted = {
-        name: weights * [entry.contributions.get(name, none) for entry in levels]
-        for name in dict.fromkeys(name for entry in levels for name in entry.contributions)
+    noise = np.sqrt(((weights * drops.contributions[NOISE]) ** 2).sum(axis=0))
+    common = {
+        name: (weights * values).sum(axis=0)
+        for name, values in drops.contributions.items()
+        if name != NOISE and values.any()
     }
-    single = np.full(level.shape, np.nan)
-    scatter = energies.std(axis=0, ddof=1) / math.sqrt(count) if count > 1 else single
-    budget = Budget.of_mean(
-        np.sqrt((weighted.pop(NOISE) ** 2).sum(axis=0)),
-        {name: values.sum(axis=0) for name, values in weighted.items()} | dict(shared or {}),
-        scatter * ENERGY_DECIBEL / 10 ** (level / 10),
-        count,
-        {name: Size(divisor=RECTANGULAR) for name in (METHOD, OFFSET_STEP)} | dict(sizes or {}),
-    )
-    return AverageLevels(
-        first.bands, first.method, tuple(entry.name for entry in levels), drops, level, background,
-        flag, drops.std(axis=0, ddof=1) if count > 1 else single, budget,
-        budget.estimates(level, flag == "background", not_stated), _level_outliers(levels, drops),
+    spread = scatter = np.full(level.shape, np.nan)
+    if count > 1:
+        spread = drops.level.std(axis=0, ddof=1)
+        scatter = energies.std(axis=0, ddof=1) / math.sqrt(count)
+        scatter = scatter * ENERGY_DECIBEL / 10 ** (level / 10)
+    estimates = tuple(
+        Estimate.of_mean(
+            float(level[band]), float(noise[band]), float(scatter[band]), count,
+            [
+                Contribution(name, float(values[band]), divisor=DIVISORS.get(name, 1.0))
+                for name, values in common.items()
+            ] + list(shared[band] if shared else ()),
+            upper_bound=flag[band] == "background", not_stated=tuple(not_stated),
+        )
+        for band in range(len(level))
     )  # fmt: skip
+    # At 5 % for all bands together (Bonferroni).
+    nominal = get_bands(drops.bands).nominal
+    outliers = tuple(
+        outlier
+        for middle, levels, own in zip(
+            nominal, drops.level.T, drops.contributions[NOISE].T, strict=True
+        )
+        for outlier in find_outliers(
+            levels, drops.names, f"level at {middle:g} Hz, dB,", own, SIGNIFICANCE / len(nominal)
+        )
+    )
+    return AverageLevels(drops, level, background, flag, spread, estimates, outliers)
 
 
-def mean_force(drops: Sequence[Drop], level: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a force with the mean energy of drops and the phase of the first, N, shape (n,).
+def mean_force(drop: Drop, level: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the force of a drop, scaled to a level in each one-third-octave band, N, shape (n,).
 
-    In each one-third-octave band it has the given level, dB, shape (n_band,); a NaN changes
-    nothing. The sample rate is that of the first drop.
+    The levels are in dB, shape (n_band,); a NaN changes nothing.
     """
-    rate, bands = drops[0].sample_rate, get_bands("third")
-    forces = [drop.contact.gated for drop in drops]
-    count = next_fast_len(PADDING * max(map(len, forces)), real=True)
+    force, rate, bands = drop.contact.gated, drop.sample_rate, get_bands("third")
+    count = next_fast_len(PADDING * len(force), real=True)
     frequency = np.fft.rfftfreq(count, 1 / rate)
-    spectra = [
-        czt(force, len(frequency), np.exp(-2j * np.pi * frequency[1] / drop.sample_rate))
-        / drop.sample_rate
-        * (frequency < drop.sample_rate / 2)
-        for force, drop in zip(forces, drops, strict=True)
-    ]
-    size = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=0))
-    spectrum = rate * size * np.exp(1j * np.angle(spectra[0]))
     below, band = frequency < bands.upper[-1], np.searchsorted(bands.upper, frequency)
+    spectrum = np.fft.rfft(force, count)
     for _ in range(N_SCALING):
-        force = np.fft.irfft(spectrum, count)
         gain = np.nan_to_num(level - force_exposure_levels(force, rate, "third"))
         spectrum[below] *= 10 ** (gain[band[below]] / 20)
-    return np.asarray(np.fft.irfft(spectrum, count))
-
-
-def _levels(
-    force: NDArray[np.float64], rate: float, bands: BandSet, method: str
-) -> NDArray[np.float64]:
-    """Return levels by a method, dB; NaN if the rate is too low for the band."""
-    if method == "filter":
-        return filter_levels(force, rate, bands)
-    return force_exposure_levels(force, rate, bands, "fft" if method == "fft" else "exact")
+        force = np.fft.irfft(spectrum, count)
+    return np.asarray(force)
 
 
 def _corrected(
@@ -276,20 +261,3 @@ def _corrected(
     level = measured + 10 * np.log10(1 - 10 ** (-np.maximum(above, low) / 10))
     flag = np.where(above < low, "background", np.where(above <= high, "corrected", ""))
     return level, np.where(np.isnan(measured), "rate", flag)
-
-
-def _level_outliers(
-    estimates: Sequence[DropLevels], drops: NDArray[np.float64]
-) -> tuple[Note, ...]:
-    """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
-    nominal = get_bands(estimates[0].bands).nominal
-    names = [e.name for e in estimates]
-    noise = np.array([e.contributions[NOISE] for e in estimates])
-    return tuple(
-        outlier
-        for band, middle in enumerate(nominal)
-        for outlier in find_outliers(
-            drops[:, band], names, f"level at {middle:g} Hz, dB,", noise[:, band],
-            SIGNIFICANCE / len(nominal),
-        )
-    )  # fmt: skip

@@ -11,24 +11,18 @@ import numpy as np
 
 from thud.base.checks import require_whole
 from thud.base.extras import data_frame, require_extra
-from thud.base.note import Note, about
+from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
 from thud.level.drop_force import DropForce, ImpactOrRecording
-from thud.recordings.assumptions import check_assumptions, instrument_contributions
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
+from thud.recordings.instruments import check_assumptions, instrument_contributions
 from thud.recordings.measured_drop import ESTIMATES
-from thud.recordings.recorded_levels import (
-    average_levels,
-    compare_methods,
-    mean_force,
-    measure_levels,
-)
+from thud.recordings.recorded_levels import average_levels, mean_force, measure_levels
+from thud.recordings.restitution import GRAVITY
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
@@ -39,8 +33,8 @@ if TYPE_CHECKING:
     from thud.level.assessment import Verdict
     from thud.level.estimate import Estimate
     from thud.recordings.measured_drop import Drop
+    from thud.recordings.read_recording import Stages
     from thud.recordings.recorded_levels import AverageLevels
-    from thud.recordings.signal import Signal
 
 
 @dataclass(frozen=True)
@@ -58,20 +52,6 @@ class Origin:
     sample_rate: float
     notes: tuple[Note, ...]
     drops: int
-
-    @classmethod
-    def of(cls, signal: Signal, drops: int, notes: Iterable[Note]) -> Origin:
-        """Return the origin of a number of drops of a signal, with notes on others."""
-        return cls(
-            signal.name,
-            signal.path,
-            signal.checksum,
-            signal.date,
-            signal.calibration,
-            signal.sample_rate,
-            (*signal.notes, *about(signal.name, notes)),
-            drops,
-        )
 
 
 # Uncertainties of levels that a laboratory may not have stated.
@@ -97,6 +77,8 @@ class Recording(ImpactOrRecording):
         What the laboratory states; mass, kg, and height, m, may be None.
     calibration_uncertainty : float or None
         Relative standard uncertainty of the force; None if unknown.
+    stages : Stages or None
+        First drop after each stage of its measurement; None if the drops were not read from files.
     """
 
     # Of every `ImpactResult`: a recording has only the force on the floor, and no floor or room.
@@ -113,6 +95,7 @@ class Recording(ImpactOrRecording):
     origins: tuple[Origin, ...]
     config: Config = field(default_factory=Config)
     calibration_uncertainty: float | None = None
+    stages: Stages | None = field(default=None, repr=False, compare=False)
     _averages: dict[tuple[str, str], AverageLevels] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -156,7 +139,7 @@ class Recording(ImpactOrRecording):
     @property
     def impact_velocity(self) -> float:
         """Velocity at first touch from the stated drop height, m/s; NaN if none is stated."""
-        return self.config.conditions(None).speed
+        return math.sqrt(2 * GRAVITY * self.config.height) if self.config.height else math.nan
 
     @property
     def contact_time(self) -> float:
@@ -199,12 +182,12 @@ class Recording(ImpactOrRecording):
         if 0 < len(known) < len(self.drops):
             note = Note("restitution_partly_known", effect=0.0)
             notes.append(replace(note, value=len(known), high=len(self.drops)))
-        notes += check_restitution(self.drops, config.conditions(self.calibration_uncertainty))
+        notes += check_restitution(self.drops, config, self.calibration_uncertainty)
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             notes.append(Note("effective_mass", effect=0.0))
         notes += (check.note for check in config.plate_checks if check.met is False)
         notes += config.check_dates(origin.date for origin in self.origins)
-        notes += check_assumptions(self.drops, config, self.average().budget)
+        notes += check_assumptions(self.drops, config, self.level_estimates())
         if self.not_stated:
             names = {"names": ", ".join(self.not_stated)}
             notes.append(Note("uncertainty_not_stated", effect=0.0, others=names))
@@ -237,10 +220,9 @@ class Recording(ImpactOrRecording):
     def mean_force(self) -> NDArray[np.float64]:
         """Return the force whose one-third-octave levels are those of the recording, N, shape (n,).
 
-        It has the mean energy of the drops within their gates without that of the noise, and the
-        phase of the first drop.
+        It is that of the first drop within its gate, scaled in each band.
         """
-        return mean_force(self.drops, self.average("third").level)
+        return mean_force(self.drops[0], self.average("third").level)
 
     def peak(self, _: LevelsForce | None = None) -> float:
         """Return the mean maximum force, N."""
@@ -253,11 +235,11 @@ class Recording(ImpactOrRecording):
         """
         if (bands, method) not in self._averages:
             levels = measure_levels(self.drops, bands, method)
-            shared, sizes = instrument_contributions(
+            shared = instrument_contributions(
                 self.drops, self.config, self.calibration_uncertainty, bands
             )
             lacking = [name for name in self.not_stated if name in LEVEL_CAUSES]
-            self._averages[bands, method] = average_levels(levels, shared, sizes, lacking)
+            self._averages[bands, method] = average_levels(levels, shared, lacking)
         return self._averages[bands, method]
 
     def levels(
@@ -268,14 +250,6 @@ class Recording(ImpactOrRecording):
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
         return self.average(bands, method or self.level_method).level.copy()
-
-    def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
-        """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
-        levels = [compare_methods(drop, bands) for drop in self.drops]
-        return {
-            method: np.max([np.abs(entry[method] - entry["exact"]) for entry in levels], axis=0)
-            for method in levels[0]
-        }
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
@@ -352,8 +326,8 @@ class Recording(ImpactOrRecording):
             checksum=origin.checksum,
             date=origin.date,
             notes=(
-                *(str(note) for note in measured.notes if not note.is_warning),
-                str(Note("noise_remains", value=measured.noise, unit="N")),
+                *(note for note in measured.notes if not note.is_warning),
+                Note("noise_remains", value=measured.noise, unit="N"),
             ),
         )
 

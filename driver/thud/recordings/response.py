@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.drops import Section
-    from thud.recordings.plate import Plate
-    from thud.recordings.recorder_filter import RecorderFilter
+    from thud.recordings.instruments import Plate, RecorderFilter
 
 # Minimum response by which a spectrum is divided.
 MIN_RESPONSE = 0.05

@@ -1,23 +1,31 @@
-"""Restitution and effective mass by impulse and by bounces (docs/recordings_theory.md, 5)."""
+"""Restitution and effective mass by impulse and by bounces (docs/recordings_theory.md, 5).
+
+The impulse needs the mass and a calibrated force, but no bounce in the record; the bounces need
+neither. Where both are known, their difference shows a wrong mass, height or calibration.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from thud.base._schema import Drop
-from thud.base.note import Note
-from thud.level.estimate import RECTANGULAR, Estimate, Size
+from thud.level.estimate import RECTANGULAR, Contribution, Estimate
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
+
+    from thud.recordings.config import Config
 
     Values = Mapping[str, float]
 
 # Gravity, m/s2, the default of the models.
 GRAVITY = Drop.gravity
 IMPULSE, BOUNCES, RESTITUTION, MASS = "impulse", "bounces", "restitution", "effective_mass"
+# Restitution by the impulse minus that by the bounces.
+DIFFERENCE = "difference"
 # Maximum error of the measured release, s, and maximum height by
 # which the center of a ball is lower or higher at the release than at first touch, m: finite
 # elements, modal ball and shell have up to 0.5 ms, and -2 to 4 mm.
@@ -25,149 +33,101 @@ SLOW_RELEASE = 5e-4
 DEFORMATION = 4e-3
 
 
-class Rebound(NamedTuple):
-    """How a ball returns after a contact.
+def shared_causes(config: Config, calibration: float | None) -> dict[str, Contribution]:
+    """Return what is uncertain in all drops alike, in its own unit, by name.
 
-    `restitutions` is the restitution by each method that can be applied, `restitution` their mean,
-    and `mass` the effective mass, kg, with uncertainties by the noise of the drop. `shared` is the
-    change of each of them, by name, by one standard uncertainty of what all drops share.
+    `calibration` is the relative standard uncertainty of the force. One that is not stated is zero.
     """
+    causes = (
+        ("calibration", calibration or 0.0, "", 1.0),
+        ("mass", config.mass_uncertainty or 0.0, "kg", 1.0),
+        ("drop height", config.height_uncertainty or 0.0, "m", 1.0),
+        ("slow release", SLOW_RELEASE, "s", RECTANGULAR),
+        ("deformed ball", DEFORMATION, "m", RECTANGULAR),
+    )
+    return {
+        name: Contribution(name, size / divisor, size=size, unit=unit, divisor=divisor)
+        for name, size, unit, divisor in causes
+    }
 
-    restitutions: dict[str, Estimate]
-    restitution: Estimate
-    mass: Estimate
-    shared: dict[str, dict[str, float]]
-    notes: tuple[Note, ...] = ()
 
+def measure_rebound(  # noqa: PLR0913, PLR0917 - what is measured, and what is stated
+    impulse: Estimate,
+    duration: Estimate,
+    flight: Estimate | None,
+    config: Config,
+    calibration: float | None = None,
+    quantization: float = 0.0,
+) -> tuple[dict[str, Estimate], dict[str, dict[str, float]]]:
+    """Return how a ball returns after a contact, as far as mass, height and flight allow.
 
-@dataclass(frozen=True)
-class DropConditions:
-    """Drop height and mass, with the standard uncertainties that all drops share.
+    These are the restitution by `IMPULSE` and by `BOUNCES`, their mean `RESTITUTION`, weighted by
+    inverse variances, their `DIFFERENCE`, and the effective `MASS`, kg. Their uncertainties are
+    those by the noise of the drop; also returned are the changes of each by one standard
+    uncertainty of what all drops share (`shared_causes`, and quantization).
 
-    Attributes
-    ----------
-    height, mass : float or None
-        Drop height of the lowest point, m, and mass, kg; None if unknown.
-    calibration_uncertainty, mass_uncertainty, height_uncertainty : float
-        Standard uncertainties of force (relative), mass, kg, and drop height, m.
+    The impulse is in N s; the duration of the contact, and the flight, s, are those between first
+    touch and release. `quantization` is the standard uncertainty of the impulse by quantization of
+    the background, N s. Uncertainties are propagated linearly (JCGM 100, 5.1.2), with slopes by
+    central differences.
     """
-
-    height: float | None = None
-    mass: float | None = None
-    calibration_uncertainty: float = 0.0
-    mass_uncertainty: float = 0.0
-    height_uncertainty: float = 0.0
-
-    @property
-    def speed(self) -> float:
-        """Velocity at first touch, m/s; NaN if the drop height is unknown."""
-        return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
-
-    @property
-    def sizes(self) -> dict[str, Size]:
-        """Standard uncertainties, or half widths of rectangular distributions, by contribution."""
-        return {
-            "calibration": Size(self.calibration_uncertainty),
-            "mass": Size(self.mass_uncertainty, "kg"),
-            "drop height": Size(self.height_uncertainty, "m"),
-            "slow release": Size(SLOW_RELEASE, "s", RECTANGULAR),
-            "deformed ball": Size(DEFORMATION, "m", RECTANGULAR),
+    noise = {"impulse": impulse, "duration": duration}
+    functions = {IMPULSE: _by_impulse} if config.height and config.mass else {}
+    if flight:
+        noise["flight"] = flight
+        functions |= {BOUNCES: _by_flight, MASS: _effective_mass} if config.height else {}
+    steps = {name: c.uncertainty for name, c in shared_causes(config, calibration).items()}
+    steps["quantization"] = quantization
+    steps |= {name: estimate.uncertainty for name, estimate in noise.items()}
+    inputs = dict.fromkeys(steps, 0.0) | {name: e.value for name, e in noise.items()}
+    inputs |= {"mass": config.mass or math.nan, "drop height": config.height or math.nan}
+    values, effects = {}, {}
+    for name, function in functions.items():
+        values[name] = function(inputs)
+        effects[name] = {
+            cause: function({**inputs, cause: inputs[cause] + step / 2})
+            - function({**inputs, cause: inputs[cause] - step / 2})
+            for cause, step in steps.items()
         }
-
-    def rebound(
-        self,
-        impulse: Estimate,
-        duration: Estimate,
-        flights: Sequence[Estimate],
-        quantization: float = 0.0,
-    ) -> Rebound:
-        """Return restitution and effective mass, as far as mass, height and flights allow.
-
-        The impulse is in N s; the duration of the contact, and the flights, s, are those between
-        first touch and release. `quantization` is the standard uncertainty of the impulse by
-        quantization of the background, N s. Uncertainties are propagated linearly (JCGM 100,
-        5.1.2), with slopes by central differences.
-        """
-        noise = {"impulse": impulse, "duration": duration}
-        if flights:
-            noise["flight"] = flights[0]
-        functions = {IMPULSE: _by_impulse} if self.height and self.mass else {}
-        if self.height and flights:
-            functions |= {BOUNCES: _by_flight, MASS: _effective_mass}
-        values = {"mass": self.mass or math.nan, "drop height": self.height or math.nan}
-        shifts = {name: size.size / size.divisor for name, size in self.sizes.items()}
-        shifts["quantization"] = quantization
-        values = dict.fromkeys(shifts, 0.0) | values | {k: e.value for k, e in noise.items()}
-        shifts |= {name: estimate.uncertainty for name, estimate in noise.items()}
-        estimates: dict[str, Estimate] = {}
-        shared: dict[str, dict[str, float]] = {}
-        for name, function in functions.items():
-            effects = {
-                key: function({**values, key: values[key] + size / 2})
-                - function({**values, key: values[key] - size / 2})
-                for key, size in shifts.items()
-            }
-            uncertainty = math.hypot(*(effects.pop(key) for key in noise))
-            estimates[name] = Estimate(function(values), uncertainty)
-            shared[name] = {key: effect for key, effect in effects.items() if effect}
-        mass = estimates.pop(MASS, Estimate.unknown())
-        restitution, shared[RESTITUTION] = _weighted_mean(estimates, shared)
-        if self.height or len(flights) < 2:  # noqa: PLR2004 - the ratio of two
-            return Rebound(estimates, restitution, mass, shared)
-        ratio = flights[1].value / flights[0].value
-        note = Note("restitution_second", value=ratio, effect=0.0)
-        return Rebound(estimates, restitution, mass, shared, (note,))
-
-
-def _speed(values: Values) -> float:
-    return math.sqrt(2 * GRAVITY * values["drop height"])
-
-
-def _momentum(values: Values) -> float:
-    return values["impulse"] * (1 + values["calibration"]) + values["quantization"]
+    methods = [method for method in (IMPULSE, BOUNCES) if method in values]
+    weights = np.array([1 / max(math.hypot(*effects[m].values()), 1e-12) ** 2 for m in methods])
+    combined = {RESTITUTION: weights / weights.sum()} if methods else {}
+    if len(methods) == 2:  # noqa: PLR2004 - both
+        combined[DIFFERENCE] = np.array([1, -1])
+    for name, factors in combined.items():
+        values[name] = float(factors @ [values[method] for method in methods])
+        effects[name] = {
+            cause: float(factors @ [effects[method][cause] for method in methods])
+            for cause in steps
+        }
+    estimates = {
+        name: Estimate(value, math.hypot(*(effects[name][cause] for cause in noise)))
+        for name, value in values.items()
+    }
+    shared = {
+        name: {cause: effect for cause, effect in row.items() if effect and cause not in noise}
+        for name, row in effects.items()
+    }
+    return estimates, shared
 
 
 def _by_impulse(values: Values) -> float:
     """Return (J - m g t)/(m v) - 1; a slow release makes the measured duration t too long."""
+    speed = math.sqrt(2 * GRAVITY * values["drop height"])
+    momentum = values["impulse"] * (1 + values["calibration"]) + values["quantization"]
     duration = values["duration"] - values["slow release"]
-    return (
-        _momentum(values) / values["mass"] / _speed(values)
-        - 1
-        - (GRAVITY * duration / _speed(values))
-    )
+    return momentum / values["mass"] / speed - 1 - (GRAVITY * duration / speed)
 
 
 def _by_flight(values: Values) -> float:
     """Return e = g T/(2 v); a flight from a height d lasts 2 e v/g + d/(e v)."""
     rise = GRAVITY * values["flight"] / 2
-    return (rise + GRAVITY * values["deformed ball"] / (2 * rise)) / _speed(values)
+    speed = math.sqrt(2 * GRAVITY * values["drop height"])
+    return (rise + GRAVITY * values["deformed ball"] / (2 * rise)) / speed
 
 
 def _effective_mass(values: Values) -> float:
     """Return J/(v + g T/2 + g t), kg."""
+    momentum = values["impulse"] * (1 + values["calibration"]) + values["quantization"]
     rise = GRAVITY * (values["flight"] / 2 + values["duration"])
-    return _momentum(values) / (_speed(values) + rise)
-
-
-def _weighted_mean(
-    estimates: Mapping[str, Estimate], shared: Mapping[str, Mapping[str, float]]
-) -> tuple[Estimate, dict[str, float]]:
-    """Return the mean over the methods, and the shared effects on it.
-
-    The weights are the inverse variances, shared effects included.
-    """
-    if not estimates:
-        return Estimate.unknown(), {}
-    weights = {
-        name: 1 / (max(e.uncertainty, 1e-12) ** 2 + sum(u**2 for u in shared[name].values()))
-        for name, e in estimates.items()
-    }
-    total = sum(weights.values())
-    weights = {name: weight / total for name, weight in weights.items()}
-    value = sum(weights[name] * estimate.value for name, estimate in estimates.items())
-    uncertainty = math.hypot(*(weights[name] * e.uncertainty for name, e in estimates.items()))
-    combined: dict[str, float] = {}
-    for name, weight in weights.items():
-        for cause, effect in shared[name].items():
-            combined[cause] = combined.get(cause, 0.0) + weight * effect
-    return Estimate(value, uncertainty), combined
+    return momentum / (math.sqrt(2 * GRAVITY * values["drop height"]) + rise)

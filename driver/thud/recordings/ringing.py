@@ -10,17 +10,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from thud.base.note import Note
-from thud.level.estimate import RECTANGULAR
 from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, resonance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.config import Config
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
-    from thud.recordings.measured_drop import Drop
-    from thud.recordings.plate import Plate
+    from thud.recordings.instruments import Plate
     from thud.recordings.response import Chain
 
 # Trial decay times of a ringing to 1/e, s.
@@ -156,22 +153,3 @@ def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | No
     excess = np.abs(np.log(near / np.sqrt(low * high)))
     difference = float(excess[0] - excess[1])
     return None if abs(difference) < CLEAR else difference > 0
-
-
-def with_plate(drop: Drop, recorded: Section, config: Config) -> Drop:
-    """Return a drop with the ringing of the plate, and whether its resonance is in the record.
-
-    `recorded` is the section before the correction of the plate.
-    """
-    ringing, plate = find_ringing(drop.contact, config.chain), config.resonance
-    contact_time = drop.contact_time
-    if ringing and not ringing.corrected:
-        # A resonance spreads an edge over a quarter of its period.
-        contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
-    return replace(
-        drop,
-        contact_time=contact_time,
-        ringing=ringing,
-        plate_recorded=None if plate is None else is_in_record(recorded, drop.contact, plate),
-        notes=(*drop.notes, ringing.note) if ringing else drop.notes,
-    )

@@ -14,6 +14,7 @@ from thud.level.estimate import CONFIDENCE, NOISE, REPEATABILITY
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.config import Instrument
 from thud.recordings.measured_drop import ESTIMATES
+from thud.recordings.recorded_levels import compare_methods
 from thud.recordings.times import read_date
 from thud.report.notes import sentences
 from thud.report.rows import SCATTER
@@ -59,6 +60,7 @@ def report_data(recording: Recording) -> dict[str, Any]:
     Values are in SI units; uncertainties are standard uncertainties unless named expanded.
     """
     config, verdict = recording.config, recording.assess()
+    methods = compare_methods(recording.drops)
     data: dict[str, Any] = {
         "format": FORMAT,
         "thud": version(),
@@ -88,7 +90,8 @@ def report_data(recording: Recording) -> dict[str, Any]:
         "criteria": criteria_data(recording),
         "levels": {bands: _levels(recording, bands) for bands in BANDWIDTHS},
         "method_differences": {
-            method: values.tolist() for method, values in recording.agreement().items()
+            method: np.abs(values - methods["exact"]).max(axis=0).tolist()
+            for method, values in methods.items()
         },
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [
@@ -208,7 +211,7 @@ def _without_outliers(recording: Recording) -> dict[str, Any] | None:
     if not names or not kept:
         return None
     drops = [recording.drops[i] for i in kept]
-    energies = 10 ** (recording.average().drops[kept] / 10)
+    energies = 10 ** (recording.average().drops.level[kept] / 10)
     means = {
         name: [getattr(drop, name).value for drop in drops]
         for name in ("contact_time", "restitution", "peak_force")
@@ -223,14 +226,15 @@ def _without_outliers(recording: Recording) -> dict[str, Any] | None:
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     average = recording.average(bands)
-    columns = ("background", "spread", "flag", "drops")
+    columns = ("background", "spread", "flag")
     return {
         "band": get_bands(bands).nominal.tolist(),
-        "method": average.method,
+        "method": average.drops.method,
         "level": average.level.tolist(),
-        "uncertainty": average.uncertainty.tolist(),
+        "uncertainty": [estimate.uncertainty for estimate in average.estimates],
         "expanded_uncertainty": [estimate.expanded for estimate in average.estimates],
         **{name: getattr(average, name).tolist() for name in columns},
+        "drops": average.drops.level.tolist(),
     }
 
 

@@ -42,7 +42,7 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
     The number after ± is the standard uncertainty due to the noise of the drop.
     """
     nominal = get_bands().nominal
-    levels = recording.average().drops
+    levels = recording.average().drops.level
     methods = dict.fromkeys(method for drop in recording.drops for method in drop.restitutions)
     restitutions = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
     head = ("drop", "at, s", "contact, ms (± u)", *restitutions, "peak, N")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from thud.base.tables import Result
 from thud.level.assessment import criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR
-from thud.recordings.assumptions import AMPLITUDE_DECIBEL
+from thud.recordings.instruments import AMPLITUDE_DECIBEL
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
