@@ -18,7 +18,7 @@ from thud.recordings.instruments import (
     Plate,
     RecorderFilter,
     instrument_contributions,
-    level_changes,
+    mean_level_changes,
 )
 from thud.recordings.response import Chain
 from thud.recordings.signal import Signal
@@ -170,7 +170,7 @@ def test_unstated_filter_is_assumed_by_the_rate() -> None:
     assert "filter_assumed" in codes(recording.notes)
     # A quarter of the rate.
     assumed = RecorderFilter("bessel", 4, RATE / 19 / 4)
-    effect = level_changes(recording.drops, {"filter": assumed.response})["filter"]
+    effect = mean_level_changes(recording.drops, {"filter": assumed.response})["filter"]
     found = contributions(recording)["recorder filter, assumed"]
     np.testing.assert_allclose(found, -effect / math.sqrt(3))
     assert 0.3 < -effect[-1] < 2
@@ -222,7 +222,7 @@ def test_other_backgrounds_are_no_step(kind: str) -> None:
 
 
 def test_gain_of_two_is_six_decibels_in_every_band() -> None:
-    change = level_changes([make_drop(1.0)], {"two": lambda f: np.full(len(f), 2.0)}, "third")
+    change = mean_level_changes([make_drop(1.0)], {"two": lambda f: np.full(len(f), 2.0)}, "third")
     np.testing.assert_allclose(change["two"], 20 * math.log10(2))
 
 

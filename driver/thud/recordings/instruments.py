@@ -280,7 +280,7 @@ def instrument_contributions(
     size, divisor = {"calibration": calibration or 0.0}, dict.fromkeys(ASSUMED, RECTANGULAR)
     count = len(get_bands(bands).nominal)
     changes = {"calibration": np.full(count, AMPLITUDE_DECIBEL * size["calibration"])}
-    changes |= level_changes(drops, _gains(drops, config), bands)
+    changes |= mean_level_changes(drops, _gains(drops, config), bands)
     return [
         [
             Contribution(
@@ -294,7 +294,7 @@ def instrument_contributions(
     ]  # fmt: skip
 
 
-def level_changes(
+def mean_level_changes(
     drops: Sequence[Drop], gains: Mapping[str, Gain], bands: BandSet = "octave"
 ) -> dict[str, NDArray[np.float64]]:
     """Return the changes of the mean level of drops by gains of the force, dB, shape (n_band,)."""
@@ -395,7 +395,7 @@ def check_assumptions(
     if limit is not None and limit < FLAT[1]:
         notes.append(Note("plate_not_flat", value=limit, low=FLAT[1], unit="Hz"))
     if plate is not None and seen == {None}:
-        changes = level_changes(drops, {"plate": plate.response})["plate"]
+        changes = mean_level_changes(drops, {"plate": plate.response})["plate"]
         change, others = float(np.nanmax(np.abs(changes))), {"frequency": plate.f0}
         if change > MIN_WARNED:
             notes.append(
