@@ -7,7 +7,7 @@ module thud_run
    use thud_constants, only: version
    use thud_error, only: error_type, prefix_error
    use thud_note, only: get_sentence
-   use thud_record_files, only: get_history_csv, get_namelist, get_table_csv
+   use thud_record_files, only: get_csv, get_namelist
    use thud_records, only: add_results
    use thud_result_directory, only: add_text, check_target, close_results, open_results, result_directory_type
    use thud_screen_tables, only: get_screen_tables
@@ -21,11 +21,11 @@ module thud_run
    !> Maximum length of a warning.
    integer, parameter :: message_length = 1200
 
-   !> Groups of results that are files: tables, and histories with all digits.
-   character(len=*), parameter :: tables(*) = [character(len=12) :: 'modes', 'levels', 'floor_levels', 'room_levels', &
-      'room_octaves']
-   character(len=*), parameter :: histories(*) = [character(len=21) :: 'force', 'snapshots', 'floor_force', &
-      'floor_snapshots', 'compression', 'model_histories', 'floor_model_histories']
+   !> Groups of results that are files: tables, then histories with all digits.
+   integer, parameter :: table_count = 5
+   character(len=*), parameter :: files(*) = [character(len=21) :: 'modes', 'levels', 'floor_levels', 'room_levels', &
+      'room_octaves', 'force', 'snapshots', 'floor_force', 'floor_snapshots', 'compression', 'model_histories', &
+      'floor_model_histories']
 
    !> Groups of results in `summary.nml`.
    character(len=*), parameter :: summary_groups(*) = [character(len=22) :: 'summary', 'model_quantities', 'warnings', &
@@ -122,14 +122,10 @@ contains
       ! The input with all defaults filled in.
       call get_case_text(case, text)
       call add_text(directory, 'effective.nml', text, error)
-      do i = 1, size(tables)
-         call get_table_csv(records, tables(i), text)
-         if (text /= '') call add_text(directory, trim(tables(i))//'.csv', text, error)
-      end do
-      do i = 1, size(histories)
-         if (index(histories(i), 'model') > 0 .and. .not. write_all) cycle
-         call get_history_csv(records, histories(i), text)
-         if (text /= '') call add_text(directory, trim(histories(i))//'.csv', text, error)
+      do i = 1, size(files)
+         if (index(files(i), 'model') > 0 .and. .not. write_all) cycle
+         call get_csv(records, files(i), i > table_count, text)
+         if (text /= '') call add_text(directory, trim(files(i))//'.csv', text, error)
       end do
       if (.not. case%has_impact) return
       summary = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline

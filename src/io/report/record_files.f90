@@ -8,7 +8,7 @@ module thud_record_files
    implicit none (type, external)
    private
 
-   public :: get_history_csv, get_namelist, get_table_csv
+   public :: get_csv, get_namelist
 
    !> Maximum length of a text in a list, such as a warning.
    integer, parameter :: cell_length = 256
@@ -21,45 +21,12 @@ module thud_record_files
 
 contains
 
-   !> A group of histories, the first column their times, with all digits.
-   subroutine get_history_csv(bundle, group, text)
+   !> A group as a table with as many digits as its numbers need, and empty cells for unknown ones; or, of histories, the
+   !> first column their times, with all digits.
+   subroutine get_csv(bundle, group, all_digits, text)
       type(bundle_type), intent(in) :: bundle
       character(len=*), intent(in) :: group
-      !> The table with a header; empty if the results have no such group.
-      character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: cells, row
-      real(wp), allocatable :: columns(:, :)
-      integer, allocatable :: members(:)
-      logical :: at_rest
-      integer :: i, at
-
-      call find_group(bundle, group, members, text)
-      if (text == '') return
-      at = len(text)
-      allocate (columns(size(bundle%records(members(1))%values), size(members)))
-      do i = 1, size(members)
-         columns(:, i) = bundle%records(members(i))%values(:, 1, 1)
-      end do
-      allocate (character(len=width*(size(members) - 1)) :: cells)
-      allocate (character(len=width*size(members)) :: row)
-      text = text//repeat(' ', size(columns, 1)*len(row))
-      at_rest = .false.
-      do i = 1, size(columns, 1)
-         ! Formatting takes most of a run's time; the zeros after the release are formatted once.
-         if (.not. at_rest .or. any(abs(columns(i, 2:)) > 0.0_wp)) write (cells, row_form) columns(i, 2:)
-         at_rest = .not. any(abs(columns(i, 2:)) > 0.0_wp)
-         write (row, row_form) columns(i, 1)
-         row(width:) = ','//cells
-         row(len(row):) = newline
-         text(at + 1:at + len(row)) = row
-         at = at + len(row)
-      end do
-   end subroutine get_history_csv
-
-   !> A group as a table with as many digits as its numbers need; the cells of unknown numbers are empty.
-   subroutine get_table_csv(bundle, group, text)
-      type(bundle_type), intent(in) :: bundle
-      character(len=*), intent(in) :: group
+      logical, intent(in) :: all_digits
       !> The table with a header; empty if the results have no such group.
       character(len=:), allocatable, intent(out) :: text
       type(text_buffer_type) :: buffer
@@ -70,18 +37,46 @@ contains
       call find_group(bundle, group, members, text)
       if (text == '') return
       call buffer%append(text)
-      do j = 1, size(members)
-         call get_cells(bundle%records(members(j)), column)
-         if (j == 1) allocate (cells(size(column), size(members)))
-         cells(:, j) = column
-      end do
-      do i = 1, size(cells, 1)
+      if (all_digits) then
+         call append_numbers(bundle, members, buffer)
+      else
          do j = 1, size(members)
-            call buffer%append(trim(cells(i, j))//merge(newline, ',', j == size(members)))
+            call get_cells(bundle%records(members(j)), column)
+            if (j == 1) allocate (cells(size(column), size(members)))
+            cells(:, j) = column
          end do
-      end do
+         do i = 1, size(cells, 1)
+            do j = 1, size(members)
+               call buffer%append(trim(cells(i, j))//merge(newline, ',', j == size(members)))
+            end do
+         end do
+      end if
       text = buffer%get_text()
-   end subroutine get_table_csv
+   end subroutine get_csv
+
+   !> Appends rows of numbers with all digits.
+   subroutine append_numbers(bundle, members, buffer)
+      type(bundle_type), intent(in) :: bundle
+      !> Indices of the columns: [n_column].
+      integer, intent(in) :: members(:)
+      type(text_buffer_type), intent(inout) :: buffer
+      character(len=width*size(members)) :: row
+      real(wp) :: values(size(members))
+      logical :: at_rest
+      integer :: i, j
+
+      at_rest = .false.
+      do i = 1, size(bundle%records(members(1))%values)
+         values = [(bundle%records(members(j))%values(i, 1, 1), j=1, size(members))]
+         ! Formatting takes most of a run's time; the zeros after the release are formatted once.
+         if (.not. at_rest .or. any(abs(values(2:)) > 0.0_wp)) write (row(width + 1:), row_form) values(2:)
+         at_rest = .not. any(abs(values(2:)) > 0.0_wp)
+         write (row(:width), row_form) values(1)
+         row(width:width) = ','
+         row(len(row):) = newline
+         call buffer%append(row)
+      end do
+   end subroutine append_numbers
 
    !> A group as a namelist group behind an empty line, without unknown numbers.
    subroutine get_namelist(bundle, group, text)
