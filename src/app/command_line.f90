@@ -12,10 +12,9 @@ module thud_command_line
    use thud_run, only: outcome_type, run_case, run_options_type
    use thud_samples_run, only: run_samples
    use thud_schema, only: get_schema
-   use thud_screen, only: print_message, print_results, red, write_screen, yellow
-   use thud_suggestion, only: get_suggestion
+   use thud_screen, only: print_message, print_results, red, wrap_lines, write_screen, yellow
    use thud_system, only: path_length, standard_output
-   use thud_text, only: join, newline, quoted, to_text, wrap_lines
+   use thud_text, only: get_suggestion, join, newline, quoted, to_text
    implicit none (type, external)
    private
 

@@ -2,11 +2,11 @@
 module thud_screen
    use thud_error, only: bad_input
    use thud_system, only: get_system_message, is_terminal, standard_error, standard_output, write_text
-   use thud_text, only: end_mark, newline, to_text, wrap_lines
+   use thud_text, only: end_mark, get_width, newline, screen_width, to_text
    implicit none (type, external)
    private
 
-   public :: print_message, print_results, write_screen
+   public :: print_message, print_results, wrap_lines, write_screen
 
    !> Colors of warnings and of errors.
    integer, parameter, public :: yellow = 33, red = 31
@@ -49,6 +49,42 @@ contains
       if (has_colors(standard_error)) lines = painted(lines(:5), color)//lines(6:)
       call write_screen(standard_error, lines, exit_code)
    end subroutine print_message
+
+   !> Text whose lines fit the screen. Long ones are broken at blanks, and their further lines are indented; words and paths
+   !> that are wider than the screen stay whole.
+   pure subroutine wrap_lines(text, wrapped)
+      !> Lines of UTF-8.
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable, intent(out) :: wrapped
+      ! First characters of the line of `text`, and of what is not yet in `wrapped`; last blank; characters since `begin`.
+      integer :: line, begin, blank, width
+      integer :: i, indentation
+
+      wrapped = ''
+      line = 1
+      begin = 1
+      blank = 0
+      width = 0
+      do i = 1, len(text)
+         width = width + get_width(text(i:i))
+         if (text(i:i) == newline) then
+            wrapped = wrapped//text(begin:i)
+            line = i + 1
+            begin = line
+            blank = 0
+            width = 0
+         else if (text(i:i) == ' ' .and. verify(text(line:i), ' ') > 0) then
+            blank = i
+         end if
+         if (width <= screen_width .or. blank <= begin) cycle
+         ! Further lines of a comment in a namelist are comments, too.
+         indentation = verify(text(line:), ' !') - 1
+         wrapped = wrapped//trim(text(begin:blank))//newline//text(line:line + indentation - 1)//'  '
+         begin = blank + 1
+         width = indentation + 2 + get_width(text(begin:i))
+      end do
+      wrapped = wrapped//text(begin:)
+   end subroutine wrap_lines
 
    !> Writes to the screen; a full disk is an error, a closed pipe is not.
    subroutine write_screen(descriptor, text, exit_code)

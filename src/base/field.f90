@@ -5,8 +5,7 @@ module thud_field
    use thud_error, only: error_type, input_error
    use thud_interval, only: get_range_text, interval_type, key_length, new_interval
    use thud_kinds, only: wp
-   use thud_suggestion, only: get_suggestion
-   use thud_text, only: is_number, join, join_quoted, lower_case, quoted, shortened, to_text
+   use thud_text, only: get_suggestion, is_number, join, join_quoted, lower_case, quoted, shortened, to_text
    implicit none (type, external)
    private
 

@@ -8,8 +8,8 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: byte_order_mark, fixed, flush_right, get_width, is_number, is_utf8, join, join_quoted, lower_case, marked
-   public :: newline, padded, quoted, replaced, shortened, significant, split, tab, to_text, wrap_lines
+   public :: byte_order_mark, fixed, flush_right, get_suggestion, get_width, is_number, is_utf8, join, join_quoted
+   public :: lower_case, marked, newline, padded, quoted, replaced, shortened, significant, split, tab, to_text
 
    !> Width of the screen, characters.
    integer, parameter, public :: screen_width = 80
@@ -319,6 +319,39 @@ contains
       text = join_words(format_real(values))
    end function join_numbers
 
+   !> The known word that a misspelled one probably means, by the number of insertions, deletions and replacements of letters
+   !> that turn one into the other (Levenshtein distance).
+   pure subroutine get_suggestion(word, known, suggestion)
+      !> The misspelled word.
+      character(len=*), intent(in) :: word
+      !> The known words: [n_known].
+      character(len=*), intent(in) :: known(:)
+      !> ` (did you mean 'height'?)`; empty if no word is close.
+      character(len=:), allocatable, intent(out) :: suggestion
+      ! Distance between the first j letters of the word and the first i letters of a known one; that for i - 1.
+      integer :: row(0:len(word)), before(0:len(word))
+      integer :: distance(size(known))
+      integer :: i, j, k
+
+      suggestion = ''
+      if (size(known) == 0 .or. len(word) > longest_shown) return
+      do k = 1, size(known)
+         row = [(j, j=0, len(word))]
+         do i = 1, len_trim(known(k))
+            before = row
+            row(0) = i
+            do j = 1, len(word)
+               row(j) = min(row(j - 1) + 1, before(j) + 1, &
+                  before(j - 1) + merge(0, 1, lower_case(word(j:j)) == lower_case(known(k)(i:i))))
+            end do
+         end do
+         distance(k) = row(len(word))
+      end do
+      k = minloc(distance, dim=1)
+      ! A third of the letters may be wrong.
+      if (3*distance(k) <= max(len(word), len_trim(known(k)))) suggestion = ' (did you mean '//quoted(known(k))//'?)'
+   end subroutine get_suggestion
+
    !> A text padded with blanks on the right.
    pure function padded(text, width) result(cell)
       character(len=*), intent(in) :: text
@@ -338,42 +371,6 @@ contains
 
       cell = repeat(' ', len(cell) - len(text))//text
    end function flush_right
-
-   !> Text whose lines fit the screen. Long ones are broken at blanks, and their further lines are indented; words and paths
-   !> that are wider than the screen stay whole.
-   pure subroutine wrap_lines(text, wrapped)
-      !> Lines of UTF-8.
-      character(len=*), intent(in) :: text
-      character(len=:), allocatable, intent(out) :: wrapped
-      ! First characters of the line of `text`, and of what is not yet in `wrapped`; last blank; characters since `begin`.
-      integer :: line, begin, blank, width
-      integer :: i, indentation
-
-      wrapped = ''
-      line = 1
-      begin = 1
-      blank = 0
-      width = 0
-      do i = 1, len(text)
-         width = width + get_width(text(i:i))
-         if (text(i:i) == newline) then
-            wrapped = wrapped//text(begin:i)
-            line = i + 1
-            begin = line
-            blank = 0
-            width = 0
-         else if (text(i:i) == ' ' .and. verify(text(line:i), ' ') > 0) then
-            blank = i
-         end if
-         if (width <= screen_width .or. blank <= begin) cycle
-         ! Further lines of a comment in a namelist are comments, too.
-         indentation = verify(text(line:), ' !') - 1
-         wrapped = wrapped//trim(text(begin:blank))//newline//text(line:line + indentation - 1)//'  '
-         begin = blank + 1
-         width = indentation + 2 + get_width(text(begin:i))
-      end do
-      wrapped = wrapped//text(begin:)
-   end subroutine wrap_lines
 
    !> Text between marks without width, for which the screen shows a color or nothing.
    pure function marked(text, kind) result(between)

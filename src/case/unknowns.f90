@@ -4,8 +4,7 @@ module thud_unknowns
    use thud_field, only: field_type, get_interval, key_length, list_type, new_field, text_list_type
    use thud_interval, only: interval_type
    use thud_kinds, only: wp
-   use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, quoted, to_text
+   use thud_text, only: get_suggestion, join_quoted, quoted, to_text
    implicit none (type, external)
    private
 

@@ -3,8 +3,7 @@ module thud_column
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length
-   use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, quoted, to_text
+   use thud_text, only: get_suggestion, join_quoted, quoted, to_text
    implicit none (type, external)
    private
 

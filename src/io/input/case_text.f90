@@ -7,8 +7,7 @@ module thud_case_text
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: assignment_type, parse_namelist
    use thud_registry, only: floor_names
-   use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, newline, quoted, shortened, to_text
+   use thud_text, only: get_suggestion, join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
    private
 
