@@ -127,8 +127,7 @@ def read_scaled(
     samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
 ) -> NDArray[np.float64]:
     """Return samples from start to before stop times a factor."""
-    values = samples(start, stop)
-    return values if factor == 1.0 else values * factor
+    return samples(start, stop) * factor
 
 
 def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:

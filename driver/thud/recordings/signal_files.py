@@ -204,7 +204,7 @@ def _in_newtons(
         path=str(file),
         sample_rate=rate,
         n_sample=channel.n_sample,
-        samples=partial(read_scaled, channel.samples, scale),
+        samples=channel.samples if scale == 1 else partial(read_scaled, channel.samples, scale),
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
         calibration=description,

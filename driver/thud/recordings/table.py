@@ -21,26 +21,24 @@ from thud.base.workbooks import read_workbook
 from thud.recordings.channel import MAX_COLUMNS, require_small, shown_path, shown_text
 from thud.recordings.header import (
     BRACKETS,
+    COMMENT,
     DATE,
-    NUMBER,
+    GROUPING,
+    MARKS,
+    NUMBERS,
+    QUANTITY,
     RATE,
     STEP,
     TIME,
     TIME_UNIT,
     UNIT,
     WORDS,
-    is_time,
-    plain,
-    split_title,
-)
-from thud.recordings.numbers import (
-    COMMENT,
-    GROUPING,
-    MARKS,
-    NUMBERS,
     find_separator,
     is_number,
+    is_time,
+    plain,
     split_line,
+    split_title,
     to_number,
 )
 from thud.recordings.times import DATE as DATE_CELL, seconds_of_day
@@ -101,6 +99,8 @@ class Column:
         Title, and unit as the file states it; empty if there is none.
     values : ndarray, shape (n_row,)
         The numbers in the unit of the file.
+    is_time : bool
+        Whether title or unit are those of times.
     table : str
         Name of the file.
     """
@@ -109,16 +109,12 @@ class Column:
     name: str
     unit: str
     values: NDArray[np.float64]
+    is_time: bool = False
     table: str = ""
 
     def __str__(self) -> str:
         """Return number and title for messages."""
         return f"column {self.number}" + (f", {shown_text(self.name)!r}" if self.name else "")
-
-    @property
-    def is_time(self) -> bool:
-        """Whether title or unit are those of times."""
-        return is_time(f"{self.name} [{self.unit}]")
 
     def to(self, unit: str, allowed: str = "") -> NDArray[np.float64]:
         """Return the numbers in a unit of `UNITS`; without a unit in the file it is that unit.
@@ -234,7 +230,10 @@ def read_table(
     except (OSError, ValueError) as error:
         refuse(f"{name}: cannot be read ({shown_text(error)})", allowed, error)
     clock = None if layout.clock is None else values.pop(layout.clock)
-    columns = [Column(i + 1, *titles[i], numbers, layout.name) for i, numbers in values.items()]
+    columns = [
+        Column(i + 1, *titles[i], numbers, is_time("{} [{}]".format(*titles[i])), layout.name)
+        for i, numbers in values.items()
+    ]
     decimal = layout.decimal if layout.shown else ""
     return Table(layout.name, columns, header, decimal, has_titles, clock)
 
@@ -298,7 +297,7 @@ def _read_lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[
 
 def _value(cell: str) -> tuple[str, str]:
     """Return the number of a cell as text and its unit; the cell itself if there is no unit."""
-    match = None if is_number(cell) else NUMBER.fullmatch(cell)
+    match = None if is_number(cell) else QUANTITY.fullmatch(cell)
     is_value = match and is_number(match["number"]) and find_unit(match["unit"])
     return (match["number"], match["unit"]) if match and is_value else (cell, "")
 
