@@ -6,7 +6,6 @@ import csv
 import io
 import re
 import textwrap
-from functools import lru_cache
 from itertools import zip_longest
 from typing import TYPE_CHECKING
 
@@ -136,14 +135,10 @@ def _format_columns(columns: Sequence[Column]) -> str:
     if _total([label, *minima[1:]]) <= WIDTH:
         minima[0] = label
     while _total(widths) > WIDTH and widths != minima:
-        # The column that adds the fewest lines; of several, the widest.
-        narrower = [
-            (_height(columns, trial), -width, trial)
-            for i, (width, least) in enumerate(zip(widths, minima, strict=True))
-            if width > least
-            for trial in [[*widths[:i], width - 1, *widths[i + 1 :]]]
+        wider = [
+            i for i, (width, least) in enumerate(zip(widths, minima, strict=True)) if width > least
         ]
-        widths = min(narrower)[-1]
+        widths[max(wider, key=widths.__getitem__)] -= 1
     broken = [[_break(cell, w) for cell in c] for c, w in zip(columns, widths, strict=True)]
     widths = [max((len(line) for cell in c for line in cell), default=0) for c in broken]
     lines = []
@@ -173,13 +168,6 @@ def _total(widths: Sequence[int]) -> int:
     return sum(widths) + _GAP * (len(widths) - 1)
 
 
-def _height(columns: Iterable[Column], widths: Sequence[int]) -> int:
-    """Return the number of lines of a table."""
-    heights = [[len(_break(c, w)) for c in col] for col, w in zip(columns, widths, strict=True)]
-    return sum(map(max, zip(*heights, strict=True)))
-
-
-@lru_cache(4096)
 def _break(cell: str, width: int) -> list[str]:
     """Return the lines of a cell; words that are wider are cut."""
     lines = [""]
