@@ -81,7 +81,7 @@ class Signal(Immutable):
     def scaled(self, factor: float) -> Signal:
         """Return the signal, and those of its load cells, times a factor."""
         cells = tuple(cell.scaled(factor) for cell in self.cells)
-        return replace(self, samples=partial(read_scaled, self.samples, factor), cells=cells)
+        return replace(self, samples=partial(read_scaled, self.samples, factor, 0.0), cells=cells)
 
     @cached_property
     def checksum(self) -> str:
@@ -124,10 +124,14 @@ def common_uncertainty(values: Sequence[float | None]) -> float | None:
 
 
 def read_scaled(
-    samples: Callable[[int, int], NDArray[np.float64]], factor: float, start: int, stop: int
+    samples: Callable[[int, int], NDArray[np.float64]],
+    factor: float,
+    offset: float,
+    start: int,
+    stop: int,
 ) -> NDArray[np.float64]:
-    """Return samples from start to before stop times a factor."""
-    return samples(start, stop) * factor
+    """Return samples from start to before stop times a factor, plus an offset."""
+    return samples(start, stop) * factor + offset
 
 
 def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:

@@ -204,7 +204,9 @@ def _in_newtons(
         path=str(file),
         sample_rate=rate,
         n_sample=channel.n_sample,
-        samples=channel.samples if scale == 1 else partial(read_scaled, channel.samples, scale),
+        samples=channel.samples
+        if scale == 1
+        else partial(read_scaled, channel.samples, scale, 0.0),
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
         calibration=description,
@@ -279,7 +281,8 @@ def _oriented(signal: Signal, polarity: str | None) -> Signal:
         signal, up, down = signal.scaled(-1.0), down, up
     is_assumed = any(note.code == "unit_assumed" for note in signal.notes)
     notes += check_peak(up, down, signal.name, assumed=is_assumed)
-    notes += check_signs(signal.cells, up)
+    if signal.cells:
+        notes += check_signs(signal.cells, up)
     return replace(signal, notes=(*signal.notes, *notes))
 
 

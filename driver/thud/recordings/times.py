@@ -20,6 +20,8 @@ STEPS = (1e-9, 1e3)
 # Tolerances of any times, and of rounded times, as fractions of the sampling interval.
 TOLERANCE = 1e-3
 ROUNDED_TOLERANCE = 0.25
+# Relative tolerance between the rate in a header and the rate of the times, and of a step.
+SAME_RATE = 0.01
 # Approximate number of times from which the last digit is determined.
 MAX_COUNTED = 2**16
 # Significant decimal digits of a float.
@@ -43,6 +45,13 @@ class Record(NamedTuple):
     time: NDArray[np.float64]
     force: NDArray[np.float64]
     sample_rate: float
+
+
+def rise_uniformly(values: NDArray[np.float64]) -> bool:
+    """Whether values may be times: steps are positive, and differ by a factor of 2 at most."""
+    with np.errstate(invalid="ignore"):  # infinite numbers
+        rise = np.diff(values)
+    return bool((rise > 0).all() and rise.max() < 2 * rise.min() + SAME_RATE * rise.mean())
 
 
 def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[Note, ...]]:

@@ -27,7 +27,8 @@ from thud.recordings.header import (
     split_title,
     text_of,
 )
-from thud.recordings.times import uniform_grid
+from thud.recordings.signal import read_scaled
+from thud.recordings.times import rise_uniformly, uniform_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,9 +37,8 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
 
-# Maximum number of times, and number of rows that show whether a vector may hold times.
+# Maximum number of times.
 MAX_TIMES = MAX_IN_MEMORY // 8
-SHOWN_TIMES = 4096
 
 Header = list[tuple[str, str]]
 
@@ -149,7 +149,7 @@ def _channel(
         name=vector.array + (f"[{vector.column}]" if vector.column else ""),
         number=number,
         n_sample=vector.n_sample,
-        samples=partial(_read_scaled, vector.read, factor, offset),
+        samples=partial(read_scaled, vector.read, factor, offset),
         unit=unit,
         sample_rate=rate or find_rate(entries),
         date=find_word(entries, DATE) or since,
@@ -197,34 +197,18 @@ def _scaling(own: Header) -> tuple[float, float, Header]:
     return factor, offset, applied
 
 
-def _read_scaled(
-    read: Callable[[int, int], NDArray[np.float64]],
-    factor: float,
-    offset: float,
-    start: int,
-    stop: int,
-) -> NDArray[np.float64]:
-    return read(start, stop) * factor + offset
-
-
 def _holds_times(vector: Vector) -> bool:
     """Whether a vector holds times by its name, or by the end of its name and its values.
 
     The first column of a matrix holds times if it rises.
     """
     if vector.column:
-        return vector.column == 1 and _rises(vector)
-    end = vector.title.rpartition("_")[2].casefold()
-    return is_time(vector.title) or (end in TIME and _rises(vector))
-
-
-def _rises(vector: Vector) -> bool:
-    """Whether a vector rises uniformly enough to be times."""
-    for count in (min(SHOWN_TIMES, vector.n_sample), min(MAX_TIMES, vector.n_sample)):
-        rise = np.diff(vector.read(0, count))
-        if not ((rise > 0).all() and rise.max() < 2 * rise.min()):
-            return False
-    return True
+        may_be = vector.column == 1
+    elif is_time(vector.title):
+        return True
+    else:
+        may_be = vector.title.rpartition("_")[2].casefold() in TIME
+    return may_be and rise_uniformly(vector.read(0, min(MAX_TIMES, vector.n_sample)))
 
 
 def _rate(time: Vector, header: Header, name: str) -> tuple[float | None, str, tuple[Note, ...]]:

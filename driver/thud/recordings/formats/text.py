@@ -14,7 +14,13 @@ from thud.recordings.channel import MIN_SAMPLES, Channel
 from thud.recordings.header import DATE, find_rate, find_word
 from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
-from thud.recordings.times import ROUNDED_TOLERANCE, last_digit, uniform_grid
+from thud.recordings.times import (
+    ROUNDED_TOLERANCE,
+    SAME_RATE,
+    last_digit,
+    rise_uniformly,
+    uniform_grid,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -22,9 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.table import Table
-
-# Relative tolerance between the rate in the header and the rate of the times.
-SAME_RATE = 0.01
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -76,10 +79,7 @@ def _times(table: Table, rate: float | None) -> tuple[NDArray[np.float64] | None
     first, *others = table.columns
     time = next((column for column in table.columns if column.is_time), None)
     if time is None and table.clock is None and others and not first.unit:
-        with np.errstate(invalid="ignore"):  # infinite numbers
-            rise = np.diff(first.values)
-        is_rising = (rise > 0).all() and rise.max() < 2 * rise.min() + SAME_RATE * rise.mean()
-        time = first if rate is None or is_rising else None
+        time = first if rate is None or rise_uniformly(first.values) else None
     if time is not None and (others or table.clock is not None):
         return time.to("s"), time.number
     return table.clock, 0
