@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
 from thud.recordings.background import MAINS
-from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy
+from thud.recordings.ringing import MIN_FREQUENCY, matched_energy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

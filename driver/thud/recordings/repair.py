@@ -17,7 +17,6 @@ from thud.recordings.differences import (
     MEDIAN,
     MIN_STEPS,
     largest_beside,
-    robust_deviation,
     runs,
 )
 from thud.recordings.load_cells import check_cells
@@ -43,10 +42,8 @@ MAX_REPAIRED = 1e-3
 # before it to the line through those after it (LINES).
 LINES = np.array([2.0, -3.0, 0.0, 0.0, 0.0, 3.0, -2.0])
 # The deviations exceed MIN_SPIKE_RATIO times the largest one from the cubic at samples that a spike
-# does not change, CLEAN samples away; MIN_SPIKE_DEVIATIONS robust standard deviations of all of
-# them; and MIN_SPIKE times the peak.
+# does not change, CLEAN samples away, and MIN_SPIKE times the peak.
 MIN_SPIKE_RATIO = 4.0
-MIN_SPIKE_DEVIATIONS = 8.0
 MIN_SPIKE = 0.005
 CLEAN = (5, 12)
 # Time before and after the contact that is searched for spikes, s, and time within which they count
@@ -153,11 +150,7 @@ def _find_spikes(section: Section, force: NDArray[np.float64], peak: float) -> N
     from_cubic = np.abs(np.convolve(padded, FROM_CUBIC, mode="valid"))
     from_median = np.abs(part - median_filter(part, MEDIAN, mode="nearest"))
     jump = np.abs(np.convolve(padded, LINES, mode="valid"))
-    least = max(
-        MIN_SPIKE_DEVIATIONS * robust_deviation(from_cubic),
-        MIN_SPIKE * peak,
-        MIN_STEPS * section.quantization.step,
-    )
+    least = max(MIN_SPIKE * peak, MIN_STEPS * section.quantization.step)
     limit = np.maximum(MIN_SPIKE_RATIO * largest_beside(from_cubic, *CLEAN).max(axis=0), least)
     spikes[searched] = (np.minimum(from_cubic, from_median) > limit) & (jump < from_cubic)
     return spikes

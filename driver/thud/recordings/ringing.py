@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.optimize import least_squares
 
 from thud.base.note import Note
-from thud.recordings.free_oscillation import MIN_FREQUENCY, matched_energy, resonance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,7 +25,9 @@ DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
 # Pause after the gate, in which soft releases end, and minimum length of the signal after it, s.
 PAUSE = 1e-3
 MIN_LENGTH = 4e-3
-# Maximum frequency as a fraction of the sample rate: filters ring near half the rate.
+# Minimum frequency, Hz, and maximum one as a fraction of the sample rate: filters ring near half
+# the rate.
+MIN_FREQUENCY = 200.0
 MAX_FREQUENCY = 0.3
 # Minimum ratio to the energy of noise: noise exceeds it at one of about 6000 points once in 1e7.
 MIN_ENERGY = 25.0
@@ -102,8 +104,26 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     amplitude = 2 * math.sqrt(energy / window)
     if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
         return None
-    fitted = _fit_decay(after[: int(LENGTH * decay * rate)], rate, np.array([frequency, decay]))
-    return Ringing(*resonance(*fitted), amplitude, chain is not None)
+    start = np.array([frequency, decay])
+    frequency, decay = _fit_decay(after[: int(LENGTH * decay * rate)], rate, start)
+    # A damped mode oscillates below its resonance.
+    resonance = math.hypot(frequency, 1 / (2 * math.pi * decay))
+    return Ringing(resonance, math.pi * resonance * decay, amplitude, chain is not None)
+
+
+def matched_energy(
+    level: NDArray[np.float64], rate: float, decay_times: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return frequencies, Hz, and the energy of a matched filter, shape (n_decay, n_frequency).
+
+    The filter searches a free oscillation that begins with the level. Of white noise the energy is
+    its variance at every frequency and decay time, s.
+    """
+    windows = np.exp(-np.arange(len(level)) / rate / decay_times[:, None])
+    length = next_fast_len(2 * len(level), real=True)
+    energy = np.abs(np.fft.rfft(windows * level, length)) ** 2 / (windows**2).sum(axis=1)[:, None]
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(energy)
 
 
 def _fit_decay(
