@@ -548,12 +548,6 @@ def test_two_samples_at_full_scale_are_clipped(count: int) -> None:
         repair(window)
 
 
-def test_coarse_digits_are_no_clipping() -> None:
-    force, _ = make_recording(HALF_SINE, FINE, rate=96e3)
-    (drop,) = drops(np.round(force / 2) * 2, 96e3)
-    assert drop.contact_time.value == pytest.approx(ABOVE, abs=1e-4)
-
-
 def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
     lost = force.copy()

@@ -46,10 +46,11 @@ def check(section: Section) -> tuple[Note, ...]:
             "a measuring range that includes the peak",
         )
     width = max(1, round(SMOOTHING * rate))
-    if len(force) < 2 * width + len(FROM_CUBIC):
-        return ()
     smooth = uniform_filter1d(median_filter(force, MEDIAN) - np.median(section.background), width)
-    peak, noise, step = smooth.max(), noise_deviation(force), section.quantization.step
+    peak = smooth.max()
+    if not (len(force) >= 2 * width + len(FROM_CUBIC) and peak > 0):
+        return ()
+    noise, step = noise_deviation(force), section.quantization.step
     # Noise averages the steps.
     least = max(noise / math.sqrt(width), step if noise < step / 2 else 0.0, MIN_NOISE * peak)
     lowest = MIN_FLAT * least / peak
@@ -65,4 +66,4 @@ def _count_above(force: NDArray[np.float64], level: float) -> float:
     """Return the number of samples, with fractions, for which a force, N, is above a level."""
     ends = np.array([force[1:], force[:-1]]) - level
     low, high = ends.min(axis=0), ends.max(axis=0)
-    return float(np.clip(high / np.maximum(high - low, 1e-300), 0, 1).sum())
+    return float(np.clip(high / np.maximum(high - low, 1e-100), 0, 1).sum())
