@@ -119,19 +119,13 @@ class BallImpedance(Displayed):
         result = np.full(len(self.frequency), np.nan)
         for band, column in enumerate(size.T):
             above = np.flatnonzero(column >= log_change)
-            if len(above) == 0:
+            if not above.size:
                 continue
-            i = above[-1]
-            if i == len(log_resistance) - 1:
-                refuse_value(
-                    "decibels",
-                    decibels,
-                    f"above {10 ** column[i]:.2g}, the change at the highest resistance",
-                )
-            fraction = (column[i] - log_change) / (column[i] - column[i + 1])
-            result[band] = 10 ** (
-                log_resistance[i] + fraction * (log_resistance[i + 1] - log_resistance[i])
-            )
+            if (i := above[-1]) == len(column) - 1:
+                allowed = f"above {10 ** column[i]:.2g}, the change at the highest resistance"
+                refuse_value("decibels", decibels, allowed)
+            ends = slice(i, i + 2)
+            result[band] = 10 ** np.interp(-log_change, -column[ends], log_resistance[ends])
         return result
 
     def rows(self) -> list[tuple[str, ...]]:

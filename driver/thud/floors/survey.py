@@ -327,11 +327,10 @@ def _kind(title: str) -> str:
 def _nominal(frequency: float, path: object) -> float:
     """Return the nearest rounded mid frequency; raise InputError if none is near."""
     if 1 <= frequency < 1e5:  # noqa: PLR2004 - bands of sound
-        decade = 10.0 ** math.floor(math.log10(frequency))
-        candidates = np.append(R10, 10) * decade
-        nearest = float(candidates[np.argmin(abs(candidates / frequency - 1))])
+        decade, index = divmod(round(10 * math.log10(frequency)), 10)
+        nearest = float(f"{R10[index] * 10.0**decade:.3g}")
         if abs(nearest / frequency - 1) < FREQUENCY_TOLERANCE:
-            return float(f"{nearest:.3g}")
+            return nearest
     return refuse(
         f"{path}: frequency = {frequency:g} Hz is not a mid frequency",
         "those of octave or one-third-octave bands, such as 50, 63, 80",

@@ -115,24 +115,8 @@ def tapping_level(floor: Plate | Construction | str, room: Room | None = None) -
     plate = case.floor
     if not isinstance(plate, Plate):
         refuse_value("floor", floor, "a bare plate of concrete")
-    if not _is_like_concrete(plate):
-        refuse(
-            f"floor: wave_speed/density = {plate.wave_speed / plate.density:.3g} differs from "
-            "concrete, for which the formula of ISO 12354-2 is valid",
-            f"{CONCRETE / MAX_RATIO:.2f} to {CONCRETE * MAX_RATIO:.2f} m4/(kg s)",
-        )
-    if not _is_isotropic(plate):
-        refuse(
-            f"floor: stiffness_ratio = {plate.stiffness_ratio:g} and torsion_ratio = "
-            f"{plate.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
-            "1 and 1",
-        )
-    if layers := _layers(plate, case.room or Room()):
-        refuse(
-            "the formula of ISO 12354-2 is for bare plates, but this one has "
-            f"{' and '.join(layers)}",
-            "plates without floating floor, covering, subceiling and ceiling",
-        )
+    if obstacle := _obstacle(plate, room or Room()):
+        refuse(*obstacle)
     result = ask("floor_modes", case=case_text(case), frequency=FREQUENCY)["plate"]
     time = 2.2 / (FREQUENCY * result["loss_factor"])
     radiated = time * result["radiation_factor"] * FREQUENCY / 1000
@@ -142,25 +126,25 @@ def tapping_level(floor: Plate | Construction | str, room: Room | None = None) -
 
 def has_tapping_level(floor: FloorOptions, room: Room) -> TypeGuard[Plate]:
     """Whether `tapping_level` applies: to a bare isotropic plate similar to concrete."""
-    is_plate = isinstance(floor, Plate) and _is_like_concrete(floor) and _is_isotropic(floor)
-    return is_plate and not _layers(floor, room)
+    return isinstance(floor, Plate) and not _obstacle(floor, room)
 
 
-def _layers(floor: FloorOptions, room: Room) -> list[str]:
-    """Return the names of layers above and below a plate."""
+def _obstacle(floor: Plate, room: Room) -> tuple[str, str] | None:
+    """Return why the formula does not apply, and to what it does; None if it applies."""
+    formula, ratio = "the formula of ISO 12354-2 is for", floor.wave_speed / floor.density
+    if not 1 / MAX_RATIO <= ratio / CONCRETE <= MAX_RATIO:
+        allowed = f"{CONCRETE / MAX_RATIO:.2f} to {CONCRETE * MAX_RATIO:.2f} m4/(kg s)"
+        return f"floor: wave_speed/density = {ratio:.3g}, but {formula} concrete", allowed
+    ratios = floor.stiffness_ratio, floor.torsion_ratio
+    if ratios != (1, 1):
+        stated = "floor: stiffness_ratio = {:g} and torsion_ratio = {:g}".format(*ratios)
+        return f"{stated}, but {formula} isotropic floors", "1 and 1"
     layers = {
-        "a floating floor": getattr(floor, "screed_thickness", 0.0),
-        "a covering": getattr(floor, "covering_stiffness", 0.0)
-        or any(getattr(floor, "covering_improvement", ())),
-        "a subceiling": getattr(floor, "subceiling_thickness", 0.0),
+        "a floating floor": floor.screed_thickness,
+        "a covering": floor.covering_stiffness or any(floor.covering_improvement),
+        "a subceiling": floor.subceiling_thickness,
         "a ceiling": room.ceiling_mass,
     }
-    return [name for name, value in layers.items() if value]
-
-
-def _is_like_concrete(floor: Plate) -> bool:
-    return 1 / MAX_RATIO <= floor.wave_speed / floor.density / CONCRETE <= MAX_RATIO
-
-
-def _is_isotropic(floor: Plate) -> bool:
-    return (floor.stiffness_ratio, floor.torsion_ratio) == (1, 1)
+    names = " and ".join(name for name, value in layers.items() if value)
+    bare = "plates without floating floor, covering, subceiling and ceiling"
+    return (f"{formula} bare plates, but this one has {names}", bare) if names else None
