@@ -111,7 +111,6 @@ def compare_floors(
     require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}
     for name, entry in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
-        require_kind("name", name, str)
         require_kind(name, entry, Case | RoomPrediction | Construction | str)
         if isinstance(entry, RoomPrediction):
             result[name] = entry

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
@@ -295,17 +296,11 @@ def _force_change(mass: float, contact_time: float, resistance: float) -> float:
     """Return the change of the peak force of a linear source by a resistive floor, dB.
 
     F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0. The ratio of the peak to that on a
-    rigid floor is exp(-b arctan(w/b)/w) with b = k/(2 Z), w**2 = k/M - b**2; if the force does not
-    oscillate, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
+    rigid floor is exp(-b ln((b + s)/w)/s) with b = k/(2 Z), w**2 = k/M and s**2 = b**2 - w**2,
+    which is imaginary if the force oscillates.
     """
     stiffness = mass * (math.pi / contact_time) ** 2
-    decay = stiffness / (2 * resistance)
-    square = stiffness / mass - decay**2
-    rate = math.sqrt(abs(square))
-    # ln((b + w)/(b - w))/2 without cancellation: b**2 - w**2 = k/M.
-    angle = (
-        math.atan2(rate, decay)
-        if square > 0
-        else math.log((decay + rate) / math.sqrt(stiffness / mass))
-    )
-    return -20 / math.log(10) * (decay / rate * angle if rate > 0 else 1.0)
+    decay, natural = stiffness / (2 * resistance), math.sqrt(stiffness / mass)
+    root = cmath.sqrt(decay**2 - natural**2)
+    exponent = decay * (cmath.log((decay + root) / natural) / root).real if root else 1.0
+    return -20 / math.log(10) * exponent

@@ -11,6 +11,7 @@ from thud.base.files import replace_file
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Container
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -54,10 +55,10 @@ def write_floor_modes(  # noqa: PLR0913 - a mode, and a grid
     OSError
         If the file cannot be written.
     """
-    frequencies = _checked("frequency", frequency, 1)
+    frequencies = _finite("frequency", frequency, (1,))
     n_mode = len(frequencies)
-    grid = _checked("x", x, 1), _checked("y", y, 1)
-    values = _checked("shape", shape, 3)
+    grid = _finite("x", x, (1,)), _finite("y", y, (1,))
+    values = _finite("shape", shape, range(4))
     if values.shape != (n_mode, *map(len, grid)):
         refuse(f"shape is an array {values.shape}", f"{(n_mode, *map(len, grid))}: modes, x and y")
     rows = {
@@ -79,22 +80,15 @@ def _joined(row: Array) -> str:
 
 def _per_mode(name: str, values: ArrayLike, n_mode: int) -> Array:
     """Return one value for each mode."""
-    array = require_real(name, require_array(name, values, (0, 1)))
+    array = _finite(name, values, (0, 1))
     if array.size not in {1, n_mode}:
         refuse(f"{name} has {array.size} values", f"1, or {n_mode}, one for each mode")
-    return np.broadcast_to(_finite(name, array), (n_mode,))
+    return np.broadcast_to(array, (n_mode,))
 
 
-def _checked(name: str, values: ArrayLike, dimensions: int) -> Array:
-    """Return an array of finite numbers of a number of dimensions."""
-    array = require_array(name, values, range(4))
-    if array.ndim != dimensions:
-        refuse(f"{name} has {array.ndim} dimensions", f"{dimensions}")
-    return _finite(name, require_real(name, array))
-
-
-def _finite(name: str, array: Array) -> Array:
-    """Return an array, or refuse it if an entry is not finite."""
+def _finite(name: str, values: ArrayLike, dimensions: Container[int]) -> Array:
+    """Return an array of finite numbers; raise InputError if it is none."""
+    array = require_real(name, require_array(name, values, dimensions))
     if not np.isfinite(array).all():
         refuse(f"{name} has entries that are not finite", "finite numbers")
     return array
