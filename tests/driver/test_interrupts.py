@@ -7,7 +7,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -18,7 +17,6 @@ import pytest
 from conftest import MINIMAL, names_in, naming, python
 
 import thud
-from thud.base.files import uninterrupted
 from thud.level.levels import low_pass, peak_count
 
 if TYPE_CHECKING:
@@ -236,19 +234,3 @@ def test_interrupted_study_waits_for_no_block(tmp_path: Path) -> None:
             time.sleep(0.01)
         time.sleep(1.0)
         assert KEPT.match(ended(process, signal.SIGINT))
-
-
-def test_main_thread_alone_defers_signals() -> None:
-    done = []
-
-    def defer() -> None:
-        with uninterrupted():
-            if threading.current_thread() is threading.main_thread():
-                signal.raise_signal(signal.SIGINT)
-            done.append(1)
-
-    with pytest.raises(KeyboardInterrupt):
-        defer()
-    with ThreadPoolExecutor(1) as thread:
-        thread.submit(defer).result()
-    assert done == [1, 1]

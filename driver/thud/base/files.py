@@ -6,9 +6,7 @@ import errno
 import os
 import secrets
 import shutil
-import signal
 import stat
-import threading
 import tomllib
 from abc import ABC, abstractmethod
 from contextlib import contextmanager, suppress
@@ -26,29 +24,6 @@ if TYPE_CHECKING:
 _NO_FILE = (
     errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR
 )  # fmt: skip
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Defer signals until a short operation is done, as file libraries print errors if interrupted.
-
-    Other threads than the main thread receive no signals: there this does nothing.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    pending: list[int] = []
-    handlers = {
-        number: signal.signal(number, lambda number, _: pending.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
-    try:
-        yield
-    finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
-        if pending:
-            signal.raise_signal(pending[0])
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:

@@ -17,12 +17,7 @@ from tqdm import tqdm
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.base.errors import InputError
-from thud.base.files import (
-    is_failure,
-    read_input,
-    replace_file,
-    uninterrupted,
-)
+from thud.base.files import is_failure, read_input, replace_file
 from thud.studies.backends import run_blocks
 from thud.studies.dataset import disk_space, grid_of, new_dataset
 from thud.studies.samples import Block
@@ -167,10 +162,8 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
     with _readable(path):
-        with uninterrupted():
-            content = BytesIO(read_input(path))
-            dataset = xr.open_dataset(content, engine="h5netcdf", phony_dims="access")
-        with dataset:
+        content = BytesIO(read_input(path))
+        with xr.open_dataset(content, engine="h5netcdf", phony_dims="access") as dataset:
             yield dataset
 
 
@@ -186,8 +179,7 @@ def _readable(path: Path) -> Iterator[None]:
 
 def _write(dataset: xr.Dataset, path: Path) -> None:
     """Write a NetCDF file atomically."""
-    with uninterrupted():
-        replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
+    replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
 
 
 @contextmanager
