@@ -259,5 +259,5 @@ def test_quantity_does_not_guess(text: str, words: str) -> None:
 def test_quantity_takes_the_units_of_studies(name: str) -> None:
     (unit,) = {key.unit for key in KEYS if key.name == name}
     for multiple in units.MULTIPLES[unit]:
-        parameter = read_fitted(name, {"start": 3.1, "unit": multiple}, "hollow_sphere")
+        parameter = read_fitted(name, {"start": 3.1, "unit": multiple}, thud.Case())
         assert thud.quantity(f"3.1 {multiple}") == parameter.start

@@ -32,7 +32,7 @@ from thud.studies.trained_surrogate import (
 )
 from thud.studies.uncertainty import Uncertainty
 
-OWNERS = ("modal_ball",)
+CASE = thud.Case()
 REAL = next(key for key in KEYS if (key.group, key.name) == ("drop", "height"))
 WHOLE = next(key for key in KEYS if (key.group, key.name) == ("modal_ball", "rings"))
 
@@ -108,11 +108,9 @@ def test_trial_is_the_start_or_a_quantile() -> None:
 def test_bounds_of_parameters(name: str, given: dict[str, Any], words: str) -> None:
     if words:
         with pytest.raises(thud.InputError, match=words):
-            read_varied(name, given, OWNERS, 1.0)
+            read_varied(name, given, CASE, 1.0)
     else:
-        found = read_varied(
-            name, {**given, "unit": "cm"} if name == "height" else given, OWNERS, 0.7
-        )
+        found = read_varied(name, {**given, "unit": "cm"} if name == "height" else given, CASE, 0.7)
         size = 0.01 if name == "height" else 1
         for word in ("low", "high", "std"):
             if word in given:
@@ -223,7 +221,7 @@ def test_modulus_of_a_case_changes_with_its_coefficient() -> None:
 )  # fmt: skip
 def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words: str) -> None:
     case = thud.Case(model=thud.ModalBall(damping_law="rising"))
-    varying = (read_varied("temperature", {"values": [20, 30]}, OWNERS, None),)
+    varying = (read_varied("temperature", {"values": [20, 30]}, CASE, None),)
     if words:
         with pytest.raises(thud.InputError, match=words):
             read_temperature(given, case, varying)

@@ -85,7 +85,8 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
     known = [option.name for option in fields(MODELS[model])]
     for word in options.keys() - known:
         owners = dict.fromkeys(key.owner or f"&{key.group}" for key in KEYS if key.name == word)
-        of = f", but of {' and '.join(owners)}" if owners else suggestion(word, known)
+        hint = suggestion(word, [*known, *_NAMES["sampling"]])
+        of = f", but of {' and '.join(owners)}" if owners else hint
         refuse(f"{word!r} is no option of {model}{of}", ", ".join(known))
     return MODELS[model](**options)  # type: ignore[arg-type]
 

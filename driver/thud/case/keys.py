@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from functools import lru_cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from thud.base._schema import GROUPS, KEYS
@@ -41,21 +39,13 @@ DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
-def key_owners(case: Case) -> tuple[str, ...]:
-    """Return what has keys in a case: the names of its model and floor, and ``"room"``."""
-    floor = case.floor.name if case.floor else ""
-    owners = (case.model.name if case.model else "", floor, "room" if case.room else "")
-    return tuple(filter(None, owners))
-
-
-@lru_cache
-def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
-    """Return the keys in which samples may differ, by name; for `owners` see `key_owners`.
+def known_keys(case: Case) -> dict[str, Key]:
+    """Return the keys in which samples of a case may differ, by name.
 
     Names of floor and room keys begin with the group, such as ``"plate.thickness"``; the group may
     be omitted if no other key has the name.
     """
-    model, *others = owners
+    model = case.model.name if case.model else ""
     keys = {
         key.name: key
         for key in KEYS
@@ -63,24 +53,27 @@ def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
         and key.group != OUTPUT_GROUP
     }
     keys |= {key.name: key for key in (DENSITY, TEMPERATURE)}
+    below = {case.floor.name if case.floor else "", "room" if case.room else ""}
     for key in KEYS:
-        if key.owner in others:
+        if key.owner and key.owner in below:
             keys.setdefault(key.name, key)
             keys[f"{key.group}.{key.name}"] = key
-    return MappingProxyType(keys)
+    return keys
 
 
-def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
+def find_key(name: str, case: Case) -> tuple[Key, int | None]:
     """Return a key by its name, and the number of a list entry: 2 for ``"frequency(2)"``.
 
-    Raise InputError, with the groups of the allowed keys, if the owners have no such key.
+    Raise InputError, with the groups of the allowed keys, if the case has no such key.
     """
-    keys = known_keys(owners)
+    keys = known_keys(case)
     match = re.fullmatch(r"(\w+(?:\.\w+)?)(?:\(([1-9]\d{0,3})\))?", str(name))
     key = keys.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
         hint = suggestion(str(name).partition("(")[0], keys)
         groups = ", ".join(dict.fromkeys(f"&{entry.group}" for entry in keys.values()))
+        owners: list[str] = [owner.name for owner in (case.model, case.floor) if owner]
+        owners += ["room"] if case.room else []
         refuse(
             f"{shown(name)} is not a key of {' and '.join(owners)}{hint}",
             f"keys of {groups}, density and temperature (`thud --keys` lists them)",
@@ -93,7 +86,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
-        key, entry = find_key(name, key_owners(case))
+        key, entry = find_key(name, case)
         group = attribute_of(key)
         changes = groups.setdefault(group, {})
         if entry is None:
@@ -110,7 +103,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
 def value_in(case: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None if there is no value or a list."""
-    key, entry = find_key(name, key_owners(case))
+    key, entry = find_key(name, case)
     value = getattr(getattr(case.resolved(), attribute_of(key)), key.name, None)
     if isinstance(value, tuple) and entry:
         value = next(iter(value[entry - 1 :]), None)

@@ -12,7 +12,7 @@ import numpy as np
 from thud.base.checks import refuse, require_number, shown
 from thud.base.key import Group
 from thud.case.case import check_case
-from thud.case.keys import find_key, key_owners, known_keys
+from thud.case.keys import find_key, known_keys
 from thud.explorer.answer import new_case
 from thud.export.room_sound import listen
 from thud.floors.prediction import predict_level
@@ -101,7 +101,7 @@ def study(values: Values) -> Download:
     moved = _moved_ranges(values.pop(MOVED, {}))
     case = new_case(values)
     check_case(case)
-    names = {f"{key.group}.{key.name}": name for name, key in known_keys(key_owners(case)).items()}
+    names = {f"{key.group}.{key.name}": name for name, key in known_keys(case).items()}
     ranges = {names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[1]}
     if not ranges:
         refuse("move a slider first", "a study of one or more parameters")
@@ -115,7 +115,7 @@ def study(values: Values) -> Download:
     lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SAMPLES}", "seed = 1"]
     lines += ["", "[parameters]"]
     for name, (low, high) in ranges.items():
-        key = find_key(name, key_owners(case))[0]
+        key = find_key(name, case)[0]
         count = f", count = {_count(key, low, high)}" if grid else ""
         ends = [round(low), round(high)] if key.kind == "whole" else [low, high]
         lines.append(f'"{name}" = {{ low = {ends[0]!r}, high = {ends[1]!r}{count} }}')

@@ -16,7 +16,7 @@ from thud.base.errors import ThudError
 from thud.base.note import Note
 from thud.base.units import scaled
 from thud.case.constructions import constructions
-from thud.case.keys import find_key, key_owners, limits, value_in, with_values
+from thud.case.keys import find_key, limits, value_in, with_values
 from thud.explorer.answer import new_case
 from thud.explorer.criteria import model_headline
 from thud.explorer.form import fields_by_key
@@ -177,7 +177,7 @@ def _floor_changes(
     Also return the tried values, and the lowest level, in words.
     """
     start = float(getattr(case.floor, name))
-    _, high = limits(find_key(name, key_owners(case))[0], case)
+    _, high = limits(find_key(name, case)[0], case)
     steps = range(1, FLOOR_STEPS + 1)
     if name == "layer_stiffness":
         tried = [start * (1 - STIFFNESS_STEP) ** i for i in steps]
@@ -242,7 +242,7 @@ def _facts(model: str) -> Facts:
 
 
 def _field(case: Case, name: str) -> Mapping[str, Any]:
-    key, _ = find_key(name, key_owners(case))
+    key, _ = find_key(name, case)
     return fields_by_key()[key.group, key.name]
 
 
@@ -275,7 +275,7 @@ def _smallest_change(case: Case, name: str, begin: float, length: float) -> Sear
 
 def _range(case: Case, name: str) -> tuple[float, float]:
     """Return the limits of a parameter; those of the standards if it is a criterion itself."""
-    low, high = limits(find_key(name, key_owners(case))[0], case)
+    low, high = limits(find_key(name, case)[0], case)
     for criterion in get_criteria(case.limits.source):
         if criterion.name == name:
             low, high = max(low, criterion.lower), min(high, criterion.upper)
@@ -384,7 +384,7 @@ def fit_recording(
         ends = f"{low} to {high}" if np.isfinite(intervals[name]).all() else "not determined"
         texts.append(f"{lower(field['label'])} {best} ({ends}) {field['unit']}".strip())
     for name, value in (known | fitted).items():
-        key, _ = find_key(name, key_owners(case))
+        key, _ = find_key(name, case)
         values.setdefault(key.group, {})[key.name] = value
     details = " ".join(f"{text[:1].upper()}{text[1:]}." for text in map(str, result.warnings))
     text = f"Fitted to {Path(paths[0]).name}: {', '.join(texts)} (95 %){_misfit_text(result)}"

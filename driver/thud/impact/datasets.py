@@ -12,7 +12,7 @@ import xarray as xr
 
 from thud.base._schema import BANDS, QUANTITIES, VERDICTS
 from thud.base.bridge import compiler, version, without_units
-from thud.case.keys import find_key, key_owners
+from thud.case.keys import find_key
 from thud.impact.outcomes import DIMENSIONS, FREQUENCIES, RESULTS
 from thud.level.levels import FORCES
 
@@ -61,7 +61,7 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
     """Return the dataset of an ensemble, with the dimension ``sample``."""
     coordinates, variables = sample_variables(ensemble.results)
     for name, values in ensemble.parameters.items():
-        key, _ = find_key(name, key_owners(ensemble.case))
+        key, _ = find_key(name, ensemble.case)
         coordinates[coordinate_name(name, key)] = ("sample", values, attributes(key))
     for force in FORCES:
         if (values := getattr(ensemble, f"{force}_force")) is not None:

@@ -23,7 +23,7 @@ from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
-from thud.case.keys import find_key, key_owners
+from thud.case.keys import find_key
 from thud.impact.outcomes import NO_ERRORS, RESULTS, sample_warnings
 from thud.level.levels import FORCES
 
@@ -315,7 +315,7 @@ def _columns(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return arrays of one length by key, and their numbers for the library, [n_sample, n_key]."""
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
-    keys = [find_key(name, key_owners(case))[0] for name in parameters]
+    keys = [find_key(name, case)[0] for name in parameters]
     for key in keys:
         if key not in KEYS:
             refuse(f"{key.name!r} is a parameter of studies", "keys of the input")

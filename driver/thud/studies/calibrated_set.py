@@ -13,7 +13,7 @@ import numpy as np
 from thud.base._schema import STANDARD_BALL, FiniteElement, ModalBall
 from thud.base.checks import refuse, require_kind
 from thud.case.case import Case, check_case
-from thud.case.keys import find_key, key_owners, value_in, with_values
+from thud.case.keys import find_key, value_in, with_values
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.impact.impact import Impact
@@ -142,7 +142,7 @@ def _is_stated(case: Case, key: str) -> bool:
 
 def _is_of_other_law(case: Case, key: str) -> bool:
     """Return whether the case has another damping law than that whose key the sets have."""
-    entry, _ = find_key(key, key_owners(case))
+    entry, _ = find_key(key, case)
     return bool(entry.needs) and getattr(case.model, entry.needs[0]) != entry.needs[1]
 
 

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud.case.case import Case
+
 # Maximum number of values of a parameter, or of base samples; it limits the memory.
 MAX_VALUES = 2**30
 # Entries of the table of a varying parameter besides `unit`, by the entry that selects the form
@@ -175,12 +177,10 @@ def _in_unit(value: Value, power: int) -> Value:
     return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
 
 
-def read_varied(
-    name: str, table: object, owners: tuple[str, ...], default_mean: Value | None
-) -> Parameter:
+def read_varied(name: str, table: object, case: Case, default_mean: Value | None) -> Parameter:
     """Return a parameter that varies; `default_mean` is its value in the case."""
     words = [word for form in ENTRIES_BY_FORM.values() for word in form]
-    label, key, table, power = _read_table(name, table, owners, words)
+    label, key, table, power = _read_table(name, table, case, words)
     form = next((form for form in ENTRIES_BY_FORM if form in table), None)
     if form is None:
         refuse(
@@ -211,7 +211,7 @@ def read_varied(
     return Parameter(**result, unit=table.get("unit"), name=name, key=key)
 
 
-def read_fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
+def read_fitted(name: str, entry: object, case: Case) -> Parameter:
     """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
     if isinstance(entry, Parameter):
         entry = entry.table
@@ -219,7 +219,7 @@ def read_fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
         entry = {}
     elif not isinstance(entry, Mapping):
         entry = {"start": entry}
-    label, key, table, power = _read_table(name, entry, owners, FIT_ENTRIES)
+    label, key, table, power = _read_table(name, entry, case, FIT_ENTRIES)
     numbers: dict[str, Any] = {}
     for word, value in table.items():
         if word != "unit" and value is not None:
@@ -229,11 +229,11 @@ def read_fitted(name: str, entry: object, owners: tuple[str, ...]) -> Parameter:
 
 
 def _read_table(
-    name: str, table: object, owners: tuple[str, ...], allowed: Sequence[str]
+    name: str, table: object, case: Case, allowed: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
     """Return label, key and table of a parameter, and the exponent of ten of its unit."""
     label = f"[parameters] {name}"
-    key, index = find_key(name, owners)
+    key, index = find_key(name, case)
     if key.kind == "list" and index is None:
         refuse(f"{label} is a list", f"one of its entries, such as {name + '(1)'!r}")
     if not isinstance(table, Mapping):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 from thud.base._schema import KEYS
 from thud.base.checks import refuse
 from thud.case.case import impact_only
-from thud.case.keys import DENSITY, OUTPUT_GROUP, key_owners, value_in
+from thud.case.keys import DENSITY, OUTPUT_GROUP, value_in
 from thud.studies.backends import require_workers
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.dataset import disk_space
@@ -63,7 +63,7 @@ class DropsKind(Kind[SampleStudy, R]):
                 "[parameters] bands is not allowed", "bands in [fixed], the same for all samples"
             )
         mean = density if name == DENSITY.name else value_in(case, name)
-        return read_varied(name, entry, key_owners(case), mean)
+        return read_varied(name, entry, case, mean)
 
     def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> SampleStudy:
         """Return a study with its sampling design."""

@@ -26,7 +26,7 @@ from thud.case.case import (
     new_model,
     read_case,
 )
-from thud.case.keys import DENSITY, TEMPERATURE, find_key, key_owners, with_values
+from thud.case.keys import DENSITY, TEMPERATURE, find_key, with_values
 from thud.studies.parameter import Parameter, read_quantity, read_value
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def fix_keys(
         if name == "model":
             continue
         label = f"{table} {name}"
-        key, index = find_key(name, key_owners(case))
+        key, index = find_key(name, case)
         if key == TEMPERATURE:
             refuse(f"{label} is not allowed", "temperature in [parameters]")
         value = read_quantity(label, entry, key.unit)

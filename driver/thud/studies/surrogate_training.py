@@ -118,7 +118,7 @@ def _ranges(study: SampleStudy) -> tuple[Parameter, ...]:
     for start in range(0, study.count, _SCANNED):
         stop = min(start + _SCANNED, study.count)
         for name, values in study.key_columns(study.parameter_columns(start, stop)).items():
-            key, _ = find_key(name, (study.model,))
+            key, _ = find_key(name, study.case)
             real = key.kind == "real" or (key.kind == "list" and not key.whole)
             if not real or key.group in _GROUPS_OF_RECORDS:
                 refuse(
@@ -128,7 +128,7 @@ def _ranges(study: SampleStudy) -> tuple[Parameter, ...]:
             low[name] = min(low.get(name, np.inf), float(values.min()))
             high[name] = max(high.get(name, -np.inf), float(values.max()))
     return tuple(
-        Parameter(low=low[name], high=high[name], name=name, key=find_key(name, (study.model,))[0])
+        Parameter(low=low[name], high=high[name], name=name, key=find_key(name, study.case)[0])
         for name in low
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
 from thud.base.units import scaled
-from thud.case.keys import key_owners, limits, with_values
+from thud.case.keys import limits, with_values
 from thud.studies.parameter import read_fitted
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def fitted_parameter(name: str, entry: object, case: Case) -> Parameter:
             f"{suggestion(name, known)}",
             ", ".join(known),
         )
-    return read_fitted(name, entry, key_owners(case))
+    return read_fitted(name, entry, case)
 
 
 def bound_parameters(
