@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from conftest import recorded
 
 import thud
@@ -40,9 +39,6 @@ def walk(value: object, path: str, seen: dict[int, object]) -> Iterator[tuple[st
         parts = {f"[{key!r}]": entry for key, entry in value.items()}
     elif isinstance(value, list | tuple):
         parts = {f"[{i}]": entry for i, entry in enumerate(value)}
-    elif isinstance(value, xr.Dataset):
-        names = [name for name in value.variables if name not in value.indexes]
-        parts = {f"[{name!r}]": value.variables[name].values for name in names}
     elif type(value).__module__.startswith("thud") and not inspect.isclass(value):
         held = getattr(value, "__dict__", {})
         parts = {f".{name}": one for name, one in held.items() if not name.startswith("_")}
@@ -61,9 +57,8 @@ def held(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
             names = runpy.run_path(str(SCRIPT))
     finally:
         tempfile.tempdir = before
-    # Arrays and datasets that functions return are the caller's.
-    own = np.ndarray | xr.Dataset
-    objects = {name: one for name, one in names.items() if not isinstance(one, own)}
+    # Arrays that functions return are the caller's, and so are datasets.
+    objects = {name: one for name, one in names.items() if not isinstance(one, np.ndarray)}
     seen: dict[int, object] = {}
     return dict(walk(objects | {"modes group": thud.Modes()}, "", seen))
 
