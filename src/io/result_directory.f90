@@ -116,11 +116,14 @@ contains
       !> Set if the directory cannot be made.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: target
+      logical :: exists
       integer :: i, status
 
       target = trim(get_real_path(self%path))
       do i = 2, len(target)
-         if (target(i:i) == '/') status = make_directory(target(:i - 1)//c_null_char)
+         if (target(i:i) /= '/') cycle
+         inquire (file=target(:i)//'.', exist=exists)
+         if (.not. exists) status = make_directory(target(:i - 1)//c_null_char)
       end do
       do i = 1, max_folders
          associate (at => index(target, '/', back=.true.))
@@ -128,6 +131,8 @@ contains
          end associate
          status = make_directory(self%folder//c_null_char)
          if (status == 0) return
+         inquire (file=self%folder//'/.', exist=exists)
+         if (.not. exists) exit
       end do
       error = unusable_error(self%path, status)
    end subroutine open_results
