@@ -321,6 +321,15 @@ def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:
     assert [(float(row["height"]), float(row["mass"])) for row in rows] == [(1, 2.5), (1.5, 2.4)]
 
 
+def test_threads_without_memory_for_their_buffers_are_refused(run: Run, case: Path) -> None:
+    def little_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))
+
+    arguments = (case, "--samples", "none.csv", "--threads", "64")
+    result = run(*arguments, preexec_fn=little_memory)
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+
+
 def test_endless_lines_take_no_memory(run: Run, case: Path) -> None:
     def little_memory() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (300 * 2**20, 300 * 2**20))
