@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.io
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from recording_files import WRITERS, half_sine
@@ -106,7 +105,7 @@ def _originals() -> dict[str, bytes]:
 
 
 def _write_others(folder: Path, force: NDArray[np.float64]) -> None:
-    """Write load cells, columns of date and time, and a structure of Siemens Testlab."""
+    """Write load cells, and columns of date and time."""
     cells = np.column_stack([0.3 * force, 0.7 * force])
     np.savetxt(folder / "cells.csv", cells, "%.3f", ";", header="fs = 8000\nF1 [N];F2 [N]")
     begin = datetime(2026, 11, 23, 10, tzinfo=UTC)
@@ -117,8 +116,6 @@ def _write_others(folder: Path, force: NDArray[np.float64]) -> None:
     (folder / "clock.csv").write_text("Datum;Kraft [N]\n" + "\n".join(rows))
     days = 46349.5 + np.arange(force.size) / 8000 / 86400
     np.savetxt(folder / "days.csv", np.column_stack([days, force]), "%.11f", ",")
-    values = {"x_values": {"increment": 1 / 8000}, "y_values": {"values": force}}
-    scipy.io.savemat(folder / "testlab.mat", {"ball_time_F": values})
 
 
 def attempt(chance: random.Random) -> tuple[str, str]:
