@@ -94,10 +94,11 @@ def _filled(section: Section, peak: float) -> tuple[NDArray[np.float64], list[No
 
     Jumps are relative to the peak, N. Raise InputError if dropouts and spikes last too long.
     """
-    rate, (first, stop) = section.sample_rate, section.contact
+    rate, (first, stop), index = section.sample_rate, section.contact, np.arange(len(section.force))
     notes = [note for entry in SECTION_CHECKS for note in entry.check(section)]
     dropouts = _find_dropouts(section, peak)
-    spikes = _find_spikes(section, _interpolated(section.force, dropouts), peak)
+    force = np.interp(index, index[~dropouts], section.force[~dropouts])
+    spikes = _find_spikes(section, force, peak)
     repaired = [
         Note(
             code, value=1e3 * np.count_nonzero(bad) / rate, high=1e3 * MAX_REPAIRED, unit="ms",
@@ -113,13 +114,7 @@ def _filled(section: Section, peak: float) -> tuple[NDArray[np.float64], list[No
             f"{section.name}: the record has {' and '.join(summaries)}",
             f"up to {1e3 * MAX_REPAIRED:g} ms",
         )
-    return _interpolated(section.force, bad), notes + repaired
-
-
-def _interpolated(force: NDArray[np.float64], bad: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return a force, N, with a line in place of bad samples."""
-    index = np.arange(len(force))
-    return np.interp(index, index[~bad], force[~bad])
+    return np.interp(index, index[~bad], section.force[~bad]), notes + repaired
 
 
 def _find_dropouts(section: Section, peak: float) -> NDArray[np.bool_]:

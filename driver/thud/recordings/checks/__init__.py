@@ -14,10 +14,6 @@ from thud.recordings.checks import aliasing, clipping, copies, gaps, jumps, outl
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from thud.base.note import Note
-    from thud.recordings.contact import Contact
-    from thud.recordings.drops import Section
-
 
 class Check(NamedTuple):
     """A check: its function, what it protects from, and the size of its effect."""
@@ -78,8 +74,3 @@ OTHER_CHECKS = (
         "they are marked, not left out",
     ),
 )
-
-
-def check_contact(section: Section, contact: Contact) -> tuple[Note, ...]:
-    """Return notes on a contact in its section."""
-    return tuple(note for entry in CONTACT_CHECKS for note in entry.check(section, contact))
