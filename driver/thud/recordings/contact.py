@@ -54,10 +54,6 @@ MIN_NOISE_SAMPLES = 50
 MIN_INCREASE = 4.0
 # Band in which the noise of the background is compared with its fit, Hz.
 NOISE_BAND = (100.0, 600.0)
-# Minimum number of sections of the background whose energy is compared with that of the fitted
-# noise, and standard deviations by which it exceeds it.
-MIN_GATES = 3
-CHANCE = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,31 +137,23 @@ class Contact(Immutable):
         variance = deviation**2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
         return variance if variance > MIN_INCREASE * background else background
 
-    @property
-    def quiet_gates(self) -> NDArray[np.float64]:
-        """Background in sections of the length of the gate on both sides, N, [n_section, n]."""
-        first, count = self.span[0], len(self.gated)
-        begin, end = self.gate[0] - first, self.gate[1] - first
-        before, after = self.force[:begin], self.force[end:]
-        sections = [
-            side[k * count : (k + 1) * count]
-            for side in (before[::-1], after)
-            for k in range(len(side) // count)
-        ]
-        return np.array(sections).reshape(-1, count)
-
     @cached_property
     def noise_bandwidth(self) -> float:
         """Equivalent bandwidth of the noise of the background, Hz; infinite if it is not known.
 
-        The noise is that of the fit below a filter, and ends at it.
+        The noise is that of the fit below a filter, and ends at it. Its spectrum is the mean over
+        sections of the length of the gate.
         """
-        gates = self.quiet_gates
-        if not gates.size or self.background.quantization.offset:
+        first, stop = (index - self.span[0] for index in self.gate)
+        count = stop - first
+        before, after = self.force[first % count : first], self.force[stop:]
+        sides = before, after[: len(after) // count * count]
+        sections = np.concatenate(sides).reshape(-1, count)
+        if not sections.size or self.background.quantization.offset:
             return math.inf
-        frequency = np.fft.rfftfreq(gates.shape[1], 1 / self.sample_rate)[1:]
-        window = np.hanning(gates.shape[1] + 2)[1:-1]
-        power = (np.abs(np.fft.rfft(window * gates, axis=1)[:, 1:]) ** 2).mean(axis=0)
+        frequency = np.fft.rfftfreq(count, 1 / self.sample_rate)[1:]
+        window = np.hanning(count + 2)[1:-1]
+        power = (np.abs(np.fft.rfft(window * sections, axis=1)[:, 1:]) ** 2).mean(axis=0)
         ratio = power / self.background.density(frequency)
         reference = np.median(ratio[(frequency > NOISE_BAND[0]) & (frequency < NOISE_BAND[1])])
         return float(ratio.sum() / reference * frequency[0]) if reference > 0 else math.inf
@@ -287,57 +275,26 @@ def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
     The last axis holds the expected energy of the noise, and the standard deviations of the force's
     energy after its subtraction: by noise, and by quantization with a quiet background.
     """
-    edges = list(zip(bands.lower, bands.upper, strict=True))
-    energies = np.empty((len(drops), len(edges), 3))
-    for i, drop in enumerate(drops):
-        quiet, errors = drop.contact.quiet_gates, drop.contact.quantization_errors
-        for k, edge in enumerate(edges):
-            energies[i, k] = _energies(drop.contact, quiet, errors, *edge)
+    energies = np.empty((len(drops), len(bands.lower), 3))
+    for contact, drop_energies in zip((drop.contact for drop in drops), energies, strict=True):
+        force, rate, background = contact.gated, contact.sample_rate, contact.background
+        # What the contact has beyond the background may be the force: it is not subtracted.
+        beyond = contact.white_variance - background.variances[0] * rate / 2
+        errors = contact.quantization_errors
+        for k, (lower, upper) in enumerate(zip(bands.lower, bands.upper, strict=True)):
+            rows = band_functionals(len(force), rate, lower, upper)
+            values, covariance = rows @ force, contact.covariance_of(rows)
+            further = beyond * float((rows**2).sum())
+            noise = float(np.trace(covariance)) - further
+            squares = float((covariance**2).sum())
+            # The noise in `values` makes the first term too large by twice the second, on average.
+            variance = max(4 * float(values @ covariance @ values) - 2 * squares, 2 * squares)
+            frequency = (lower + upper) / 2
+            relative = background.density_deviation(frequency) / background.density(frequency)
+            variance += (noise * float(relative)) ** 2 + further**2
+            # An error e changes the energy by 2 (R f)' R e + |R e|**2.
+            changes = errors @ rows.T
+            quantized = ((changes + 2 * values) * changes).sum(axis=1)
+            deviation = float(quantized.std()) if len(quantized) else 0.0
+            drop_energies[k] = noise, math.sqrt(variance), deviation
     return energies
-
-
-def _energies(
-    contact: Contact,
-    quiet: NDArray[np.float64],
-    errors: NDArray[np.float64],
-    lower: float,
-    upper: float,
-) -> tuple[float, float, float]:
-    """Return the energy of the noise in a band, N2 s, and the deviations of that of the force.
-
-    `quiet` are sections of the background, `errors` those of the force by quantization, N.
-    """
-    force, rate, background = contact.gated, contact.sample_rate, contact.background
-    rows = band_functionals(len(force), rate, lower, upper)
-    values, covariance = rows @ force, contact.covariance_of(rows)
-    # What the contact has beyond the background may be the force: it is not subtracted.
-    further = contact.white_variance - background.variances[0] * rate / 2
-    further *= float((rows**2).sum())
-    excess = _excess(quiet, covariance, rows)
-    noise = excess * (float(np.trace(covariance)) - further)
-    covariance *= excess
-    squares = float((covariance**2).sum())
-    # The noise in `values` makes the first term too large by twice the second, on average.
-    variance = max(4 * float(values @ covariance @ values) - 2 * squares, 2 * squares)
-    frequency = (lower + upper) / 2
-    relative = background.density_deviation(frequency) / float(background.density(frequency))
-    variance += (noise * relative) ** 2 + further**2
-    # An error e changes the energy by 2 (R f)' R e + |R e|**2.
-    changes = errors @ rows.T
-    quantized = ((changes + 2 * values) * changes).sum(axis=1)
-    return noise, math.sqrt(variance), float(quantized.std()) if len(quantized) else 0.0
-
-
-def _excess(
-    gates: NDArray[np.float64], covariance: NDArray[np.float64], rows: NDArray[np.float64]
-) -> float:
-    """Return the energy of the background in sections over that of the fitted noise in the gate.
-
-    It is 1 unless the former is larger by more than chance: the background is no noise of the fit.
-    """
-    if len(gates) < MIN_GATES:
-        return 1.0
-    expected = float(np.trace(covariance))
-    deviation = math.sqrt(2 * float((covariance**2).sum()) / len(gates))
-    energy = float(((gates @ rows.T) ** 2).sum()) / len(gates)
-    return energy / expected if energy > expected + CHANCE * deviation else 1.0
