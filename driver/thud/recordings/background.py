@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import cho_solve, lapack
+from scipy.linalg import lapack, solve_triangular
 from scipy.ndimage import uniform_filter1d
 
 from thud.base.immutable import Immutable
@@ -132,16 +132,18 @@ class Background(Immutable):
         return np.tensordot(scales, unit_covariances(cells, other), 1)
 
     @cached_property
-    def factor(self) -> NDArray[np.float64]:
-        """Cholesky factor of the covariance of the cells, [n_cell, n_cell]."""
+    def whiten(self) -> NDArray[np.float64]:
+        """Matrix that makes the cells independent and of unit variance, [n_cell, n_cell], 1/N."""
         white = self.variances[0] / 2 / (self.cells[1] - self.cells[0])
         noise = np.diag(white + (QUANTIZATION * self.peak) ** 2)
-        return np.asarray(np.linalg.cholesky(self.covariance(self.cells, self.cells) + noise))
+        factor = np.linalg.cholesky(self.covariance(self.cells, self.cells) + noise)
+        unit = np.eye(len(factor))
+        return np.asarray(solve_triangular(factor, unit, lower=True, check_finite=False))
 
-    @cached_property
+    @property
     def _weights(self) -> NDArray[np.float64]:
         """Inverse of the covariance of the cells times their means."""
-        return np.asarray(cho_solve((self.factor, True), self.mean, check_finite=False))
+        return np.asarray(self.whiten.T @ (self.whiten @ self.mean))
 
     def predict(self, cells: Cells) -> NDArray[np.float64]:
         """Return the expected background in cells, N."""
@@ -149,7 +151,7 @@ class Background(Immutable):
 
     def error_covariance(self, cells: Cells) -> NDArray[np.float64]:
         """Return the covariance of the error of this prediction, N2."""
-        known = solve_lower(self.factor, self.covariance(self.cells, cells))
+        known = self.whiten @ self.covariance(self.cells, cells)
         return np.asarray(self.covariance(cells, cells) - known.T @ known)
 
     @property
@@ -159,7 +161,7 @@ class Background(Immutable):
         middle, width = (self.cells[0] + self.cells[1]) / 2, self.cells[1] - self.cells[0]
         prior = (DRIFT * self.peak) ** 2
         drift = float(prior * self._weights @ middle)
-        known = float(np.sum(solve_lower(self.factor, middle) ** 2))
+        known = float(np.sum((self.whiten @ middle) ** 2))
         if abs(drift) > MIN_DEVIATIONS * math.sqrt(max(prior - prior**2 * known, 0.0)):
             notes.append(Note("drift_removed", value=drift, unit="N/s"))
         k = int(np.argmax(self.variances[3:]))
@@ -344,14 +346,14 @@ def find_offset_step(background: Background, impulse: float) -> float:
     if min(len(time) - after.sum(), after.sum()) < MIN_CELLS:
         return 0.0
     variances, _ = fit_noise(cells, mean, peak, column=after)
-    factor = replace(background, variances=variances).factor
-    column, white = solve_lower(factor, np.column_stack([after, mean])).T
+    whiten = replace(background, variances=variances).whiten
+    column, white = whiten @ after, whiten @ mean
     step = float(column @ white / (column @ column))
     if abs(step) < max(MIN_RATIO / math.sqrt(column @ column), MIN_STEP * peak):
         return 0.0
     squares = float(np.sum((white - step * column) ** 2))
     droop = -impulse / TIME_CONSTANTS * np.exp(-time[:, None] / TIME_CONSTANTS) * after[:, None]
-    rest = solve_lower(factor, mean[:, None] - droop)
+    rest = whiten @ (mean[:, None] - droop)
     return 0.0 if np.min(np.sum(rest**2, axis=0)) < squares + INCREASE else step
 
 
@@ -363,11 +365,6 @@ def step_errors(step: float, count: int) -> NDArray[np.float64]:
     line = np.linspace(0, step, count)
     index = np.arange(count)
     return np.array([line - step * (index >= instant * count) for instant in INSTANTS])
-
-
-def solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solve a lower triangular system without the slow checks of SciPy."""
-    return np.asarray(lapack.dtrtrs(factor, right, lower=True)[0])
 
 
 def unit_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:

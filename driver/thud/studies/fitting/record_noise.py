@@ -193,7 +193,7 @@ class BackgroundRecord:
             residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
             tried = [
                 (_log_likelihood(self.background((*result, tone))), tone)
-                for whiten in (_trendless(cells), _whitening(self.background(result)))
+                for whiten in (_trendless(cells), self.background(result).whiten)
                 for tone, gain in [_strongest(cells, whiten @ residual, whiten, grid)]
                 if gain > min_gain
             ]
@@ -213,7 +213,7 @@ class BackgroundRecord:
         cells, mean = self._means
         tone = MAINS[int(np.argmax(background.variances[3:]))]
         others = np.append(background.variances[:3], np.zeros(len(MAINS)))
-        whiten = _whitening(replace(background, variances=others))
+        whiten = replace(background, variances=others).whiten
         basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone, *tones])[:, 1:])
         inverse = np.linalg.inv(triangle)
         value, covariance = inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T
@@ -262,16 +262,9 @@ def _trendless(cells: Cells) -> Array:
     return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
 
 
-def _whitening(background: Background) -> Array:
-    """Return the matrix that makes background cells independent and of unit variance."""
-    factor = background.factor
-    whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
-    return np.asarray(whiten, dtype=np.float64)
-
-
 def _log_likelihood(background: Background) -> float:
     """Return the logarithm of the likelihood of background cells."""
-    whiten = _whitening(background)
+    whiten = background.whiten
     white = whiten @ background.mean
     return float(np.log(np.diag(whiten)).sum() - 0.5 * white @ white)
 
