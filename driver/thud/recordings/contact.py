@@ -39,8 +39,9 @@ GATE_RATE = 10_000.0
 # Duration of the impulse response of a correction before and after the impulse, in periods of the
 # highest corrected frequency.
 CORRECTION_PERIODS = 4.0
-# Error of begin and end due to content above the corrected frequencies, in periods of the highest.
-CORRECTION_ERROR = 0.06
+# Standard uncertainty of begin and end due to what a correction loses, in periods of the highest
+# corrected frequency: it spreads an edge over half of one, a quarter of that up to which it passes.
+CORRECTION_ERROR = 0.08
 # Number of positions of a background within a quantization step.
 N_PHASE = 16
 # Weights of neighboring samples that give values between the steps.

@@ -223,13 +223,11 @@ def measure_drop(
         ratio = flights[1].value / flights[0].value
         notes.append(Note("restitution_second", value=ratio, effect=0.0))
     ringing, plate = find_ringing(contact, section.chain), config.resonance
-    notes += [ringing.note] if ringing else []
-    # A resonance spreads an edge over a quarter of its period, a correction over that of the
-    # frequency up to which it passes the force, which is twice the highest corrected one.
-    spread = [2 * section.chain.highest] if section.chain else []
-    spread += [ringing.frequency] if ringing and not ringing.corrected else []
-    if spread:
-        contact_time = contact_time.widened(0.25 / min(spread) / RECTANGULAR)
+    if ringing:
+        notes.append(ringing.note)
+        if not ringing.corrected:
+            # A resonance spreads an edge over a quarter of its period.
+            contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
     return Drop(
         name=section.name,
         onset=section.start / section.sample_rate + contact.touch.value,
