@@ -186,33 +186,19 @@ def draw_tolerance(
 
 
 @own_style()
-def level_changes(
-    reference: Impact, impacts: Mapping[str, Impact], force: LevelsForce | None = None
-) -> Figure:
-    """Draw the change of octave levels relative to a reference.
+def level_changes(reference: Impact, impacts: Mapping[str, Impact]) -> Figure:
+    """Draw the change of octave levels of the assessed force relative to a reference, dB.
 
-    Parameters
-    ----------
-    reference
-        The impact that the others are compared with.
-    impacts
-        Impacts by their names in the legend.
-    force
-        ``"floor"`` or ``"elastic"``; by default that of each case.
-
-    Returns
-    -------
-    Figure
-        Octave bands in Hz, change of the force exposure level in dB.
+    Impacts are stated by their names in the legend.
     """
     figure, axes = empty_axes(2.8)
     axes.axhline(0, color="0.45", linewidth=0.8)
-    for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
+    for i, (name, impact, kind) in enumerate(iterate_curves(impacts, None)):
         change = impact.levels(force=kind) - reference.levels(force=kind)
         x = np.arange(len(change))
         axes.plot(x, change, label=escape_label(name), **line_style(i), **marker_style(i))
     octave_axis(axes)
-    axes.set_ylabel(level_label(impacts, force, "Change of the level, dB"))
+    axes.set_ylabel(level_label(impacts, None, "Change of the level, dB"))
     legend_above(axes)
     return figure
 

@@ -157,11 +157,6 @@ class Recording(ImpactOrRecording):
         return float(np.mean([drop.peak_force.value for drop in self.drops]))
 
     @property
-    def impulse(self) -> float:
-        """Mean time integral of the force, N s."""
-        return float(np.mean([drop.impulse.value for drop in self.drops]))
-
-    @property
     def notes(self) -> tuple[Note, ...]:
         """Possible faults and processing of the recording, its files and its drops."""
         of_files = (note for origin in self.origins for note in origin.notes)
