@@ -10,11 +10,11 @@ the rate, quality 10 to 60. A ringing plate counts as due where it moves the lev
 
 from __future__ import annotations
 
-import re
 import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.signal
@@ -22,6 +22,9 @@ import scipy.signal
 import thud
 from thud.level.levels import low_pass, peak_count
 from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from thud.base.note import Note
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from synthetic import band_limited, make_recording
@@ -54,7 +57,7 @@ def felt(force: np.ndarray, frequency: float, quality: float) -> np.ndarray:
     return np.asarray(scipy.signal.lsim(plate, force, np.arange(force.size) / FINE)[1])
 
 
-def told(force: np.ndarray, rate: float, rng: np.random.Generator) -> list[str]:
+def told(force: np.ndarray, rate: float, rng: np.random.Generator) -> list[Note]:
     """Return what is said of ringing in a random record of a force at FINE."""
     if rng.random() < 0.5:
         place = rng.uniform() / rate
@@ -107,7 +110,7 @@ def main() -> None:
         due[kind] += 1
         seen[kind] += bool(said)
         if said:
-            errors.append(float(re.findall(r"at (\d+) Hz", said[0])[0]) / frequency - 1)
+            errors.append(said[0].others["frequency"] / frequency - 1)
     print("false alarms:", *(f"{name} {wrong[name]} of {clean[name]};" for name in known))
     print(f"in all {sum(wrong.values())} of {sum(clean.values())}")
     print("plates found:", *(f"{kind} {seen[kind]} of {due[kind]};" for kind in due))

@@ -14,7 +14,7 @@ from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.calibration import open_source
-from thud.recordings.decay_fit import MIN_LENGTH, SAME, Mode, fit_modes
+from thud.recordings.free_oscillation import MIN_LENGTH, SAME, Mode, fit_modes
 
 if TYPE_CHECKING:
     import os

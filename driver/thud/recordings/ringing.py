@@ -7,14 +7,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.fft import next_fast_len
-from scipy.optimize import least_squares
 
 from thud.base.note import Note
+from thud.recordings.free_oscillation import (
+    MIN_FREQUENCY,
+    fit_oscillations,
+    matched_energy,
+    resonance,
+)
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
     from thud.recordings.instruments import Plate
@@ -25,9 +27,7 @@ DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
 # Pause after the gate, in which soft releases end, and minimum length of the signal after it, s.
 PAUSE = 1e-3
 MIN_LENGTH = 4e-3
-# Minimum frequency, Hz, and maximum one as a fraction of the sample rate: filters ring near half
-# the rate.
-MIN_FREQUENCY = 200.0
+# Maximum frequency as a fraction of the sample rate: filters ring near half the rate.
 MAX_FREQUENCY = 0.3
 # Minimum ratio to the energy of noise: noise exceeds it at one of about 6000 points once in 1e7.
 MIN_ENERGY = 25.0
@@ -104,42 +104,9 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     amplitude = 2 * math.sqrt(energy / window)
     if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
         return None
-    start = np.array([frequency, decay])
-    frequency, decay = _fit_decay(after[: int(LENGTH * decay * rate)], rate, start)
-    # A damped mode oscillates below its resonance.
-    resonance = math.hypot(frequency, 1 / (2 * math.pi * decay))
-    return Ringing(resonance, math.pi * resonance * decay, amplitude, chain is not None)
-
-
-def matched_energy(
-    level: NDArray[np.float64], rate: float, decay_times: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return frequencies, Hz, and the energy of a matched filter, shape (n_decay, n_frequency).
-
-    The filter searches a free oscillation that begins with the level. Of white noise the energy is
-    its variance at every frequency and decay time, s.
-    """
-    windows = np.exp(-np.arange(len(level)) / rate / decay_times[:, None])
-    length = next_fast_len(2 * len(level), real=True)
-    energy = np.abs(np.fft.rfft(windows * level, length)) ** 2 / (windows**2).sum(axis=1)[:, None]
-    frequency = np.fft.rfftfreq(length, 1 / rate)
-    return np.asarray(frequency, dtype=np.float64), np.asarray(energy)
-
-
-def _fit_decay(
-    force: NDArray[np.float64], rate: float, start: NDArray[np.float64]
-) -> tuple[float, float]:
-    """Return frequency, Hz, and decay time, s, of the free oscillation of least squares."""
-    time = np.arange(len(force)) / rate
-
-    def residual(shape: NDArray[np.float64]) -> NDArray[np.float64]:
-        wave = np.exp((2j * np.pi * shape[0] - 1 / shape[1]) * time)
-        waves = np.column_stack([wave.real, wave.imag])
-        return np.asarray(force - waves @ np.linalg.lstsq(waves, force)[0])
-
-    bounds = start * [0.8, 0.25], start * [1.25, 4]
-    frequency, decay = least_squares(residual, start, bounds=bounds, x_scale=start).x
-    return float(frequency), float(decay)
+    start, ringing = np.array([[frequency, -math.log(decay)]]), after[: int(LENGTH * decay * rate)]
+    ((frequency, log_rate),), _ = fit_oscillations(ringing, start, rate, background=False)
+    return Ringing(*resonance(frequency, math.exp(-log_rate)), amplitude, chain is not None)
 
 
 def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | None:

@@ -1,4 +1,4 @@
-"""Decaying oscillations Re(a exp(s t)) of a force plate: least-squares fit of their poles s."""
+"""Free oscillations a exp(-t/d) cos(2 pi f t + p) of a force plate: least-squares fits."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.fft import next_fast_len
 from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
 from thud.recordings.background import MAINS
-from thud.recordings.ringing import MIN_FREQUENCY, matched_energy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+# Minimum frequency of a resonance of a plate, Hz.
+MIN_FREQUENCY = 200.0
 # Trial decay times to 1/e, s.
 DECAYS = np.array([0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])
 # Maximum frequency of a resonance as a fraction of the sample rate; minimum quality factor; minimum
@@ -63,50 +65,87 @@ def fit_modes(
     `quiet` is the level before they begin; what remains of the fit is compared with its noise.
     Return None if no resonance stands out.
     """
-    noise = quiet - _fit(quiet, np.zeros((0, 2)), rate)[0] if quiet.size else quiet
+    noise = quiet - _closest(quiet, np.zeros((0, 2)), rate)[0] if quiet.size else quiet
     modes, parameters, used = None, np.zeros((0, 2)), level
     while len(parameters) < MAX_MODES and len(used) >= MIN_LENGTH:
-        trial = _strongest(used - _fit(used, parameters, rate)[0], rate)
+        trial = _strongest(used - _closest(used, parameters, rate)[0], rate)
         if trial is None or (np.abs(parameters[:, 0] / trial[0] - 1) < SAME).any():
             break
         parameters = np.vstack([parameters, trial])
         length = round(DECAY_TIMES / math.exp(parameters[:, 1].min()) * rate)
         used = level[: max(length, MIN_LENGTH)]
-        parameters, inverse = _optimize(used, parameters, rate)
-        quality = np.pi * np.hypot(parameters[:, 0], np.exp(parameters[:, 1]) / (2 * np.pi))
-        if (quality < MIN_QUALITY * np.exp(parameters[:, 1])).any():
+        parameters, inverse = fit_oscillations(used, parameters, rate)
+        if any(resonance(f, math.exp(-decay))[1] < MIN_QUALITY for f, decay in parameters):
             break
         modes = _describe(used, parameters, inverse, rate, noise)
     return modes
 
 
-def _fit(
-    level: NDArray[np.float64], parameters: NDArray[np.float64], rate: float
-) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return the oscillations, a drift and hum that are closest to a level, and the amplitudes.
+def resonance(frequency: float, decay_time: float) -> tuple[float, float]:
+    """Return the resonance, Hz, and the quality factor of a mode from its free oscillation.
 
-    The parameters of an oscillation are its frequency, Hz, and the logarithm of its decay rate,
-    1/s.
+    A damped mode oscillates at a frequency, Hz, below its resonance; the amplitude falls to 1/e
+    within the decay time, s.
+    """
+    natural = math.hypot(frequency, 1 / (2 * math.pi * decay_time))
+    return natural, math.pi * natural * decay_time
+
+
+def matched_energy(
+    level: NDArray[np.float64], rate: float, decay_times: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return frequencies, Hz, and the energy of a matched filter, shape (n_decay, n_frequency).
+
+    The filter searches a free oscillation that begins with the level. Of white noise the energy is
+    its variance at every frequency and decay time, s.
+    """
+    windows = np.exp(-np.arange(len(level)) / rate / decay_times[:, None])
+    length = next_fast_len(2 * len(level), real=True)
+    energy = np.abs(np.fft.rfft(windows * level, length)) ** 2 / (windows**2).sum(axis=1)[:, None]
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(energy)
+
+
+def _closest(
+    level: NDArray[np.float64],
+    parameters: NDArray[np.float64],
+    rate: float,
+    *,
+    background: bool = True,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the oscillations that are closest to a level, and their amplitudes.
+
+    The parameters of each are its frequency, Hz, and the logarithm of its decay rate, 1/s. With a
+    `background`, drift and hum are fitted, too.
     """
     time = np.arange(len(level)) / rate
-    frequencies = np.append(parameters[:, 0], MAINS)
-    decays = np.append(np.exp(parameters[:, 1]), np.zeros(len(MAINS)))
+    hum = MAINS if background else ()
+    frequencies = np.append(parameters[:, 0], hum)
+    decays = np.append(np.exp(parameters[:, 1]), np.zeros(len(hum)))
     waves = np.exp(np.outer(time, 2j * np.pi * frequencies - decays))
-    drift = np.vander(time * rate / len(level), DEGREE + 1)
+    drift = np.vander(time * rate / len(level), DEGREE + 1 if background else 0)
     columns = np.hstack([waves.real, -waves.imag, drift])
     factors = np.linalg.lstsq(columns, level, rcond=None)[0]
-    real, imaginary = factors[: 2 * len(frequencies)].reshape(2, -1)
-    return columns @ factors, (real + 1j * imaginary)[: len(parameters)]
+    amplitudes = np.hypot(*factors[: 2 * len(frequencies)].reshape(2, -1))
+    return columns @ factors, amplitudes[: len(parameters)]
 
 
-def _optimize(
-    level: NDArray[np.float64], parameters: NDArray[np.float64], rate: float
+def fit_oscillations(
+    level: NDArray[np.float64],
+    parameters: NDArray[np.float64],
+    rate: float,
+    *,
+    background: bool = True,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the parameters of least squares, and their covariance for noise of variance one."""
+    """Return the parameters of least squares, and their covariance for noise of variance one.
+
+    They begin with `parameters`, shape (n, 2): frequencies, Hz, and logarithms of decay rates, 1/s.
+    With a `background`, drift and hum are fitted, too.
+    """
     low = np.tile([MIN_FREQUENCY, 0.0], len(parameters))
     high = np.tile([MAX_FREQUENCY * rate, math.log(rate)], len(parameters))
     solution = least_squares(
-        lambda x: level - _fit(level, x.reshape(-1, 2), rate)[0],
+        lambda x: level - _closest(level, x.reshape(-1, 2), rate, background=background)[0],
         np.clip(parameters.ravel(), low, high),
         bounds=(low, high),
         x_scale=np.column_stack([np.exp(parameters[:, 1]), np.ones(len(parameters))]).ravel(),
@@ -134,16 +173,16 @@ def _describe(
     quiet: NDArray[np.float64],
 ) -> list[Mode]:
     """Return the modes of a fit; their uncertainties are those by the noise around each."""
-    fitted, amplitudes = _fit(level, parameters, rate)
+    fitted, amplitudes = _closest(level, parameters, rate)
     frequencies, power = _spectrum(level - fitted, rate)
     quiet_frequencies, quiet_power = _spectrum(quiet, rate)
     deviations = np.sqrt(np.diagonal(inverse)).reshape(-1, 2)
     modes = []
     for (frequency, log_decay), amplitude, deviation in zip(
-        parameters, np.abs(amplitudes), deviations, strict=True
+        parameters, amplitudes, deviations, strict=True
     ):
         decay = math.exp(log_decay)
-        natural = math.hypot(frequency, decay / (2 * math.pi))
+        natural, quality = resonance(frequency, 1 / decay)
         near = power[np.abs(frequencies / natural - 1) < AROUND]
         usual = quiet_power[np.abs(quiet_frequencies / natural - 1) < AROUND]
         # An oscillation takes two values from the residual.
@@ -160,7 +199,6 @@ def _describe(
         u_quality = math.hypot(u_frequency, u_decay)
         # The sum of the squares of the oscillation is that of its amplitude times rate / (4 decay).
         misfit = excess / float(amplitude) / math.sqrt(rate / (4 * decay))
-        quality = math.pi * natural / decay
         modes.append(Mode(natural, quality, u_frequency, u_quality, float(amplitude), misfit))
     return modes
 
