@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Height without the legend, inch: a report has two figures side by side.
 HEIGHT = 2.05
-# Maximum number of drops, and of outliers, drawn as lines; the range of more drops is filled.
+# Maximum number of drops drawn as lines; the range of more drops is filled.
 MAX_LINES = 40
 # Margin of the filtered force around the drawn times, s: longer than the filter's response.
 FILTER_MARGIN = 2e-2
@@ -74,13 +74,10 @@ def recording_forces(recording: Recording) -> Figure:
 
 def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the force of a drop, low-passed at 1.25 kHz, N, at times since first touch, s."""
-    indices = (
-        (np.array([time[0] - FILTER_MARGIN, time[-1] + FILTER_MARGIN]) - drop.begin)
-        * drop.sample_rate
-    ).astype(int)
-    first, stop = np.clip(indices, 0, len(drop.force))
-    force = low_pass(drop.force[first:stop], drop.sample_rate)
-    return np.interp(time, drop.time[first:stop], force)
+    edges = time[[0, -1]] + [-FILTER_MARGIN, FILTER_MARGIN]
+    indices = ((edges - drop.begin) * drop.sample_rate).astype(int)
+    part = slice(*np.clip(indices, 0, len(drop.force)))
+    return np.interp(time, drop.time[part], low_pass(drop.force[part], drop.sample_rate))
 
 
 @own_style()
@@ -162,11 +159,9 @@ def _draw_drops(
         name = f"{count} drops" if count > 1 else "drop"
         for i, curve in enumerate(curves[~marked]):
             axes.plot(x, curve, label=name if i == 0 else None, **THIN)
-    for i, curve in enumerate(curves[marked][:MAX_LINES]):
-        number = int(marked.sum())
-        name = "outlier" if number == 1 else f"{number} outliers"
-        if number > MAX_LINES:
-            name += f", {MAX_LINES} of them drawn"
+    number = int(marked.sum())
+    name = "outlier" if number == 1 else f"{number} outliers"
+    for i, curve in enumerate(curves[marked]):
         axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
 
 
