@@ -124,12 +124,7 @@ def require_array(
         return array
     if array.size and array.dtype.kind not in kinds:
         refuse(f"{name} is not an array of real numbers", "one dimension of real numbers")
-    return np.ascontiguousarray(array, dtype=np.float64)
-
-
-def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
-    """Return an array as float64; raise InputError if its entries are not real numbers."""
-    return require_array(name, array, range(array.ndim + 1), kinds)
+    return np.asarray(array, dtype=np.float64, order="C")
 
 
 def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:

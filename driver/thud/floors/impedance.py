@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import BandSet, InfinitePlate
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_kind
 from thud.base.display import Displayed
 from thud.case.case import Case, case_text, impact_only
 from thud.impact.compute import new_floor_impact
@@ -98,7 +98,7 @@ class BallImpedance(Displayed):
         It applies to steady vibration about the maximum deflection, not to the short impact.
         Frequencies, Hz, are greater than 0.
         """
-        values = require_real("frequency", require_array("frequency", frequency, dimensions=(1,)))
+        values = require_array("frequency", frequency, (1,), "iuf")
         if not (values > 0).all():
             refuse_value("frequency", float(values.min()), "above 0")
         s = 2j * np.pi * values
@@ -185,7 +185,7 @@ def ball_impedance(
     """
     require_kind("source", source, Impact)
     values = RESISTANCES if resistance is None else resistance
-    floors = require_real("resistance", require_array("resistance", values, dimensions=(1,)))
+    floors = require_array("resistance", values, (1,), "iuf")
     if len(floors) == 0 or not (np.diff(floors) > 0).all():
         refuse("resistance: the values do not ascend", "one value or more, ascending")
     edges = get_bands(bands)

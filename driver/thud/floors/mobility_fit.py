@@ -19,7 +19,6 @@ from thud.base.checks import (
     refuse_value,
     require_array,
     require_choice,
-    require_real,
     require_whole,
     shown,
 )
@@ -303,7 +302,7 @@ def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128
     """Return the frequencies and complex values of a tuple after a check."""
     if len(table) != 2:  # noqa: PLR2004 - frequencies and values
         refuse(f"table is a tuple of {len(table)}", "frequencies, Hz, and complex values")
-    frequency = require_real("frequency", require_array("frequency", table[0], (1,)))
+    frequency = require_array("frequency", table[0], (1,), "iuf")
     values = require_array("values", table[1], (1,))
     if values.size and values.dtype.kind not in "iufc":
         refuse("values are not numbers", "complex numbers")

@@ -14,7 +14,7 @@ import numpy as np
 
 from thud.base._schema import RectangularFloor
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_number
 from thud.base.display import Displayed
 from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
@@ -212,7 +212,7 @@ def _positions(name: str, value: ArrayLike | None, sides: tuple[float, ...]) -> 
     """Return stated positions after a check, one after the other, m; none for the default."""
     if value is None:
         return np.zeros(0)
-    positions = require_real(name, require_array(name, value, dimensions=(2,)))
+    positions = require_array(name, value, (2,), "iuf")
     if positions.shape[1] != len(sides) or not 1 <= len(positions) <= MAX_POSITIONS:
         refuse(
             f"{name} have the shape {positions.shape}",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, require_array, require_real
+from thud.base.checks import refuse, require_array
 from thud.base.files import replace_file
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _per_mode(name: str, values: ArrayLike, n_mode: int) -> Array:
 
 def _finite(name: str, values: ArrayLike, dimensions: Container[int]) -> Array:
     """Return an array of finite numbers; raise InputError if it is none."""
-    array = require_real(name, require_array(name, values, dimensions))
+    array = require_array(name, values, dimensions, "iuf")
     if not np.isfinite(array).all():
         refuse(f"{name} has entries that are not finite", "finite numbers")
     return array

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import butter, resample, sosfilt, zpk2sos
 
-from thud.base.checks import refuse, require_array, require_number, require_real
+from thud.base.checks import refuse, require_array, require_number
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def filter_levels(
     sample rate, Hz. Raise InputError if the record is empty, zero throughout or not finite, or
     the rate or the bands are invalid.
     """
-    record = require_real("force", require_array("force", force, dimensions=(1,)))
+    record = require_array("force", force, (1,), "iuf")
     if not np.isfinite(record).all() or not record.any():
         refuse("force is empty, zero throughout or not finite", "a force record, N")
     _require_rate(sample_rate)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, require_array, require_number, require_real
+from thud.base.checks import refuse, require_array, require_number
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Signal(Immutable):
     @classmethod
     def from_array(cls, force: ArrayLike, sample_rate: float, name: str = "recording") -> Signal:
         """Return the signal of a force in memory, N, shape (n_sample,)."""
-        values = require_real(f"{name}: force", require_array(f"{name}: force", force, (1,)))
+        values = require_array(f"{name}: force", force, (1,), "iuf")
         require_number(f"{name}: sample_rate", sample_rate)
         if not sample_rate > 0:
             refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")

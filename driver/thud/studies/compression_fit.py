@@ -11,7 +11,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
 from thud.base._schema import Ball, Compression
-from thud.base.checks import refuse, refuse_value, require_array, require_number, require_real
+from thud.base.checks import refuse, refuse_value, require_array, require_number
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.extras import require_extra
 from thud.base.note import Note
@@ -345,7 +345,7 @@ class _Problem:
 def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     """Return both columns; raise InputError if they are not a curve."""
     measured, measured_force = (
-        require_real(name, require_array(name, values, {1}))
+        require_array(name, values, {1}, "iuf")
         for name, values in (("deflection", deflection), ("force", force))
     )
     if measured.shape != measured_force.shape or len(measured) < _MIN_DATA:
