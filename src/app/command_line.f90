@@ -170,7 +170,15 @@ contains
          if (allocated(error) .or. allocated(request%information)) return
          i = i + 1
       end do
-      if (.not. allocated(request%case_file)) error = input_error('no case is given')
+      if (.not. allocated(request%case_file)) then
+         error = input_error('no case is given')
+      else if (request%samples == '' .and. request%threads > 1) then
+         error = input_error('--threads does nothing without --samples; allowed: both')
+      else if (request%samples /= '' .and. (request%options%write_all .or. request%options%verbose)) then
+         error = input_error('--samples writes one table; allowed: without --all and --verbose')
+      else if (request%options%verbose .and. request%quiet) then
+         error = input_error('--verbose contradicts --quiet; allowed: one of them')
+      end if
    end subroutine parse_arguments
 
    !> The help text.
