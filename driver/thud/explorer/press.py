@@ -18,8 +18,8 @@ from thud.explorer.form import fields_by_key
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.recording_fields import PRESS_FIELDS
 from thud.recordings.channel import shown_text
-from thud.recordings.header import plain
 from thud.recordings.table import read_table
+from thud.recordings.words import plain
 from thud.studies.compression_fit import fit_compression
 
 if TYPE_CHECKING:

@@ -1,257 +1,265 @@
-"""Words, units and numbers in titles, headers and cells of files."""
+"""Lines above the numbers of a table: titles and units of columns, names and values."""
 
 from __future__ import annotations
 
-import csv
+import itertools
 import re
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NoReturn
 
-import numpy as np
-
-from thud.base.units import find_unit, size_of
+from thud.base.checks import refuse
+from thud.base.units import UNITS, find_unit
+from thud.recordings.channel import shown_text
+from thud.recordings.times import DATE as DATE_CELL, seconds_of_day
+from thud.recordings.words import (
+    BRACKETS,
+    COMMENT,
+    DATE,
+    QUANTITY,
+    RATE,
+    STEP,
+    TIME,
+    TIME_UNIT,
+    UNIT,
+    is_number,
+    is_time,
+    plain,
+    split_line,
+    split_title,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterator
 
-# Separators of columns by precedence; a line without any of them is separated by blanks.
-SEPARATORS = ("\t", ";", ",")
-# Decimal marks; the mark that is not the decimal one groups digits, as do the characters below.
-MARKS = {".": "point", ",": "comma"}
-GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
-# Begin of a comment. Programs by Microsoft's compilers write 1.#IND, 1.#QNAN and 1.#INF for NaN and
-# infinity, which are no numbers here.
-COMMENT = re.compile(r"#(?!(?<=\d[.,]#)(?:IND|QNAN|SNAN|INF))")
+    Pairs = list[tuple[str, str]]
 
-
-def _words(text: str) -> frozenset[str]:
-    return frozenset(text.split())
-
-
-# Aliases in lower case, letters and digits only.
-RATE = _words(
-    "samplerate samplingrate samplefrequency samplingfrequency fs sr sfreq fsample srate "
-    "samplerateperchannel samplespersecond samplespersec scanrate matsamplerate abtastrate "
-    "abtastfrequenz messrate frequenceechantillonnage "
-    "샘플링주파수 샘플링레이트 표본화주파수 サンプリング周波数 サンプリングレート 標本化周波数"
-)
-STEP = _words(
-    "dt deltat deltax timestep samplinginterval sampleinterval sampletime samplingtime "
-    "sampleperiod samplingperiod timeincrement xincrement wfincrement increment interval ts "
-    "tsample abtastintervall abtastzeit 샘플링간격 시간간격 "
-    "サンプリング間隔 サンプリング周期 時間間隔"
-)
-DATE = _words(
-    "date datum datetime recorded recordingdate measurementdate measured starttime timestamp "
-    "wfstarttime startdate datestarted created 날짜 측정일 측정일시 日付 日時 測定日 測定日時"
-)
-UNIT = _words("unit units einheit unitstring yunit yunits yunitlabel forceunit unitsy 단위 単位")
-TIME_UNIT = _words("timeunit timeunits xunit xunits xunitlabel unitsx unittime zeiteinheit")
-TIME = _words(
-    "time times t zeit temps tempo sec seconds xvalue abscissa timestamps 시간 시각 時間 時刻"
-)
-# Names of channels that show the encoding of a header.
-_FORCE = _words("kraft stoßkraft 힘 충격력 하중 力 衝撃力 荷重")
-WORDS = RATE | STEP | DATE | UNIT | TIME_UNIT | TIME | _FORCE
-
-# "Force [kN]", "Force (kN) 1"; "Force / kN", "Force, kN"; "Force in kN", "Force_kN", "Force kN".
-BRACKETS = re.compile(r"\[([^][]{0,30})\]|\{([^{}]{0,30})\}|\(((?:[^()]|\([^()]*\)){0,30})\)")
-LOOSE = re.compile(r"(?P<name>.*?\S)(?P<mark>\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s,_]{1,12})\s*")
-# Words that are no units after a blank, or after an underscore.
-_AMBIGUOUS = {"": {"g", "h", "min", "K", "rad"}, "_": {"h", "K"}}
-QUANTITY = re.compile(
-    rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
-    re.IGNORECASE,
-)
-# Names of factors and offsets; of factors that convert to a unit, which apply if no unit is stated.
-_FACTOR = re.compile(
-    r"(amp|amplifier|channel|data|force|raw|sensor|signal|unit|y)?"
-    r"((gain|scale|scaling|conversion|calibration|multiplication)(factor|coefficient|db)?"
-    r"|factor|multiplier|slope)s?"
-)
-_OFFSET = frozenset({"addoffset", "offset", "intercept"})
-_SENSITIVITY = _words("sensitivity calibration")
-# Full-width brackets of Japanese and Korean titles, and those of ASCII.
-_BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d", "()[]")
-# Maximum length of a title or value.
-MAX_LENGTH = 200
+COMMENTS = "#%!*'/;"
+# Marks at the end of a line that separate nothing.
+TRAILING = "\t; "
+# Separators of name and value in a header, and begin of a value.
+PAIR = re.compile(r"[:=\t;,]")
+VALUE = re.compile(r"[:=]\s*[-+]?\d")
+DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
+# What separates titles that hold commas: tabs, semicolons, or blanks between words.
+OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
+# A unit behind a comma, as in "Time, s": this comma separates no titles.
+UNIT_PART = re.compile(r", +([^,]+)")
+# Titles of the column that LabVIEW and spreadsheets add, which may have no cells.
+REMARK = {"comment", "comments", "remark", "remarks", "kommentar", "bemerkung"}
+ONE_TITLE = "a title for each column, with its unit if it is known"
 
 
-def _numbers(decimal: str) -> re.Pattern[str]:
-    """Return the pattern of numbers with a decimal mark; the first group separates thousands.
+@dataclass
+class Layout:
+    """Layout of a file: the numbers begin at line `first`.
 
-    A decimal comma needs a digit behind it: the comma in ``0, 1.5`` separates columns.
+    `used` are the columns of numbers with the units in their first cells, `clock` is a column of
+    times of day, `width` the number of columns and `full_width` that with empty ones behind them.
+    Line `shown` shows the decimal mark; 0 if none does.
     """
-    mark = re.escape(decimal)
-    fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
-    grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
-    return re.compile(
-        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:[ed][-+]?\d+)?"
-        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*{fraction})",
-        re.ASCII | re.IGNORECASE,
+
+    name: str
+    allowed: str
+    lines: Callable[[], Iterator[str]]
+    separator: str | None = None
+    decimal: str = "."
+    shown: int = 0
+    first: int = 1
+    width: int = 0
+    full_width: int = 0
+    used: dict[int, str] = field(default_factory=dict)
+    clock: int | None = None
+
+    def cells(self, line: str) -> list[str]:
+        """Return the cells of a line of numbers."""
+        text = COMMENT.split(line, 1)[0].strip(" \r")
+        text = text.rstrip(TRAILING.replace(self.separator or " ", ""))
+        return split_line(text, self.separator) if text else []
+
+    def refuse(self, line: int, reason: str, allowed: str = "") -> NoReturn:
+        """Raise InputError for a line."""
+        refuse(f"{self.name}: line {line}: {reason}", allowed or self.allowed)
+
+
+def read_cell(cell: str) -> tuple[str, str]:
+    """Return the number of a cell as text and its unit; the cell itself if there is no unit."""
+    match = None if is_number(cell) else QUANTITY.fullmatch(cell)
+    is_value = match and is_number(match["number"]) and find_unit(match["unit"])
+    return (match["number"], match["unit"]) if match and is_value else (cell, "")
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """A line above the numbers: name and unit of its cells, and if there is one for each column."""
+
+    number: int
+    text: str
+    titles: Pairs
+    fits: bool
+
+    @property
+    def states(self) -> tuple[bool, bool]:
+        """Whether it states units, and whether it names times."""
+        units = [find_unit(unit) for _, unit in self.titles]
+        names_time = any(plain(name) in TIME for name, _ in self.titles)
+        return any(units), names_time or any(UNITS[unit][0] == "s" for unit in units if unit)
+
+
+def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
+    """Return names and values of the header, name and unit of each column, and if it has a line."""
+    header: Pairs = []
+    rows: list[_Row] = []
+    for number, line in enumerate(above, 1):
+        text = line.lstrip(COMMENTS + " \t").strip()
+        if pair := _known_pair(text):
+            header.append(pair)
+        elif text:
+            rows.append(_read_row(number, line, text, layout))
+    fitting = [row for row in rows if row.fits]
+    units = [row for row in fitting if _are_units(row.titles)]
+    titles = [row for row in fitting if row not in units]
+    # Titles state units or times, or are next to the numbers.
+    chosen = max(titles, key=lambda row: (row.states, row.number), default=None)
+    for row in rows:
+        if row is not chosen and row not in units:
+            _refuse_row(row, above, layout, is_open=chosen is None)
+    names = chosen.titles if chosen else []
+    layout.width = max([layout.width, len(names), *(len(row.titles) for row in units)])
+    names += [("", "")] * (layout.width - len(names))
+    stated = [[unit, layout.used.get(i, "")] for i, (_, unit) in enumerate(names)]
+    for i, (name, unit) in itertools.chain(*(enumerate(row.titles) for row in units)):
+        stated[i].append(unit or name)
+    times = [i for i in layout.used if is_time(f"{names[i][0]} [{stated[i][0]}]")]
+    for title, value in header:
+        for i, unit in _header_units(title, value, times, layout):
+            stated[i].append(unit)
+    columns = [
+        (name, _one_unit(name, stated[i], f"{layout.name}: column {i + 1}"))
+        for i, (name, _) in enumerate(names)
+    ]
+    return (
+        [(name, re.split(r"[\t;]", value)[0]) for name, value in header],
+        columns,
+        bool(fitting),
     )
 
 
-NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
+def _are_units(titles: Pairs) -> bool:
+    """Whether most titles are units without a name."""
+    filled = [title for title in titles if any(map(str.isalpha, "".join(title)))]
+    known = sum(bool(find_unit(unit or name)) for name, unit in filled)
+    has_names = any(name and unit for name, unit in filled)
+    is_bare = bool(filled) and all(unit for _, unit in filled)
+    return not has_names and (2 * known > len(filled) or is_bare)
 
 
-def is_number(cell: str) -> bool:
-    """Whether a cell is a number with either decimal mark."""
-    return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
+def _one_unit(name: str, stated: list[str], label: str) -> str:
+    """Return the unit of a column, of which several statements may hold the same."""
+    known = {find_unit(unit) or unit: unit for unit in stated if unit not in {"", "-", "--"}}
+    if len(known) > 1:
+        text = " and ".join(map(shown_text, known.values()))
+        refuse(f"{label}: its unit is stated as {text}", "one unit")
+    return next(iter(known.values()), name if name in UNITS else "")
 
 
-def to_number(cell: str, decimal: str) -> float | None:
-    """Return the number in a cell; None if the cell is not a number with this decimal mark.
+def _known_pair(text: str) -> tuple[str, str] | None:
+    """Return name and value of a line of a header if the name is known and the value is one."""
+    is_marked = PAIR.search(text)
+    parts = PAIR.split(text, maxsplit=1) if is_marked else text.rsplit(maxsplit=1)
+    name, value = "".join(parts[:1]).strip(), "".join(parts[1:]).strip(" :=\t;,")
+    word = plain(split_title(name)[0] if is_marked else name)
+    is_pair = word in UNIT | TIME_UNIT or (word in DATE and DATE_LIKE.search(value))
+    is_pair = is_pair or (word in RATE | STEP and re.match(r"[-+.]?\d", value))
+    return (name, value) if value and is_pair else None
 
-    >>> to_number("1.234,5", ","), to_number("1.234,5", ".")
-    (1234.5, None)
+
+def _read_row(number: int, line: str, text: str, layout: Layout) -> _Row:
+    """Return the cells of a line, split so that there is a title or unit for each column."""
+    separator = layout.separator
+    if layout.width == 1:
+        bare = text.strip(" ;\t")
+        is_value = re.search(r"[:=]|[\t;]\s*\S", bare) or is_number(bare)
+        return _Row(number, text, [split_title(bare)], fits=not is_value)
+    # A separator in front of the titles is no comment.
+    full = line.lstrip((COMMENTS + " \t").replace(separator or " ", "")).rstrip(" \r")
+    splits = [*_splits(full, separator), *_splits(full.partition("#")[0].rstrip(), separator)]
+    for cells in splits:
+        has_number = any(
+            is_number(c.rstrip(":")) or DATE_CELL.fullmatch(c) or seconds_of_day(c) is not None
+            for c in cells
+        )
+        has_remarks = all(plain(c) in REMARK for c in cells[layout.width :] if c)
+        if len(cells) < layout.width or not any(cells) or has_number:
+            continue
+        if has_remarks or not any(cells[layout.full_width :]):
+            count = max(layout.width, *(i for i, cell in enumerate(cells, 1) if cell))
+            return _Row(number, text, [split_title(cell) for cell in cells[:count]], fits=True)
+    cells = next(_splits(text, separator), [text])
+    return _Row(number, text, [split_title(cell) for cell in cells], fits=False)
+
+
+def _splits(text: str, separator: str | None) -> Iterator[list[str]]:
+    """Yield the cells of a line of titles by the separator of the numbers, and by others."""
+    for mark in dict.fromkeys((separator or "\t", "\t", ";", ",")):
+        if mark in text and not (mark == "," and OTHER_SEPARATOR.search(text)):
+            cells = split_line(text, mark)
+            parts = {find_unit(part) for part in UNIT_PART.findall(text)}
+            is_split = mark != "," or _are_units(list(map(split_title, cells)))
+            if is_split or not parts - {"", "counts", "FS"}:
+                yield cells
+    if separator is None:
+        yield re.split(r" {2,}", text)
+        # "Force [N]" and "Force / N" are one title.
+        joined = BRACKETS.sub(lambda match: match[0].replace(" ", "\0"), text)
+        words = re.sub(r"(?<=[^\])}\s])\s+(?=[\[({])|\s+(/)\s+", "\0\\1\0", joined).split()
+        yield [" ".join(word.split("\0")) for word in words]
+
+
+def _refuse_row(row: _Row, above: list[str], layout: Layout, *, is_open: bool) -> None:
+    """Raise InputError for a line above the numbers with numbers, or with titles that do not fit.
+
+    With `is_open` the columns have no titles yet.
     """
-    match = NUMBERS[decimal].fullmatch(cell)
-    if match is None:
-        return None
-    # Fortran writes 1.5D+03.
-    return float(
-        re.sub("[dD]", "e", cell.replace(match["group"] or "\0", "").replace(decimal, "."))
-    )
+    line, is_last = above[row.number - 1].strip(" "), row.number == len(above)
+    is_comment = line[:1] in tuple(COMMENTS)
+    cells = [] if is_comment else layout.cells(line)
+    while cells and not cells[-1]:
+        cells.pop()
+    if len(cells) == layout.width and any(map(is_number, cells)):
+        # A word may stand in front of the numbers of the first row.
+        is_row = is_last and all(is_number(cells[i]) for i in layout.used)
+        wrong = next((cell for cell in cells if cell and not is_number(cell)), "")
+        if wrong and (is_row or not any(map(str.isalpha, next(filter(None, cells))))):
+            layout.refuse(row.number, f"{shown_text(wrong)!r} is not a number")
+    pieces = [piece.strip() for piece in re.split(r"[\t;,]", row.text)]
+    if VALUE.search(row.text) or any(is_number(read_cell(piece)[0]) for piece in pieces):
+        return
+    states_unit, names_time = row.states
+    count = len(row.titles)
+    is_title = names_time and (count > 1 or is_last)
+    if is_last and not is_comment and ":" not in row.text:
+        is_title |= (layout.separator or "\n") in row.text
+    if (is_title and is_open) or states_unit or _are_units(row.titles):
+        reason = f"{count} title{'s' * (count > 1)} for {layout.width} columns"
+        reason = reason if count != layout.width else "is a second line of titles"
+        layout.refuse(row.number, f"{shown_text(row.text)!r}: {reason}", ONE_TITLE)
 
 
-def find_separator(line: str) -> str | None:
-    """Return the separator of the columns of a line, None for blanks.
-
-    >>> find_separator("0,1 1,5")
-    >>> find_separator("0, 1.5")
-    ','
-    >>> find_separator('"0,1","1,5"')
-    ','
-    """
-    bare = re.sub('"[^"]*"', "0", line)
-    separator = next((mark for mark in SEPARATORS if mark in bare), None)
-    words = re.split(" +", bare)
-    # A comma next to a blank is no decimal comma.
-    are_numbers = all(is_number(word) and not word.startswith(",") for word in words)
-    return None if separator == "," and len(words) > 1 and are_numbers else separator
-
-
-def split_line(line: str, separator: str | None) -> list[str]:
-    """Return the cells of a line without the blanks and quotes around them.
-
-    >>> split_line('"0,1" ;1,5', ";")
-    ['0,1', '1,5']
-    """
-    if '"' in line:
-        words = csv.reader([line], delimiter=separator or " ", skipinitialspace=True)
-        return [cell.strip() for cell in next(words)]
-    if separator is None:  # other blanks group digits
-        return re.split("[ \t]+", line)
-    return [cell.strip() for cell in line.split(separator)]
-
-
-def plain(name: str) -> str:
-    """Return a name in lower case, letters and digits only.
-
-    >>> plain("Sample_Rate ")
-    'samplerate'
-    """
-    return "".join(c for c in name[:MAX_LENGTH].casefold() if c.isalnum())
-
-
-def split_title(title: str) -> tuple[str, str]:
-    """Return name and unit of a title; the unit is empty if there is none.
-
-    >>> split_title("Force [kN]")
-    ('Force', 'kN')
-    >>> split_title("time_s")
-    ('time', 's')
-    """
-    text = title.strip().strip("\"'").strip()[:MAX_LENGTH].translate(_BRACKETS)
-    loose = LOOSE.fullmatch(text)
-    if loose and (unit := find_unit(loose["unit"])):
-        mark = loose["mark"].strip()
-        if unit not in _AMBIGUOUS.get(mark[:1], ()) or plain(loose["name"]) in TIME:
-            return loose["name"].strip(), loose["unit"]
-    groups = [(match, "".join(filter(None, match.groups()))) for match in BRACKETS.finditer(text)]
-    for match, unit in groups:
-        if find_unit(unit) or (match is groups[-1][0] and text.endswith(match[0])):
-            name = f"{text[: match.start()]} {text[match.end() :]}"
-            return " ".join(name.split()), unit.strip()
-    return text, ""
-
-
-def is_time(title: str) -> bool:
-    """Whether a title names a column of times."""
-    name, unit = split_title(title)
-    return plain(name) in TIME or size_of(unit)[0] == "s"
-
-
-def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
-    """Return a number and the unit after it; None if there is no number.
-
-    If the text is a number with either decimal mark, `decimal` is the mark. Without it the mark is
-    the point, and None is returned for an ambiguous number such as 51,200.
-
-    >>> read_number("51,2 kHz")
-    (51.2, 'kHz')
-    """
-    match = QUANTITY.fullmatch(str(text).strip().strip("\"'").strip()[:MAX_LENGTH])
-    if not match:
-        return None
-    values = {mark: to_number(match["number"], mark) for mark in MARKS}
-    known = {value for value in values.values() if value is not None}
-    if not known or (len(known) > 1 and not decimal and "," in match["number"]):
-        return None
-    value = values[decimal or "."] if len(known) > 1 else known.pop()
-    return (value, match["unit"].strip(" []()")) if value is not None else None
-
-
-def find_rate(items: Iterable[tuple[str, str]], decimal: str = "") -> float | None:
-    """Return the sample rate, Hz, from names and values of a header; None if there is none.
-
-    `decimal` is that of `read_number`.
-    """
-    for title, value in items:
-        name, titled = split_title(title)
-        kind = "Hz" if plain(name) in RATE else "s" if plain(name) in STEP else ""
-        number, own = (read_number(value, decimal) if kind else None) or (0.0, "")
-        base, size = size_of(own or titled or kind)
-        if number * size > 0 and base == kind:
-            return number * size if kind == "Hz" else 1 / (number * size)
-    return None
-
-
-def find_word(items: Iterable[tuple[str, str]], words: frozenset[str]) -> str:
-    """Return the first value of a header whose name is one of some words, or an empty string."""
-    for title, value in items:
-        if plain(split_title(title)[0]) in words and value.strip():
-            return value.strip().strip("\"'")[:MAX_LENGTH]
-    return ""
-
-
-def neutral_value(name: str, unit: str = "") -> float | None:
-    """Return the value of a factor or an offset that changes nothing; None of any other name.
-
-    >>> neutral_value("scale_factor"), neutral_value("add_offset"), neutral_value("date")
-    (1.0, 0.0, None)
-    """
-    alias = plain(split_title(name)[0])
-    if alias in _OFFSET:
-        return 0.0
-    is_factor = not unit if alias in _SENSITIVITY else _FACTOR.fullmatch(alias)
-    return 1.0 if is_factor else None
-
-
-def find_unapplied(items: Iterable[tuple[str, str]], unit: str) -> str:
-    """Return the first factor or offset in a header that changes values; `unit` is theirs."""
-    for title, value in items:
-        neutral = neutral_value(title, unit)
-        if neutral is not None and (read_number(value) or (None, ""))[0] != neutral:
-            return f"{title[:MAX_LENGTH]} = {value[:MAX_LENGTH]}"
-    return ""
-
-
-def text_of(value: object) -> str:
-    """Return an attribute as text: bytes, text, a number, or an array with one element."""
-    item = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-    while isinstance(item, list | tuple) and len(item) == 1:
-        item = item[0]
-    if isinstance(item, bytes):
-        return item.decode("utf-8", "replace")
-    return "" if isinstance(item, list | tuple) or item is None else str(item)
+def _header_units(
+    title: str, value: str, times: list[int], layout: Layout
+) -> Iterator[tuple[int, str]]:
+    """Yield columns and units of an entry of the header, of times or of the other columns."""
+    used, word = [*layout.used], plain(split_title(title)[0])
+    channels = [i for i in used if i not in times]
+    units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
+    if word in TIME_UNIT:
+        yield from ((i, units[0]) for i in times or used[:1])
+    elif word in UNIT and len(units) == 1:
+        yield from ((i, units[0]) for i in channels)
+    elif word in UNIT:
+        lists = ([*range(layout.width)], used, channels, used[1:])
+        chosen = next((some for some in lists if len(some) == len(units)), [])
+        if not chosen:
+            count = f"{len(units)} units for {len(channels)} channels"
+            refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
+        yield from zip(chosen, units, strict=True)

@@ -13,7 +13,9 @@ from thud.base.checks import refuse
 from thud.base.units import factor_to
 from thud.recordings.channel import MAX_COLUMNS, MAX_IN_MEMORY, MIN_SAMPLES, Channel
 from thud.recordings.force_units import find_unit
-from thud.recordings.header import (
+from thud.recordings.signal import read_scaled
+from thud.recordings.times import rise_uniformly, uniform_grid
+from thud.recordings.words import (
     DATE,
     TIME,
     UNIT,
@@ -27,8 +29,6 @@ from thud.recordings.header import (
     split_title,
     text_of,
 )
-from thud.recordings.signal import read_scaled
-from thud.recordings.times import rise_uniformly, uniform_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, guarded, library, shown_path, shown_text
-from thud.recordings.header import (
+from thud.recordings.words import (
     DATE,
     UNIT,
     find_rate,

@@ -11,7 +11,6 @@ from thud.base.checks import refuse
 from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.recordings.channel import MIN_SAMPLES, Channel
-from thud.recordings.header import DATE, find_rate, find_word
 from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
 from thud.recordings.times import (
@@ -21,6 +20,7 @@ from thud.recordings.times import (
     rise_uniformly,
     uniform_grid,
 )
+from thud.recordings.words import DATE, find_rate, find_word
 
 if TYPE_CHECKING:
     from pathlib import Path
