@@ -40,6 +40,8 @@ MAX_EVALUATIONS = 20
 # its amplitude times MISFIT_WEIGHT.
 NOISE_PROBABILITY = 0.01
 MISFIT_WEIGHT = 2.0
+# Power of a record without noise.
+TINY = 1e-300
 
 
 class Mode(NamedTuple):
@@ -189,7 +191,7 @@ def _describe(
         count = max(near.size - 2, 1)
         noise, excess = math.sqrt(float(near.sum()) / count), 0.0
         if usual.size:
-            ratio = float(near.sum() / count / usual.mean())
+            ratio = float(near.sum() / count / max(usual.mean(), TINY))
             # A frequency of a real signal has two values.
             if fdtrc(2 * count, 2 * usual.size, ratio) < NOISE_PROBABILITY:
                 excess = math.sqrt(max(2 * float(near.sum() - near.size * usual.mean()), 0.0))

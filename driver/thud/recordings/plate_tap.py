@@ -43,7 +43,8 @@ STARTS = (1e-3, 1.5e-3, 2e-3, 3e-3, 4e-3)
 MIN_MISFIT = 0.01
 # Relative standard uncertainty of the clock of a recorder.
 CLOCK = 1e-4
-# Maximum relative uncertainty of the frequency.
+# Minimum relative uncertainty of a tap, by rounding, and maximum one of the frequency.
+MIN_UNCERTAINTY = 1e-12
 MAX_UNCERTAINTY = 0.05
 # Probability below which the taps differ by more than their noise.
 SIGNIFICANT = 0.05
@@ -129,7 +130,9 @@ def calibrate_tap(
         refuse(f"{name}: the sample rate is unknown or low", f"{MIN_RATE:g} Hz or more")
     if signal.n_sample > MAX_SAMPLES:
         refuse(f"{name}: {signal.n_sample} samples", f"up to {MAX_SAMPLES} samples")
-    taps = _find_taps(signal.read(0, signal.n_sample), rate, name)
+    level = signal.read(0, signal.n_sample)
+    # Fits of very large or small numbers overflow.
+    taps = _find_taps(level / (np.abs(level).max(initial=0.0) or 1.0), rate, name)
     fits = [modes for tap in taps if (modes := _fit_tap(tap, rate))]
     if not fits:
         refuse(
@@ -176,7 +179,7 @@ def _static_response(mode: Mode) -> float:
 
 def _mean(values: list[float], deviations: list[float]) -> tuple[float, float]:
     """Return the geometric mean of values with relative uncertainties, and its uncertainty."""
-    value, weight = np.log(values), 1 / np.square(deviations)
+    value, weight = np.log(values), 1 / np.maximum(deviations, MIN_UNCERTAINTY) ** 2
     mean, count = float(weight @ value / weight.sum()), len(values)
     if count == 1 or chdtrc(count - 1, weight @ (value - mean) ** 2) >= SIGNIFICANT:
         return math.exp(mean), 1 / math.sqrt(weight.sum())
