@@ -56,9 +56,8 @@ contains
       !> Lines of UTF-8.
       character(len=*), intent(in) :: text
       character(len=:), allocatable, intent(out) :: wrapped
-      ! First characters of the line of `text`, and of what is not yet in `wrapped`; last blank; characters since `begin`.
-      integer :: line, begin, blank, width
-      integer :: i, indentation
+      ! First characters of the line of `text`, and of what is not yet in `wrapped`; last blank; width since `begin`.
+      integer :: line, begin, blank, width, i, indentation
 
       wrapped = ''
       line = 1
@@ -71,7 +70,6 @@ contains
             wrapped = wrapped//text(begin:i)
             line = i + 1
             begin = line
-            blank = 0
             width = 0
          else if (text(i:i) == ' ' .and. verify(text(line:i), ' ') > 0) then
             blank = i
