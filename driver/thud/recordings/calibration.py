@@ -149,7 +149,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
         notes.append(Note("gravity_assumed", "", local, low, high, "m/s2", others=others))
     load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg (g = {local:g} m/s2)"
     return Calibration(
-        f"{newtons / size!r} N/{symbol}",
+        f"{float(newtons / size)!r} N/{symbol}",
         math.hypot(steps.uncertainty / size, uncertainty, spread),
         f"{number} step{'s' * (number > 1)} of {load} in {signal.name}",
         time_constant,
