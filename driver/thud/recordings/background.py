@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import lapack, solve_triangular
 from scipy.ndimage import uniform_filter1d
 
-from thud.base.immutable import Immutable
+from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.quantization import MARGIN, MAX_BACKGROUND, Quantization
@@ -138,7 +138,7 @@ class Background(Immutable):
         noise = np.diag(white + (QUANTIZATION * self.peak) ** 2)
         factor = np.linalg.cholesky(self.covariance(self.cells, self.cells) + noise)
         unit = np.eye(len(factor))
-        return np.asarray(solve_triangular(factor, unit, lower=True, check_finite=False))
+        return freeze(np.asarray(solve_triangular(factor, unit, lower=True, check_finite=False)))
 
     @property
     def _weights(self) -> NDArray[np.float64]:
