@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 COMMENTS = "#%!*'/;"
 # Marks at the end of a line that separate nothing.
 TRAILING = "\t; "
-# Separators of name and value in a header, and begin of a value.
+# Separators of name and value in a header; begin of a value, or a value with its unit at the end.
 PAIR = re.compile(r"[:=\t;,]")
-VALUE = re.compile(r"[:=]\s*[-+]?\d")
+VALUE = re.compile(r"[:=]\s*[-+]?\d|\s[-+]?\d[\d.]* [A-Za-z]+$")
 DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
 # What separates titles that hold commas: tabs, semicolons, or blanks between words.
 OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
