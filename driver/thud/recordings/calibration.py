@@ -120,6 +120,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     local = _require_gravity(gravity, mass)
     newtons = force if force is not None else (mass or 0.0) * local
     require_number("calibrate(): force", newtons)
+    require_number("calibrate(): uncertainty", uncertainty)
     if not newtons > 0 or not 0 <= uncertainty < 1:
         refuse(
             f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from datetime import date
+from numbers import Integral
 from typing import Any, ClassVar, Self
 
 from thud.base.checks import (
@@ -98,9 +99,9 @@ def to_date(value: object, key: str) -> str:
 
 def to_channel(value: object, key: str) -> int | str:
     """Return the number or the name of a channel."""
-    is_number = isinstance(value, int) and not isinstance(value, bool)
-    number: int = Number(1, 1_000_000, whole=True)(value, key) if is_number else 0
-    return number or to_line(value, key)
+    if isinstance(value, Integral) and not isinstance(value, bool):
+        return int(Number(1, 1_000_000, whole=True)(int(value), key))
+    return to_line(value, key)
 
 
 def require_channels(value: object, key: str = "channels") -> str | tuple[int | str, ...]:
