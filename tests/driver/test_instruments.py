@@ -267,3 +267,16 @@ def test_limit_of_a_flat_plate_below_that_of_the_standard_is_a_warning() -> None
     for limit, warned in ((999.0, True), (1000.0, False)):
         recording = measured(PULSE, plate=Plate(flat_limit=limit))
         assert ("plate_not_flat" in codes(recording.notes)) == warned
+
+
+def test_peak_has_the_uncertainty_of_instruments_that_are_not_stated() -> None:
+    signal, plates = Signal.from_array(PULSE, RATE), (200.0, 1e5)
+    doubted, known = (
+        thud.read_recording(signal, config=Config(**FLAT | {"plate": Plate(flat_limit=limit)}))
+        .drops[0].peak_force.uncertainty
+        for limit in plates
+    )  # fmt: skip
+    # The plate is 2 % off at 200 Hz, as a mass on a spring; the pulse lies near 25 Hz, and its
+    # flanks excite the resonance.
+    change = 1500 * 0.02 * (25 / 200) ** 2 / np.sqrt(3)
+    assert change < np.sqrt(doubted**2 - known**2) < 2 * change

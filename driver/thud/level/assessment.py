@@ -354,7 +354,7 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     for standard, value in zip(get_criteria(source), values, strict=True):
         name, unit = standard.name, standard.unit
         if not isinstance(value, Estimate):
-            is_unknown = isinstance(value, float) and math.isnan(value)
+            is_unknown = isinstance(value, float | np.floating) and math.isnan(value)
             value = Estimate(math.nan if is_unknown else require_number(name, value))  # noqa: PLW2901
         lower, upper = (limits or {}).get(name, (standard.lower, standard.upper))
         criteria.append(Criterion(name, replace(value, unit=unit), lower, upper))

@@ -16,7 +16,7 @@ from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.base.units import frequency_text
 from thud.level.estimate import NORMAL_FACTOR, RECTANGULAR, Contribution
-from thud.level.levels import get_bands
+from thud.level.levels import get_bands, low_pass
 from thud.recordings.config_values import Choice, Number, Table, key, to_linearity
 
 if TYPE_CHECKING:
@@ -318,6 +318,23 @@ def mean_level_changes(
             after[name] += below[stop] - below[first]
     with np.errstate(invalid="ignore"):  # a band above half the rate
         return {name: 10 * np.log10(values / before) for name, values in after.items()}
+
+
+def with_assumptions(drop: Drop, config: Config) -> Drop:
+    """Return a drop whose peak has the uncertainty due to instruments that are not stated."""
+    from scipy.fft import next_fast_len
+
+    rate, force = drop.sample_rate, np.pad(drop.contact.gated, 2)
+    length = next_fast_len(2 * len(force), real=True)
+    spectrum = np.fft.rfft(force, length)
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
+    peaks = [
+        low_pass(np.fft.irfft(spectrum * gain(frequency), length)[: len(force)], rate).max()
+        for name, gain in _gains([drop], config).items()
+        if name in ASSUMED
+    ]
+    change = math.hypot(*(peak - low_pass(force, rate).max() for peak in peaks))
+    return replace(drop, peak_force=drop.peak_force.widened(change / RECTANGULAR))
 
 
 def _gains(drops: Sequence[Drop], config: Config) -> dict[str, Gain]:

@@ -21,6 +21,7 @@ from thud.recordings.checks import copies
 from thud.recordings.config import Config, read_config
 from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, choose, cut_section, find_drops, require_chosen
+from thud.recordings.instruments import with_assumptions
 from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.recording import Origin, Recording
@@ -81,6 +82,7 @@ def measure_stages(section: Section, config: Config, calibration: float | None =
         allowed = "a background of noise, drift and hum"
         refuse(f"{section.name}: the background is not noise", allowed, error)
     drop = measure_drop(corrected, contact, config, calibration, repaired)
+    drop = with_assumptions(drop, config)
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(contact, background=replace(contact.background))
     return Stages(section, repaired, corrected, replace(drop, contact=contact))
