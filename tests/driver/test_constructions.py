@@ -202,9 +202,12 @@ def test_library_is_filtered_by_words() -> None:
         "concrete 180, screed on 15 MN/m3, ceiling",
     )
     assert [entry.name for entry in found] == list(found.names)
-    assert thud.constructions("concrete 180 ceiling")[found.names[-1]] == thud.construction(
-        found.names[-1]
-    )
+    # The dictionaries are the caller's.
+    found.entries[-1].room["ceiling_mass"] = 10.0
+    thud.construction(found.names[-1]).sources.clear()
+    last = thud.construction(found.names[-1])
+    assert (last.room["ceiling_mass"], last.sources["ceiling_mass"][:8]) == (9.0, "estimate")
+    assert thud.constructions("concrete 180 ceiling")[found.names[-1]] == last
     (header, row) = thud.constructions("mineral concrete 180 ceiling").rows()
     assert header[0] == "construction"
     assert (row[0], row[2]) == (found.names[-1], "526")

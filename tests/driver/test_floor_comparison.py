@@ -288,6 +288,14 @@ def test_tapping_level_is_of_bare_plates(
         thud.tapping_level(thud.Plate(**keys), thud.Room(**room))
 
 
+def test_tapping_level_is_not_of_constructions_with_a_ceiling() -> None:
+    found = [c for c in thud.constructions("ceiling") if c.room and isinstance(c.floor, thud.Plate)]
+    assert len(found) > 1
+    for construction in found:
+        with pytest.raises(thud.InputError, match="a ceiling"):
+            thud.tapping_level(construction)
+
+
 def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:
     """Class and verdict are not stated, whatever the level."""
     floor, room = thud.Plate(screed_thickness=0.05), thud.Room(required=49.0, rating="octaves")

@@ -23,6 +23,11 @@ class Immutable:
         for name, value in vars(self).items():
             object.__setattr__(self, name, _read_only(value))
 
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Make the arrays of a copy or a pickle read-only."""
+        vars(self).update(state)
+        Immutable.__post_init__(self)
+
 
 class Plain:
     """Base of inputs: lists and arrays become tuples, and NumPy's scalars Python's, as in files."""

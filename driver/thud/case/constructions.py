@@ -285,8 +285,13 @@ def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> C
     return floor.case(case) if isinstance(floor, Construction) else replace(case, floor=floor)
 
 
-@cache
 def _library() -> tuple[Construction, ...]:
+    """Return all constructions, whose dictionaries are the caller's."""
+    return tuple(replace(c, room={**c.room}, sources={**c.sources}) for c in _read_library())
+
+
+@cache
+def _read_library() -> tuple[Construction, ...]:
     files = (inputs_folder() / "constructions").glob("*.toml")
     entries = map(read_construction, files)
     return tuple(sorted(entries, key=lambda entry: (entry.kind, _order(entry.name))))

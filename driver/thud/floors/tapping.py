@@ -115,7 +115,7 @@ def tapping_level(floor: Plate | Construction | str, room: Room | None = None) -
     plate = case.floor
     if not isinstance(plate, Plate):
         refuse_value("floor", floor, "a bare plate of concrete")
-    if obstacle := _obstacle(plate, room or Room()):
+    if obstacle := _obstacle(plate, case.room or Room()):
         refuse(*obstacle)
     result = ask("floor_modes", case=case_text(case), frequency=FREQUENCY)["plate"]
     time = 2.2 / (FREQUENCY * result["loss_factor"])
