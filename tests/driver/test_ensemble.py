@@ -267,6 +267,9 @@ def test_scalars_and_defaults() -> None:
             {"duration": 10.0, "sample_rate": 1e7, "model": "hollow_sphere"},
             naming("&sampling: duration", "10.0 s"),
         ),
+        ({}, {"model": []}, naming("model", [])),
+        ({}, {"bands": np.ones(2)}, naming("bands", [1.0, 1.0])),
+        ({}, {"forces": np.ones(2)}, naming("forces", "bool")),
         ({}, {"source": "drum"}, naming("&limits: source", "'drum'", "'tyre'")),
     ],
 )

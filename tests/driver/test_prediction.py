@@ -531,6 +531,9 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     assert "does not conform" not in done.stderr
     with pytest.raises(thud.InputError, match=naming("floor is missing")):
         thud.predict_level()
+    for name in ("floor", "room"):
+        with pytest.raises(thud.InputError, match=naming(name, "array([1., 1.])")):
+            thud.predict_level(**{name: np.ones(2)})  # type: ignore[arg-type]
 
 
 def test_room_has_the_dimensions_that_are_stated(shell: thud.Impact) -> None:

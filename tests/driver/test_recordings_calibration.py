@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import soundfile
-from conftest import naming
+from conftest import codes, naming
 from scipy.signal import cont2discrete, lfilter
 from synthetic import half_sine
 
@@ -198,19 +198,21 @@ def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty(
     stated = calibrate(signal, mass=10.0, gravity=9.798, unit="V")
     assert float(stated.chain.split()[0]) == pytest.approx(97.98, rel=1e-4)
     assert stated.origin.startswith("2 steps of 10 kg (g = 9.798 m/s2)")
-    assert not stated.notes
+    assert codes(stated.notes) == ["known_force_uncertain"]
     silent = calibrate(signal, mass=10.0, unit="V")
     assert float(silent.chain.split()[0]) == pytest.approx(98.0665, rel=1e-4)
     # From 9.780 m/s2 at the equator to 9.833 m/s2 at the poles: a rectangular distribution.
     spread = (9.833 - 9.780) / 2 / math.sqrt(3) / 9.80665
     assert stated.uncertainty is not None
     assert silent.uncertainty == pytest.approx(math.hypot(stated.uncertainty, spread))
-    (note,) = silent.notes
+    assert calibrate(signal, mass=10.0, gravity=9.8, unit="V", uncertainty=1e-3).notes == ()
+    _, note = silent.notes
     assert (note.code, note.low, note.high) == ("gravity_assumed", 9.780, 9.833)
     for given, words in (
         ({"mass": 10.0, "gravity": 98.0}, naming("gravity", "9.76 to 9.84")),
         ({"mass": 10.0, "gravity": math.nan}, naming("gravity", "nan")),
         ({"force": 98.0, "gravity": 9.81}, naming("gravity", "mass")),
+        *(({"mass": mass}, naming("mass", mass)) for mass in ("2", [2.0], True)),
     ):
         with pytest.raises(InputError, match=words):
             calibrate(signal, unit="V", **given)
@@ -254,8 +256,9 @@ def test_steps_in_one_direction_are_each_the_whole_force() -> None:
     level += np.random.default_rng(1).normal(0, 0.01, time.size)
     found, error = calibrated(level)
     assert abs(error) < 0.01
-    assert [(note.code, note.value) for note in found.notes] == [("steps_in_one_direction", FORCE)]
-    assert not calibrated(recorded(math.inf, 1))[0].notes
+    assert codes(found.notes) == ["steps_in_one_direction", "known_force_uncertain"]
+    assert found.notes[0].value == FORCE
+    assert codes(calibrated(recorded(math.inf, 1))[0].notes) == ["known_force_uncertain"]
 
 
 def test_messages_name_the_decimal_comma_and_the_channels(

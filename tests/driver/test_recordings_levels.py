@@ -688,10 +688,25 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
     assert with_levels(Estimate(39.0)) == "conforms"
     assert with_levels(Estimate(39.0), mass=math.nan) == "undecided"
     assert with_levels(Estimate(39.0), restitution=0.95, mass=math.nan) == "does not conform"
-    with pytest.raises(thud.InputError, match=naming("levels", 4, 5)):
-        assess_levels(NOMINAL[:4])
-    with pytest.raises(thud.InputError, match=naming("'bowling_ball'", "'rubber_ball'")):
-        assess_levels(NOMINAL, source="bowling_ball")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"levels": NOMINAL[:4]}, naming("levels", 4, 5)),
+        ({"levels": None}, naming("levels", None)),
+        ({"source": "bowling_ball"}, naming("'bowling_ball'", "'rubber_ball'")),
+        ({"limits": [1]}, naming("limits", [1], "Mapping")),
+        ({"limits": {"octave_64": (1, 2)}}, naming("limits", "'octave_64'", "'octave_63'")),
+        ({"limits": {"mass": ("a", 1)}}, naming("limits: mass")),
+        ({"limits": {"mass": (1, 2, 3)}}, naming("limits: mass", [1, 2, 3])),
+        ({"peaks": 1.5}, naming("peaks", 1.5, "whole")),
+        ({"peaks": -1}, naming("peaks", -1.0)),
+    ],
+)
+def test_wrong_criteria_are_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        assess_levels(**{"levels": NOMINAL, **options})
 
 
 def test_probability_of_conformity_counts_both_limits() -> None:

@@ -390,7 +390,7 @@ def test_calibration_of_a_file_with_a_factor_names_it(tmp_path: Path) -> None:
     level = np.repeat([0.0, 0.1], 10_000) + np.random.default_rng(3).normal(0, 1e-4, 20_000)
     entries = [("array", "Fs", RATE), ("array", "unit", "V"), ("array", "gain", 10.0)]
     write_hdf5(tmp_path / "a.h5", level, entries)
-    found = calibrate(tmp_path / "a.h5", force=500.0)
+    found = calibrate(tmp_path / "a.h5", force=500.0, uncertainty=0.01)
     (note,) = found.notes
     assert (note.code, note.others) == ("stored_values_calibrated", {"factor": "gain = 10.0"})
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.display import draw_all
-from thud.base.note import Note
 from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
@@ -190,8 +189,6 @@ def run_calibrate(options: argparse.Namespace) -> int:
         if result.time_constant:
             print_results(f"# {result.time_constant}")
     print_notes(result.notes)
-    if not options.uncertainty:
-        print_notes([Note("known_force_uncertain")])
     return 0
 
 

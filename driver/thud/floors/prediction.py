@@ -220,8 +220,9 @@ def predict_level(
     """
     require_kind("source", source, ImpactOrRecording | None)
     case = Case() if source is None else source.case
+    require_kind("room", room, Room | None)
     room = room or case.room or Room()
-    case = with_floor(replace(case, room=room), floor or case.floor)
+    case = with_floor(replace(case, room=room), case.floor if floor is None else floor)
     floor, room = case.floor, case.room
     if floor is None or room is None:
         refuse("floor is missing", "a floor, such as Plate, or the name of a construction")

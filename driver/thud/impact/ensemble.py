@@ -231,7 +231,10 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 
     base = Case() if case is None else case
     require_kind("case", base, Case)
-    if model not in {None, base.model and base.model.name}:
+    for name, value in {"levels": levels, "forces": forces, "progress": progress}.items():
+        require_kind(name, value, bool | np.bool_)
+    own = base.model.name if base.model else ""
+    if model is not None and not (isinstance(model, str) and model == own):
         base = replace(base, model=new_model(model, {}))
     if base.model is None:
         refuse("the case has no source model", "a case with a model, or model = its name")
@@ -240,7 +243,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     base = replace(
         impact_only(base),
         sampling=replace(base.sampling, **keywords),  # type: ignore[arg-type]
-        levels=replace(base.levels, bands=bands or base.levels.bands),
+        levels=replace(base.levels, bands=base.levels.bands if bands is None else bands),
         limits=Limits(source) if source is not None else base.limits,
     )
     content = case_text(base)

@@ -5,13 +5,22 @@ from __future__ import annotations
 import math
 import re
 from abc import abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base._schema import LIMITS, QUANTITIES, VERDICTS
-from thud.base.checks import refuse, require_choice, require_number
+from thud.base.checks import (
+    refuse,
+    refuse_unknown,
+    refuse_value,
+    require_choice,
+    require_kind,
+    require_number,
+    require_pair,
+)
 from thud.base.display import Displayed
 from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
@@ -19,8 +28,6 @@ from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
@@ -342,21 +349,29 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     Raises
     ------
     InputError
-        If the source is not known, `levels` has not five entries, or a value is not a number.
+        If the source or a name in `limits` is not known, `levels` has not five entries, or a value
+        is not a number, or not a whole one for `peaks`.
     """
+    require_kind("levels", levels, Iterable)
     octaves = tuple(levels)
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
         refuse(f"levels: {len(octaves)} values", allowed)
     values = (*octaves, contact_time, restitution, peaks, mass, drop_height)
-    criteria = []
-    for standard, value in zip(get_criteria(source), values, strict=True):
+    criteria, standards = [], get_criteria(source)
+    limits = {} if limits is None else limits
+    require_kind("limits", limits, Mapping)
+    refuse_unknown("limits", limits, [standard.name for standard in standards])
+    for standard, value in zip(standards, values, strict=True):
         name, unit = standard.name, standard.unit
         if not isinstance(value, Estimate):
             is_unknown = isinstance(value, float | np.floating) and math.isnan(value)
             value = Estimate(math.nan if is_unknown else require_number(name, value))  # noqa: PLW2901
-        lower, upper = (limits or {}).get(name, (standard.lower, standard.upper))
+            if name == "peak_count" and not (is_unknown or 0 <= value.value == round(value.value)):
+                refuse_value("peaks", value.value, "whole numbers, 0 or more, or NaN")
+        limit = limits.get(name, (standard.lower, standard.upper))
+        lower, upper = require_pair(f"limits: {name}", limit)
         criteria.append(Criterion(name, replace(value, unit=unit), lower, upper))
     return Verdict(source, tuple(criteria))
 

@@ -118,8 +118,8 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     if (force is None) == (mass is None):
         refuse("calibrate(): state either force or mass", "force in N or mass in kg")
     local = _require_gravity(gravity, mass)
-    newtons = force if force is not None else (mass or 0.0) * local
-    require_number("calibrate(): force", newtons)
+    name, known = ("force", force) if mass is None else ("mass", mass)
+    newtons = require_number(f"calibrate(): {name}", known) * (1.0 if mass is None else local)
     require_number("calibrate(): uncertainty", uncertainty)
     if not newtons > 0 or not 0 <= uncertainty < 1:
         refuse(
@@ -142,6 +142,8 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
         notes.append(Note("steps_in_one_direction", value=newtons, unit="N"))
     if unapplied:
         notes.append(Note("stored_values_calibrated", others={"factor": unapplied}))
+    if not uncertainty:
+        notes.append(Note("known_force_uncertain"))
     if mass is not None and gravity is None:
         low, high = SEA_LEVEL
         # The standard deviation of a rectangular distribution.
