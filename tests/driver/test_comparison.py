@@ -195,8 +195,9 @@ def test_verdict_on_a_record_is_open_where_its_ball_is_not_known(tmp_path: Path)
 
 
 def test_nothing_and_different_drops_are_told(case_file: CaseFile, tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match=naming("impacts")):
-        thud.compare({})
+    for impacts in ({}, np.ma.masked, None):
+        with pytest.raises(thud.InputError, match=naming("impacts")):
+            thud.compare(impacts)  # type: ignore[arg-type]
     with pytest.raises(thud.InputError, match=r"a\b.* 4\.429 m/s.* b\b.* 3\.132 m/s"):
         thud.compare(
             {

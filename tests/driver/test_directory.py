@@ -224,13 +224,15 @@ def test_links_in_the_place_of_results_are_not_followed(name: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", ["python.partial", "python.nc"])
-def test_directories_of_something_else_stay(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", ["paper.txt", "block_000000000000.nc"])
+def test_directories_of_something_else_stay(name: str, content: str, tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("mine")
     (tmp_path / name).mkdir()
-    (tmp_path / name / "paper.txt").write_text("mine")
+    (tmp_path / name / content).symlink_to(tmp_path / "mine")
     for replace in (False, True):
         with pytest.raises(thud.InputError, match=naming(name)):
             thud.sweep(HEIGHTS, tmp_path, replace=replace)
-    assert (tmp_path / name / "paper.txt").read_text() == "mine"
+    assert (tmp_path / name / content).read_text() == "mine"
 
 
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.EACCES])

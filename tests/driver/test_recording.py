@@ -162,6 +162,15 @@ def test_ends_of_lines_change_no_number(
     np.testing.assert_array_equal(read_table(path), [expected] * 8)
 
 
+@pytest.mark.parametrize("empty", ["\n" * 8, " \n" * 8])
+def test_empty_lines_behind_a_table_are_left_out(
+    empty: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table, "BLOCK", 8)
+    (tmp_path / "plate.csv").write_text("7, 0.250\n" * 8 + empty)
+    np.testing.assert_array_equal(read_table(tmp_path / "plate.csv"), [(7, 0.25)] * 8)
+
+
 @pytest.mark.parametrize(
     ("first", "last"),
     [("0 1,5", "2, 1,5"), ("0;1,5", "2,;1,5"), ("0 1", "2, 1.500")],

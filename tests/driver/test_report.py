@@ -493,6 +493,11 @@ def test_characters_of_any_installed_font_are_not_missing(
 @pytest.mark.filterwarnings("ignore::thud.base.errors.ReportWarning")
 def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(thud.InputError, match=naming("recording", 5)):
+        thud.write_report(5, tmp_path)  # type: ignore[arg-type]
+    for name in ("a\0b", "a\nb"):
+        with pytest.raises(thud.InputError, match="one line"):
+            thud.write_report(one, tmp_path / name)
     for also in (False, True):
         with pytest.raises(thud.InputError, match=naming(tmp_path)):
             thud.write_report(one, tmp_path, replace=also)

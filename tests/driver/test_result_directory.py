@@ -202,6 +202,12 @@ def test_full_disk_keeps_the_old_results(run: Run, two_inputs: TwoInputs, small_
     assert names_in(small_disk) == ["out"]
 
 
+def test_path_of_two_lines_is_no_list_of_two_paths(tmp_path: Path) -> None:
+    results = Results(tmp_path / "out", "floor", inputs=(tmp_path / "a\nb",))
+    with pytest.raises(thud.InputError, match=naming("one line")):
+        results.require()
+
+
 def test_results_are_read_back(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
     run(case_file("&case name = 'it''s' /\n" + MINIMAL), "-o", "out")
     out = tmp_path / "out"

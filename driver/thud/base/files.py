@@ -137,14 +137,21 @@ class Results:
 
     def _ask(self, question: str, **more: bytes) -> dict[str, Any]:
         return ask(
-            question, path=os.fsencode(self.folder), command=self.command, subject=self.subject,
+            question, path=_encoded(self.folder), command=self.command, subject=self.subject,
             replace=self.replace, inputs=_lines(self.inputs), **more,
         )  # fmt: skip
 
 
 def _lines(paths: Iterable[str | os.PathLike[str]]) -> bytes:
     """Return paths as the lines of a text of a request."""
-    return b"\n".join(map(os.fsencode, paths))
+    return b"\n".join(map(_encoded, paths))
+
+
+def _encoded(path: str | os.PathLike[str]) -> bytes:
+    """Return a path for a request; raise InputError if it has line ends or zero bytes."""
+    if {"\n", "\0"} & {*os.fsdecode(path)}:
+        refuse(f"{os.fsdecode(path)!r} is not allowed", "a path in one line without zero bytes")
+    return os.fsencode(path)
 
 
 def refuse_foreign(path: Path) -> NoReturn:
@@ -183,7 +190,7 @@ def _require_regular(path: Path) -> None:
 
 def content_of(path: Path) -> bytes | None:
     """Return the content of a regular file, None for anything else."""
-    with suppress(OSError):
+    with suppress(OSError, ValueError):  # a zero byte
         return read_input(path)
     return None
 

@@ -264,6 +264,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     InputError
         If the input is invalid; the message names file, group, key, value and allowed range.
     """
+    require_kind("path", path, str | os.PathLike)
     return Case.from_text(ask("effective_case", path=os.fsencode(path))["case"])
 
 

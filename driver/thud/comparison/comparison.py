@@ -252,7 +252,9 @@ def _named(impacts: object) -> dict[str, Case | ImpactResult]:
         pairs = list(impacts.items())
     else:
         items = [impacts] if isinstance(impacts, Case | ImpactOrRecording) else impacts
-        if not isinstance(items, Iterable) or isinstance(items, str | bytes | os.PathLike):
+        if not isinstance(items, Iterable) or isinstance(
+            items, str | bytes | os.PathLike | np.ndarray
+        ):
             refuse_value("impacts", items, allowed)
         pairs = [(getattr(item, "name", type(item).__name__.lower()), item) for item in items]
     if not pairs:

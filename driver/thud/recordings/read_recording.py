@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, require_kind
 from thud.base.immutable import Immutable
 from thud.base.note import Note, about
 from thud.recordings.background import remove_background
@@ -31,7 +32,7 @@ from thud.recordings.signal import Signal, common_uncertainty
 from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.figure import Figure
 
@@ -124,8 +125,10 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     InputError
         If a file cannot be read or a drop cannot be measured.
     """
-    config = config if isinstance(config, Config) else read_config(config) if config else Config()
+    if not isinstance(config, Config):
+        config = Config() if config is None else read_config(config)
     config = config.updated(height=height, mass=mass, calibration=calibration)
+    begin, end = config.begin or 0.0, config.end or math.inf
     origins: list[Origin] = []
     measured: list[tuple[Drop, ...]] = []
     uncertainties: list[float | None] = []
@@ -134,9 +137,7 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
         for signal in _open(paths, config):
-            found, ignored = find_drops(
-                signal, config.begin or 0.0, config.end or math.inf, progress=progress
-            )
+            found, ignored = find_drops(signal, begin, end, progress=progress)
             chosen, left_out = choose(found, count + 1, signal.sample_rate, config)
             count += len(found)
             stated = config.calibration_uncertainty
@@ -150,7 +151,6 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
                 drops.append(shown.drop)
             measured.append(tuple(drops))
             notes = [*ignored, *left_out]
-            begin, end = config.begin or 0.0, config.end or math.inf
             length = signal.n_sample / signal.sample_rate
             if begin > 0 or end < length:
                 note = Note("section_searched", low=begin, high=min(end, length), unit="s")
@@ -175,7 +175,9 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
 
 def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
     """Yield the signals of files, and signals themselves, whose peaks are checked."""
-    for item in [paths] if isinstance(paths, str | os.PathLike | Signal) else paths:
+    items = [paths] if isinstance(paths, str | os.PathLike | Signal) else paths
+    require_kind("paths", items, Iterable)
+    for item in items:
         if not isinstance(item, Signal):
             yield from open_signals(item, config)
         elif item.path:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import itertools
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
 from thud.base.units import factor_to, find_unit, size_of
 from thud.base.workbooks import read_workbook
@@ -36,7 +37,6 @@ from thud.recordings.words import (
 )
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
@@ -147,6 +147,7 @@ def read_table(
         number of columns, or if units are stated that cannot be attributed to a column; the message
         names file and line.
     """
+    require_kind("path", path, str | os.PathLike)
     file = Path(path)
     name = shown_path(file)
     try:
@@ -335,6 +336,8 @@ def _convert(lines: list[str], count: int, layout: Layout) -> NDArray[np.float64
         text = text.replace(",", ".")
     separator = layout.separator
     lines = [line.rstrip(TRAILING + (separator or "")) for line in text.split("\n")]
+    if not any(lines):  # of which NumPy warns
+        return np.empty((0, count))
     try:
         values = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
     except (ValueError, OverflowError):

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from thud.base.checks import require_kind
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, content_of
@@ -53,8 +54,10 @@ def write_report(
         is replaced.
     """
     # SciPy is slow to import.
+    from thud.recordings.recording import Recording
     from thud.report.contents import report_data
 
+    require_kind("recording", recording, Recording)
     folder, data = Path(directory), report_data(recording)
     contents = {
         JSON: json_bytes(data),

@@ -111,7 +111,7 @@ def read_identity(path: Path) -> dict[str, str] | None:
     """Return the identity of results; None if they have no finished block."""
     if path.suffix == ".partial":
         for file in path.iterdir():
-            if not file.is_file() or not _FILES.fullmatch(file.name):
+            if file.is_symlink() or not file.is_file() or not _FILES.fullmatch(file.name):
                 refuse(f"{file} does not belong to a study", "finished blocks of a study")
         if not block_paths(path) and not (path / IDENTITY).exists():
             return None
