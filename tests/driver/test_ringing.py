@@ -106,6 +106,18 @@ def rung(
     return replace(contact, force=force, background=background)
 
 
+@pytest.mark.parametrize("decay", [0.002, 0.0036])
+def test_soft_release_is_not_fitted_in_place_of_the_ringing(decay: float) -> None:
+    """A release of 1000 N, which brown noise explains, had a frequency of 290 Hz."""
+    contact = rung(20.0, 3700.0, 0.008, np.array([4e-5, 0.0, 1000.0, 0, 0]))
+    time = np.arange(len(contact.force) - contact.gate[1]) / RATE
+    force = contact.force.copy()
+    force[contact.gate[1] :] += 1000 * np.exp(-time / decay)
+    ringing = find_ringing(replace(contact, force=force))
+    assert ringing is not None
+    assert ringing.frequency == pytest.approx(3700, rel=0.02)
+
+
 @pytest.mark.parametrize("frequency", [907.3, 1100.3, 3999.9])
 @pytest.mark.parametrize("plate", [None, Plate(1600.0, 30.0)])
 def test_free_oscillation_is_told_by_frequency_and_amplitude(

@@ -39,6 +39,8 @@ MIN_AMPLITUDE = (3e-4, 1e-3)
 MIN_QUALITY = 3.0
 # Length of the fitted ringing, in decay times.
 LENGTH = 4.0
+# Maximum relative change of the frequency by the fit.
+MAX_SHIFT = 0.25
 # Maximum relative difference between a stated resonance and the ringing that confirms it.
 MATCH = 0.03
 # Frequencies below and above a resonance, as fractions of it, with which its energy is compared.
@@ -105,8 +107,10 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
         return None
     start, ringing = np.array([[frequency, -math.log(decay)]]), after[: int(LENGTH * decay * rate)]
-    ((frequency, log_rate),), _ = fit_oscillations(ringing, start, rate, background=False)
-    return Ringing(*resonance(frequency, math.exp(-log_rate)), amplitude, chain is not None)
+    ((fitted, log_rate),), _ = fit_oscillations(ringing, start, rate, background=False)
+    if abs(fitted / frequency - 1) < MAX_SHIFT:  # else it is another oscillation
+        frequency, decay = fitted, math.exp(-log_rate)
+    return Ringing(*resonance(frequency, decay), amplitude, chain is not None)
 
 
 def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | None:
