@@ -135,11 +135,12 @@ def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
     return float(array[0]), float(array[1])
 
 
-def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
-    """Raise InputError if a value is not a whole number from low to high."""
+def require_whole(name: str, value: Any, low: int, high: int) -> int:  # noqa: ANN401
+    """Return a whole number from low to high; raise InputError if a value is none."""
     is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not is_whole or not low <= value <= high:
         refuse_value(name, value, f"whole numbers from {low} to {high}")
+    return int(value)
 
 
 def require_number(name: str, value: Any) -> float:  # noqa: ANN401 - of a user

@@ -140,7 +140,7 @@ class Background(Immutable):
         unit = np.eye(len(factor))
         return freeze(np.asarray(solve_triangular(factor, unit, lower=True, check_finite=False)))
 
-    @property
+    @cached_property
     def _weights(self) -> NDArray[np.float64]:
         """Inverse of the covariance of the cells times their means."""
         return np.asarray(self.whiten.T @ (self.whiten @ self.mean))

@@ -43,8 +43,7 @@ class Number:
     def __call__(self, value: Any, key: str) -> Any:  # noqa: ANN401 - of a user; a number
         """Return the number; raise InputError if it is none or out of range."""
         if self.whole:
-            require_whole(key, value, int(self.low), int(self.high))
-            return int(value)
+            return require_whole(key, value, int(self.low), int(self.high))
         require_number(key, value)
         if not self.low <= float(value) <= self.high:
             allowed = f"{self.low:g} to {self.high:g} {self.unit}".rstrip()

@@ -123,7 +123,7 @@ def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
     for row in rows:
         if row is not chosen and row not in units:
             _refuse_row(row, above, layout, is_open=chosen is None)
-    names = chosen.titles if chosen else []
+    names = [*chosen.titles] if chosen else []
     layout.width = max([layout.width, len(names), *(len(row.titles) for row in units)])
     names += [("", "")] * (layout.width - len(names))
     stated = [[unit, layout.used.get(i, "")] for i, (_, unit) in enumerate(names)]

@@ -19,7 +19,7 @@ from thud.base.note import Note, about
 from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import find_offset_step, remove_background, step_errors
-from thud.recordings.checks import CONTACT_CHECKS
+from thud.recordings.checks import CHECKS
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.differences import robust_deviation
 from thud.recordings.flanks import SAMPLE_ERROR
@@ -218,7 +218,7 @@ def measure_drop(
         impulse, _between(contact.touch, contact.release), flights[0] if flights else None, config,
         calibration, contact.quantization_impulse,
     )  # fmt: skip
-    notes += (note for entry in CONTACT_CHECKS for note in entry.check(section, contact))
+    notes += (note for entry in CHECKS["contact"] for note in entry.check(section, contact))
     if len(flights) > 1:
         ratio = flights[1].value / flights[0].value
         notes.append(Note("restitution_second", value=ratio, effect=0.0))

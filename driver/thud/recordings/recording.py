@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
@@ -175,8 +175,8 @@ class Recording(ImpactOrRecording):
         if math.isnan(self.estimates["peaks"].value):
             notes.append(Note("peaks_unknown", effect=0.0))
         if 0 < len(known) < len(self.drops):
-            note = Note("restitution_partly_known", effect=0.0)
-            notes.append(replace(note, value=len(known), high=len(self.drops)))
+            code, high = "restitution_partly_known", len(self.drops)
+            notes.append(Note(code, value=len(known), high=high, effect=0.0))
         notes += check_restitution(self.drops, config, self.calibration_uncertainty)
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             notes.append(Note("effective_mass", effect=0.0))

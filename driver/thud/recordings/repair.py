@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.checks import SECTION_CHECKS
+from thud.recordings.checks import CHECKS
 from thud.recordings.differences import (
     FROM_CUBIC,
     MEDIAN,
@@ -95,7 +95,7 @@ def _filled(section: Section, peak: float) -> tuple[NDArray[np.float64], list[No
     Jumps are relative to the peak, N. Raise InputError if dropouts and spikes last too long.
     """
     rate, (first, stop), index = section.sample_rate, section.contact, np.arange(len(section.force))
-    notes = [note for entry in SECTION_CHECKS for note in entry.check(section)]
+    notes = [note for entry in CHECKS["section"] for note in entry.check(section)]
     dropouts = _find_dropouts(section, peak)
     force = np.interp(index, index[~dropouts], section.force[~dropouts])
     spikes = _find_spikes(section, force, peak)

@@ -26,9 +26,9 @@ GRAVITY = Drop.gravity
 IMPULSE, BOUNCES, RESTITUTION, MASS = "impulse", "bounces", "restitution", "effective_mass"
 # Restitution by the impulse minus that by the bounces.
 DIFFERENCE = "difference"
-# Maximum error of the measured release, s, and maximum height by
-# which the center of a ball is lower or higher at the release than at first touch, m: finite
-# elements, modal ball and shell have up to 0.5 ms, and -2 to 4 mm.
+# Maximum error of the measured release, s, and maximum height by which the center of a ball is
+# lower or higher at the release than at first touch, m: finite elements, modal ball and shell have
+# up to 0.5 ms, and -2 to 4 mm.
 SLOW_RELEASE = 5e-4
 DEFORMATION = 4e-3
 
