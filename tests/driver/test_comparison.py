@@ -283,7 +283,7 @@ def test_impact_and_recording_answer_the_same_questions(shell: thud.Impact) -> N
         assert one.mass == 2.5
         assert one.impact_velocity == pytest.approx(4.429, abs=1e-3)
         assert one.peak("floor") == one.peak_force == pytest.approx(1574, rel=0.02)
-        assert one.impulse == pytest.approx(shell.impulse, rel=0.01)
+        assert one.quantity("impulse") == pytest.approx(shell.impulse, rel=0.01)
         assert one.limits_source in (None, "rubber_ball")
         drop = one.drop_force()
         assert drop.force.max() == pytest.approx(one.peak_force, rel=0.01)
