@@ -34,7 +34,7 @@ module thud_result_directory
       character(len=:), allocatable :: command, subject
       !> Paths of the files that the results depend on, which are never replaced: [n_input].
       character(len=path_length), allocatable :: inputs(:)
-      !> Whether to replace results of another subject or command.
+      !> Whether to replace results of another subject.
       logical :: replace = .false.
       !> Path of the new directory.
       character(len=:), allocatable :: folder
@@ -46,7 +46,7 @@ contains
    !>
    !> It may be replaced if it is missing or empty, or if thud has made it for the same command and subject, or for others
    !> with `replace`. Every file in it must be one that this command writes: one of `names`, or one that an earlier run of
-   !> the same command has listed and that is no page (.html, .pdf), such as a signed report.
+   !> the same command has listed and that is no page (.html, .pdf), such as a signed report, if names are given.
    subroutine check_target(self, names, error)
       type(result_directory_type), intent(in) :: self
       !> Names of the new files; none if they are not known yet, and pages are then checked later: [n_file].
@@ -76,8 +76,8 @@ contains
       end if
       expected = [character(len=name_length) :: names, identity]
       do i = 1, size(listed)
-         if (size(names) == 0 .or. index(owner//' ', self%command//' ') == 1 .and. index(trim(listed(i))//'|', '.html|') &
-            + index(trim(listed(i))//'|', '.pdf|') == 0) expected = [expected, listed(i)]
+         if (index(owner//' ', self%command//' ') == 1 .and. (size(names) == 0 .or. index(trim(listed(i))//'|', '.html|') &
+            + index(trim(listed(i))//'|', '.pdf|') == 0)) expected = [expected, listed(i)]
       end do
       do i = 1, size(old_names)
          file = '/'//trim(old_names(i))
@@ -97,17 +97,20 @@ contains
       character(len=*), intent(in) :: path
       !> Command and subject; empty if thud has not made the directory.
       character(len=:), allocatable, intent(out) :: owner
-      !> Names of the files: [n_file].
+      !> Names of the files, all in the directory itself: [n_file].
       character(len=name_length), allocatable, intent(out) :: names(:)
       type(error_type), allocatable :: error
       character(len=:), allocatable :: text
+      integer :: line_end
 
       owner = ''
+      allocate (names(0))
       call read_text_file(path//'/'//identity, text, error)
-      call split(text, newline, names)
       if (allocated(error) .or. index(text, signature) /= 1) return
-      owner = trim(names(1)(len(signature) + 1:))
-      names = names(2:)
+      line_end = index(text//newline, newline)
+      owner = text(len(signature) + 1:line_end - 1)
+      call split(text(line_end + 1:), newline, names)
+      names = pack(names, index(names, '/') == 0)
    end subroutine read_identity
 
    !> Makes the new directory beside the target, and missing parents.
@@ -120,21 +123,24 @@ contains
       integer :: i, status
 
       target = trim(get_real_path(self%path))
+      status = 0
       do i = 2, len(target)
-         if (target(i:i) /= '/') cycle
+         if (target(i:i) /= '/' .or. status > 0) cycle
          inquire (file=target(:i)//'.', exist=exists)
          if (.not. exists) status = make_directory(target(:i - 1)//c_null_char)
       end do
+      ! The parents may have been missing before.
+      target = trim(get_real_path(self%path))
       do i = 1, max_folders
          associate (at => index(target, '/', back=.true.))
             self%folder = target(:at)//'.'//target(at + 1:)//'.'//to_text(i)//'.new'
          end associate
-         status = make_directory(self%folder//c_null_char)
-         if (status == 0) return
-         inquire (file=self%folder//'/.', exist=exists)
-         if (.not. exists) exit
+         if (status <= 0) status = make_directory(self%folder//c_null_char)
+         if (status >= 0) exit
       end do
-      error = unusable_error(self%path, status)
+      if (status == 0) return
+      deallocate (self%folder)
+      error = unusable_error(self%path, abs(status))
    end subroutine open_results
 
    !> Adds text to a file of the new directory.
@@ -178,7 +184,8 @@ contains
       end do
       if (.not. allocated(error)) then
          status = swap_directories(self%folder//c_null_char, trim(get_real_path(self%path))//c_null_char)
-         if (status /= 0) error = unusable_error(self%path, status)
+         if (status < 0) return
+         if (status > 0) error = unusable_error(self%path, status)
       end if
       ! The folder now holds the old results, or after an error the new ones. It stays if another program wrote into it.
       call read_identity(self%folder, owner, old_names)

@@ -37,7 +37,7 @@ module thud_run
       character(len=:), allocatable :: output
       !> New directory that the caller puts in the place of `output`; empty if the run does.
       character(len=:), allocatable :: folder
-      !> Also replace results of another case or command.
+      !> Also replace results of another case.
       logical :: replace = .false.
       !> Also write additional quantities of the model; also show numbers of the solver.
       logical :: write_all = .false., verbose = .false.

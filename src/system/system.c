@@ -127,21 +127,21 @@ int thud_write(const char *path, int descriptor, const char *bytes, size_t lengt
    return error == EPIPE || error == EBADF ? 0 : error;
 }
 
-// Makes a directory.
+// Makes a directory; -EEXIST if the path exists.
 int thud_make_directory(const char *path)
 {
-   return mkdir(path, 0777) == 0 ? 0 : errno;
+   return mkdir(path, 0777) == 0 ? 0 : errno == EEXIST ? -EEXIST : errno;
 }
 
 // Puts a directory in the place of another one, which then has its path, in one step if the file system can exchange names;
-// else the other one is `NAME.old` for a moment. If it is missing or empty, nothing has the path afterwards.
+// else the other one is `NAME.old` for a moment. -1 if it was missing or empty: nothing of the caller has the path then.
 int thud_swap(const char *path, const char *target)
 {
    char old[PATH_MAX];
    struct stat there;
    int error;
 
-   if (rename(path, target) == 0) return 0;
+   if (rename(path, target) == 0) return -1;
    error = errno;
    if (stat(target, &there) != 0) return error;
    if (chmod(path, there.st_mode & 07777) != 0) return errno;

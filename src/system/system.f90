@@ -48,12 +48,12 @@ module thud_system
       end function reading_call
    end interface
 
-   !> Makes a directory; all paths end with a zero.
+   !> Makes a directory; all paths end with a zero. Negative if the path exists.
    procedure(path_call), bind(c, name='thud_make_directory') :: make_directory
    !> Removes a file or an empty directory.
    procedure(path_call), bind(c, name='remove') :: remove_file
-   !> Puts a directory in the place of another one, a path without links, which then has the path of the first; if the other
-   !> one is missing or empty, nothing has the first path afterwards.
+   !> Puts a directory in the place of another one, a path without links, which then has the path of the first. Negative if
+   !> the other one was missing or empty: the first path is then free, also for another process.
    procedure(two_path_call), bind(c, name='thud_swap') :: swap_directories
    procedure(reading_call), bind(c, name='thud_list') :: c_list
    procedure(reading_call), bind(c, name='thud_get_real_path') :: c_get_real_path

@@ -49,7 +49,9 @@ def two_inputs(run: Run, case_file: CaseFile, tmp_path: Path) -> TwoInputs:
     return result
 
 
-@pytest.mark.parametrize("place", ["deep/er/out", "out/", ".//out///", "link", "link/", "Böller 1"])
+@pytest.mark.parametrize(
+    "place", ["deep/er/out", "out/", ".//out///", "link", "link/", "Böller 1", "new/."]
+)
 def test_results_of_the_last_input_stand_alone(
     run: Run, two_inputs: TwoInputs, tmp_path: Path, place: str
 ) -> None:
@@ -113,6 +115,9 @@ def test_page_is_removed_only_by_a_command_that_writes_it(tmp_path: Path) -> Non
     results.require()
     results.write({"levels.csv": b"2", "report.html": b"2"})
     assert (tmp_path / "out/report.html").read_bytes() == b"2"
+    # Another command, before it knows its files.
+    with pytest.raises(thud.InputError, match=naming("out/levels.csv", "in the way")):
+        Results(tmp_path / "out", "fit", replace=True).require()
 
 
 def test_error_leaves_the_old_results(tmp_path: Path) -> None:
