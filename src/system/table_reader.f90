@@ -80,7 +80,6 @@ contains
       is_first = table%line == 0
       do while (size(cells) == 0)
          line = ''
-         reason = 'too long'
          ! In pieces, as the line may be too long for the memory.
          do
             status = iostat_end
@@ -89,9 +88,12 @@ contains
             line = line//piece(:n)
             if (status /= 0 .or. len(line) > line_length) exit
          end do
-         if (is_iostat_end(status)) exit
+         if (is_iostat_end(status)) call close_table(table)
+         ! A last line without line end may fill its pieces.
+         if (is_iostat_end(status) .and. line == '') exit
          table%line = table%line + 1
-         if (.not. is_iostat_eor(status) .or. len(line) > line_length) then
+         if (status >= 0 .or. len(line) > line_length) then
+            if (len(line) > line_length) reason = 'too long'
             error = row_error(table, 'it cannot be read ('//trim(reason)//'); allowed: up to '//to_text(line_length) &
                //' characters')
             return
@@ -99,15 +101,16 @@ contains
          if (table%line == 1 .and. index(line, byte_order_mark) == 1) line = line(len(byte_order_mark) + 1:)
          ! On some systems lines end with a carriage return and a line feed.
          line = trim(adjustl(replaced(line(:index(line//'#', '#') - 1), achar(13), ' ')))
-         if (line == '') cycle
          do i = len(separators), 1, -1
             if (is_first .and. index(line, separators(i:i)) > 0) table%separator = separators(i:i)
          end do
+         ! Spreadsheets write empty cells at the end of a line.
+         if (table%separator == ';') line = line(:verify(line, '; ', back=.true.))
+         if (line == '') cycle
          call split_line(table, line, cells, error)
          if (.not. allocated(error)) call set_points(table, cells, error)
          if (allocated(error)) return
       end do
-      if (size(cells) == 0) call close_table(table)
    end subroutine read_row
 
    !> Splits a line into cells.

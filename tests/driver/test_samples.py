@@ -159,7 +159,7 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ('height,mass\n1,"1,575"\n', naming("line 2", "quote")),
         ("height;mass\n1.5;2\n1;2,5\n", naming("line 3", "'2,5'")),
         ("height;mass\n0,5;2.5\n", naming("line 2", "'2.5'")),
-        ("height,mass\n1" + " " * 2**20 + ",99\n", naming("line 2", 2**20)),
+        ("height,mass\n1" + " " * 2**20 + ",99\n", naming("line 2", "too long", 2**20)),
     ],
 )
 def test_bad_tables_are_refused(
@@ -206,7 +206,8 @@ def test_greatest_number_of_threads_is_taken(run: Run, case: Path) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "height;wall_thickness;momentum_flux\n1,0;0,032;none\n1,2;0,03;retarding\n",
+        "height;wall_thickness;momentum_flux;\n1,0;0,032;none; ;\n1,2;0,03;retarding\n;;\n",
+        "height wall_thickness momentum_flux\n1 0.032 none\n" + "1.2 0.03 retarding".rjust(4096),
         "height\twall_thickness\tmomentum_flux\n1,0\t0,032\tnone\n1,2\t0,03\tretarding\n",
         "height wall_thickness  momentum_flux\n 1.0  0.032 none # first\n1.2 0.03 'retarding'\n",
         '"height", "wall_thickness", momentum_flux\n1.0, 0.032, NONE\n1.2, 3e-2, retarding\n',
