@@ -23,16 +23,18 @@ contains
       ! Volatile, since a compiler may leave out memory that nothing uses.
       integer(int8), allocatable, volatile :: block(:)
       character(len=128) :: message
+      real(wp) :: swap
       integer :: status
 
       ! Linux promises more memory than it has, and ends a process that then writes to it; files of version 2 and 1 of
       ! control groups state the limit of a container.
       !$omp critical (thud_memory)
+      swap = get_limit('/proc/meminfo', 'SwapFree:')
       status = merge(0, 1, bytes <= min(get_limit('/sys/fs/cgroup/memory.max', ''), &
          get_limit('/sys/fs/cgroup/memory/memory.limit_in_bytes', ''), &
-         1024*(get_limit('/proc/meminfo', 'MemAvailable:') + get_limit('/proc/meminfo', 'SwapFree:'))))
+         1024*(get_limit('/proc/meminfo', 'MemAvailable:') + merge(0.0_wp, swap, swap > 1.0e29_wp))))
       !$omp end critical (thud_memory)
-      if (status == 0) allocate (block(int(bytes, int64)), stat=status, errmsg=message)
+      if (status == 0) allocate (block(int(min(bytes, 1.0e18_wp), int64)), stat=status, errmsg=message)
       if (status /= 0) error = numerical_error(purpose//' need '//fixed(bytes, 0)//' bytes of memory, more than there is; ' &
          //'allowed: '//allowed)
    end subroutine require_memory
