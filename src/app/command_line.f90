@@ -14,7 +14,7 @@ module thud_command_line
    use thud_schema, only: get_schema
    use thud_screen, only: print_message, print_results, red, wrap_lines, write_screen, yellow
    use thud_system, only: path_length, standard_output
-   use thud_text, only: get_suggestion, join, newline, quoted, to_text
+   use thud_text, only: get_suggestion, join, lower_case, newline, quoted, to_text
    implicit none (type, external)
    private
 
@@ -36,6 +36,11 @@ module thud_command_line
    !> Long names of all options.
    character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--all', &
       '--samples', '--threads', '--check', '--quiet', '--verbose', '--keys', '--schema', '--help', '--version']
+
+   !> Memory of one thread.
+   type :: buffer_type
+      integer(int8), allocatable :: bytes(:)
+   end type buffer_type
 
    !> Options of the command line.
    type :: request_type
@@ -66,7 +71,7 @@ contains
       type(bundle_type) :: records
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
-      integer(int8), allocatable, volatile :: buffer(:)
+      type(buffer_type), allocatable, volatile :: buffers(:)
       character(len=128) :: message
       integer :: i, status
 
@@ -81,9 +86,13 @@ contains
          call write_screen(standard_output, request%information//newline, exit_code)
       else
          if (.not. request%quiet) call begin_progress()
-         ! Linux refuses more at once than the machine has.
-         allocate (buffer(blas_memory*request%threads), stat=status, errmsg=message)
-         if (allocated(buffer)) deallocate (buffer)
+         allocate (buffers(request%threads))
+         ! One by one, as Linux refuses more at once than the machine has.
+         do i = 1, size(buffers)
+            allocate (buffers(i)%bytes(blas_memory), stat=status, errmsg=message)
+            if (status /= 0) exit
+         end do
+         deallocate (buffers)
          if (status /= 0) then
             error = numerical_error('buffers of OpenBLAS do not fit into the memory; allowed: more memory, or fewer threads')
          else if (request%samples == '') then
@@ -160,6 +169,8 @@ contains
                call get_suggestion(trim(argument), known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: ' &
                   //join(known_options))
+            else if (index(lower_case(argument), '.wav ') > 0) then
+               error = input_error(quoted(argument)//' is a recording, for thud-driver measure; allowed: a namelist file')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one (commands such as run ' &
                   //'and predict belong to thud-driver)')
@@ -191,7 +202,7 @@ contains
          //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
          //'                       --samples outputs/<case>_samples)'//newline &
-         //'  --replace            replace also results of another case or command'//newline &
+         //'  --replace            replace also results of another case'//newline &
          //'  --all                write also model_histories.csv: energies and other'//newline &
          //'                       quantities of the model against time'//newline &
          //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
