@@ -6,7 +6,7 @@ module thud_note
    implicit none (type, external)
    private
 
-   public :: get_sentence, get_subject, note_type, sentence_length
+   public :: get_sentence, get_subject, note_type
 
    !> Maximum length of what a note says.
    integer, parameter :: text_length = 240

@@ -216,7 +216,7 @@ contains
       allocate (active, source=get_active_fields(case))
       allocate (fields, source=get_unstated_fields(case))
       do i = 1, size(fields)
-         if (fields(i)%key /= 'loss_factor') cycle
+         if (fields(i)%key /= 'loss_factor' .or. fields(i)%needs(1) == '') cycle
          j = findloc(active%owner == fields(i)%owner .and. active%key == fields(i)%needs(1), .true., dim=1)
          call active(j)%get_text(law)
          if (law /= quoted(fields(i)%needs(2))) call add(warnings, 'law_of_standard_ball', fields(i)%group, 'loss_factor', &
