@@ -23,6 +23,7 @@ from thud.recordings.words import (
     UNIT,
     is_number,
     is_time,
+    marked_units,
     plain,
     split_line,
     split_title,
@@ -36,9 +37,9 @@ if TYPE_CHECKING:
 COMMENTS = "#%!*'/;"
 # Marks at the end of a line that separate nothing.
 TRAILING = "\t; "
-# Separators of name and value in a header; begin of a value, or a value with its unit at the end.
+# Separators of name and value in a header, and begin of a value.
 PAIR = re.compile(r"[:=\t;,]")
-VALUE = re.compile(r"[:=]\s*[-+]?\d|\s[-+]?\d[\d.]* [A-Za-z]+$")
+VALUE = re.compile(r"[:=]\s*[-+]?\d")
 DATE_LIKE = re.compile(r"\d+[-./:]\d+|\d{8}")
 # What separates titles that hold commas: tabs, semicolons, or blanks between words.
 OTHER_SEPARATOR = re.compile(r"[\t;]|[^\s,] {2,}[^\s,]")
@@ -234,7 +235,8 @@ def _refuse_row(row: _Row, above: list[str], layout: Layout, *, is_open: bool) -
     pieces = [piece.strip() for piece in re.split(r"[\t;,]", row.text)]
     if VALUE.search(row.text) or any(is_number(read_cell(piece)[0]) for piece in pieces):
         return
-    states_unit, names_time = row.states
+    _, names_time = row.states
+    states_unit = any(find_unit(unit) for piece in pieces for unit in marked_units(piece))
     count = len(row.titles)
     is_title = names_time and (count > 1 or is_last)
     if is_last and not is_comment and ":" not in row.text:

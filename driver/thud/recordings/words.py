@@ -176,6 +176,13 @@ def split_title(title: str) -> tuple[str, str]:
     return text, ""
 
 
+def marked_units(text: str) -> list[str]:
+    """Return what a text has in brackets, or at its end after a mark or "in": units of titles."""
+    loose = LOOSE.fullmatch(text)
+    at_end = [loose["unit"]] if loose and loose["mark"].strip() else []
+    return ["".join(groups) for groups in BRACKETS.findall(text)] + at_end
+
+
 def is_time(title: str) -> bool:
     """Whether a title names a column of times."""
     name, unit = split_title(title)

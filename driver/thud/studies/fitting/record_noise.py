@@ -169,8 +169,10 @@ class BackgroundRecord:
         waves = cell_waves(cells, tones)
         residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        variances, log_covariance = fit_noise(cells, residual, peak)
-        # The waves have absorbed part of the noise.
+        expected, log_covariance = fit_noise(cells, residual, peak)
+        # Weights need the most likely noise, below the mean of the log-normal posterior; the waves
+        # have absorbed part of it.
+        variances = expected * np.exp(-np.diagonal(log_covariance) / 2)
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
         return Background(cells, residual, scale * variances, peak, log_covariance)
 
