@@ -136,6 +136,8 @@ contains
       type(error_type), allocatable :: floor_error
       integer :: i, n_thread
 
+      ! Two tasks: the drop on a rigid floor, from which verdict, warnings and class follow also where there is a floor, and
+      ! the floor with the drop on it, from which the level in the room below follows.
       n_thread = 1
       !$ if (case%has_floor .and. is_forked == 0) n_thread = min(2, omp_get_max_threads())
       !$omp parallel do num_threads(n_thread) schedule(static, 1)

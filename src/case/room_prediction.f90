@@ -53,6 +53,7 @@ contains
       call get_force_exposure_levels(force, sample_rate, box%bands, trim(case%level_method), force_level, error)
       if (.not. allocated(error)) call get_radiation(state%modes, radiation, error)
       if (allocated(error)) return
+      ! `rated_level` is the statistical level, that of modes in the bands that they reach, and then the mean over edges.
       call predict_supported(state%modes, radiation, prediction)
       shown = min(get_rating_index(case%room), of_thirds)
       prediction%edge_level = spread(prediction%rated_level(:, shown), 2, 2)

@@ -38,7 +38,9 @@ module thud_floor_model
       real(wp) :: resistance = 0.0_wp
       !> Air around the floor.
       type(air_type) :: air
-      !> The bearing plate with homogeneous stiffness; no thickness: nothing radiates into a room.
+      !> The bearing plate with homogeneous stiffness, of which losses and radiation above the modes are; the ribs of joists
+      !> and the layers are in the stack of `modes`, of which force, energy and radiation in the modal range are. No
+      !> thickness: nothing radiates into a room.
       type(plate_type) :: plate = plate_type(thickness=0.0_wp)
       !> The floating plate through whose layer the mean power reaches this plate; no thickness: none.
       type(screed_type) :: screed

@@ -16,7 +16,7 @@ module thud_ball
       real(wp) :: wall_thickness = 0.032_wp
       !> Mass M, kg.
       real(wp) :: mass = 2.5_wp
-      !> Modulus of elasticity E, Pa.
+      !> Modulus of elasticity E, Pa; a case that states none has that of its model (`set_standard_modulus`).
       real(wp) :: youngs_modulus = 1.6e6_wp
       real(wp) :: poisson_ratio = 0.5_wp
       !> Overpressure of the gas in the undeformed ball, Pa; 0 for a ball with a hole.

@@ -340,6 +340,8 @@ contains
       prediction%octave_level = 0*prediction%octaves%nominal
       do i = 1, size(prediction%octaves)
          first = bands_per_octave*(i - 1) + 1
+         ! Three thirds with their maxima at the same time are louder than their octave: less by the statistical level of the
+         ! simply supported floor, in which edges matter little.
          associate (last => first + bands_per_octave - 1)
             prediction%octave_level(i) = get_sum(prediction%rated_level(first:last, of_octaves)) &
                - (get_sum(prediction%statistical_level(first:last)) - get_fast_level(prediction%flow(first:last)))
