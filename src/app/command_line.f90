@@ -72,7 +72,6 @@ contains
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
       type(buffer_type), allocatable, volatile :: buffers(:)
-      character(len=128) :: message
       integer :: i, status
 
       exit_code = 0
@@ -89,7 +88,7 @@ contains
          allocate (buffers(request%threads))
          ! One by one, as Linux refuses more at once than the machine has.
          do i = 1, size(buffers)
-            allocate (buffers(i)%bytes(blas_memory), stat=status, errmsg=message)
+            allocate (buffers(i)%bytes(blas_memory), stat=status)
             if (status /= 0) exit
          end do
          deallocate (buffers)

@@ -124,21 +124,15 @@ contains
       character(len=*), intent(in), optional :: text
       character(len=12*size(extents)) :: form
       type(record_type), allocatable :: more(:)
-      real(wp), allocatable :: values(:, :, :)
-      integer :: i
 
       if (.not. allocated(self%records)) then
-         allocate (self%records(64))
+         ! More than the results of a case, of which a copy could need much memory.
+         allocate (self%records(512))
          self%header = ''
          self%text = ''
       else if (self%n_record == size(self%records)) then
          allocate (more(2*self%n_record))
-         do i = 1, self%n_record
-            ! Moved, as a copy of large arrays may not fit into the memory.
-            call move_alloc(self%records(i)%values, values)
-            more(i) = self%records(i)
-            call move_alloc(values, more(i)%values)
-         end do
+         more(:self%n_record) = self%records
          call move_alloc(more, self%records)
       end if
       self%n_record = self%n_record + 1

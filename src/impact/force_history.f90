@@ -128,8 +128,7 @@ module thud_force_history
       real(wp) :: impulse_residual = 0.0_wp
       !> |energy at release + loss - energy at first touch|, divided by the energy at first touch.
       real(wp) :: energy_residual = 0.0_wp
-      !> Octave levels of the force on the floor, dB, from which `solve_drop` estimates their error; NaN if it has none. The
-      !> levels of the results, in the bands and by the method of the case, are those of `assess` in `src/case/compute.f90`.
+      !> Octave levels of the force on the floor, dB, for their error; NaN if unknown. Those of results are made by `assess`.
       real(wp) :: octave_level(octave_count) = not_a_number
       !> Estimated error divided by the difference from a coarser resolution, if the model converges more slowly than others.
       real(wp) :: error_ratio = 0.0_wp

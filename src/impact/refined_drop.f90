@@ -101,8 +101,7 @@ contains
          if (drops(level)%numerical_error%known) is_fine = maxval(drops(level)%numerical_error%octave) <= max_error
          if (allocated(drops(coarser)%motion)) deallocate (drops(coarser)%motion)
       end do
-      ! The result is the last level that was computed before the loop ended, and not for verification only.
-      ! A copy of the snapshots would take their memory twice.
+      ! The result is the last level that was not for verification; a copy of its snapshots would take their memory twice.
       call move_alloc(drops(level - 1)%motion, motion)
       history = drops(level - 1)
       call move_alloc(motion, history%motion)
