@@ -97,12 +97,15 @@ contains
       !> Strike points, relative to length and width (default: the mean over the part above the room): [2, n].
       real(wp), intent(in), optional :: stated_strike(:, :)
       type(floor_modes_type) :: selected
+      real(wp), allocatable :: strike(:, :)
       type(wave_series_type) :: along, across
       type(part_type) :: part
       real(wp) :: highest
       integer :: i, max_count
 
       if (size(bands) == 0) return
+      ! gfortran 12 reads the bounds of an absent array when it passes it on.
+      if (present(stated_strike)) strike = stated_strike
       highest = 2*pi*maxval(bands%upper)/air%sound_speed
       part = new_part(modes, area)
       max_count = max_modes
@@ -113,8 +116,7 @@ contains
       end associate
       do i = 1, size(bands)
          selected = get_selected_modes(modes, take_part(modes, bands(i), max_count))
-         radiation(i) = get_mean_radiation(get_coupled_modes(selected, part, stated_strike), plate, air, bands(i), along, &
-            across)
+         radiation(i) = get_mean_radiation(get_coupled_modes(selected, part, strike), plate, air, bands(i), along, across)
          ! A plate without modes there, or without resolved or known ones.
          if (.not. radiation(i)%radiation_factor > 0.0_wp .or. 2*pi*bands(i)%upper > modes%limit) then
             radiation(i) = modal_radiation_type(radiation_factor=get_plate_radiation(plate, air, bands(i)%center), &

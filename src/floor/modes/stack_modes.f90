@@ -150,7 +150,10 @@ contains
       logical :: failed
       integer :: i, j, order
 
-      system%displacement = [product_type(set, function_set_type(cosines, 1.0_wp, 1))]
+      ! gfortran 12 does not free array constructors of types with allocatable components.
+      allocate (system%displacement(1))
+      system%displacement(1)%x = set
+      system%displacement(1)%y = function_set_type(cosines, 1.0_wp, 1)
       ! With the mass B per length, angular frequencies are squared wavenumbers.
       call add_energies(system, [energy_type(bending, 1, 1, [2, 0], [2, 0]), energy_type(bending, 1, 1, is_mass=.true.)], &
          0.0_wp)
@@ -287,6 +290,7 @@ contains
       !> Functions of the rotation along the ribs.
       type(function_set_type), intent(in) :: rotation
       type(function_set_type) :: x, y
+      type(product_type), allocatable :: displacement(:)
       real(wp) :: joint
       integer :: n, turn
 
@@ -300,9 +304,12 @@ contains
       if (.not. ribs%inertia > 0.0_wp) return
       ! One function for the rotation of each rib.
       n = size(ribs%position)
-      system%displacement = [system%displacement, &
-         product_type(x, function_set_type(point_values, y%length, n, get_even_and_odd(n)))]
-      turn = size(system%displacement)
+      turn = size(system%displacement) + 1
+      allocate (displacement(turn))
+      displacement(:turn - 1) = system%displacement
+      displacement(turn)%x = x
+      displacement(turn)%y = function_set_type(point_values, y%length, n, get_even_and_odd(n))
+      call move_alloc(displacement, system%displacement)
       call add_energies(system, [energy_type(ribs%torsion, turn, turn, [1, 0], [1, 0]), &
          energy_type(ribs%warping, turn, turn, [2, 0], [2, 0]), energy_type(ribs%inertia, turn, turn, is_mass=.true.)], &
          ribs%loss_factor, 2, ribs%position)
