@@ -58,7 +58,7 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     path.write_bytes(text.encode(errors="surrogateescape"))
     effective = b""
     try:
-        effective = ask("effective_case", path=str(path))["case"]
+        effective = ask("effective_case", path=str(path))["case"].encode(errors="surrogateescape")
         word, detail = _tried(path, effective, chance)
     except thud.ThudError as error:
         detail = fault_of(error, "case.nml", text)
@@ -100,7 +100,9 @@ def _effective(text: bytes) -> bytes:
     path = Path("again.nml")
     path.write_bytes(text)
     try:
-        found: bytes = ask("effective_case", path="again.nml")["case"]
+        found: bytes = ask("effective_case", path="again.nml")["case"].encode(
+            errors="surrogateescape"
+        )
     except thud.InputError as error:
         return str(error).encode()
     finally:
@@ -151,7 +153,7 @@ def _differing(files: dict[str, bytes]) -> list[str]:
 def _fill_free_limits(levels: dict[str, Any]) -> None:
     """Give 0 to the limits of the bands that say that they have none; no others may lack one."""
     for name in [name for name in levels if name.startswith("verdict_")]:
-        free = np.array([word == b"no limit" for word in levels[name].split(b"\n")])
+        free = np.array([word == "no limit" for word in levels[name].split("\n")])
         for limit in ("lower_limit_dB", "upper_limit_dB"):
             levels[limit] = np.where(free, 0.0, levels[limit])
 
@@ -161,8 +163,9 @@ def _no_numbers(name: str, found: object) -> str:
     if isinstance(found, dict):
         inner = (_no_numbers(f"{name}.{key}", value) for key, value in found.items())
         return next(filter(None, inner), "")
-    if isinstance(found, bytes):
-        return f"{name}: {found!r}" if NO_NUMBER.search(found) else ""
+    if isinstance(found, str):
+        is_number = NO_NUMBER.search(found.encode(errors="surrogateescape"))
+        return f"{name}: {found!r}" if is_number else ""
     # A warning that is about no range has none.
     is_range = re.search(r"warnings\.(value|low|high)$", name)
     return "" if is_range or np.isfinite(found).all() else name  # type: ignore[call-overload]
