@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import xarray as xr
 from conftest import naming
 
 import thud
@@ -157,6 +158,10 @@ def test_criteria_are_single_numbers(value: object) -> None:
 def test_nominal_tyre_conforms() -> None:
     assert thud.assess_levels([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
     assert not thud.assess_levels([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
+    levels = xr.DataArray([47, 40, 22, 11.5, 5.5])
+    assert thud.assess_levels(levels, 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
+    with pytest.raises(thud.InputError, match="levels"):
+        thud.assess_levels(levels[0], 0.02, 0.8, 1, 7.3, 0.85)
 
 
 def criteria_of(source: LimitsSource, **changes: float) -> thud.Verdict:

@@ -353,7 +353,9 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
         is not a number, or not a whole one for `peaks`.
     """
     require_kind("levels", levels, Iterable)
-    octaves = tuple(levels)
+    # Arrays of other libraries yield scalars of their own.
+    is_array = hasattr(levels, "__array__")
+    octaves = tuple(np.atleast_1d(np.asarray(levels)).tolist() if is_array else levels)
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
