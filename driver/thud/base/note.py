@@ -11,6 +11,8 @@ from thud.base.sentences import LIBRARY, PROCESSING, WARNINGS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+_SENTENCES = PROCESSING | WARNINGS
+
 
 @dataclass(frozen=True, eq=True)
 class Note:
@@ -63,6 +65,11 @@ def about(subject: str, notes: Iterable[Note]) -> tuple[Note, ...]:
     return tuple(note if note.subject else replace(note, subject=subject) for note in notes)
 
 
+def of_part(part: str, notes: Iterable[Note]) -> list[Note]:
+    """Return notes about a part of their subject, such as a load cell."""
+    return [replace(note, others={**note.others, "part": part}) for note in notes]
+
+
 class _Range:
     """Values of one number in several notes, shown as its range, or with the format "list"."""
 
@@ -90,7 +97,7 @@ def sentence(notes: Sequence[Note]) -> str:
     values |= {name: _Range([note.others[name] for note in notes]) for name in notes[0].others}
     part = "{part}: " if "part" in values else ""
     # Facts of the library bring their text; their codes may be those of the driver too.
-    text = LIBRARY if "text" in values else (PROCESSING | WARNINGS)[notes[0].code]
+    text = LIBRARY if "text" in values else _SENTENCES[notes[0].code]
     return (part + text).format(**values)
 
 

@@ -333,7 +333,7 @@ def with_assumptions(drop: Drop, config: Config) -> Drop:
         for name, gain in _gains([drop], config).items()
         if name in ASSUMED
     ]
-    change = math.hypot(*(peak - low_pass(force, rate).max() for peak in peaks))
+    change = math.hypot(*(np.array(peaks) - low_pass(force, rate).max()))
     return replace(drop, peak_force=drop.peak_force.widened(change / RECTANGULAR))
 
 

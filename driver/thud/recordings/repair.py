@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from thud.base.checks import refuse
-from thud.base.note import Note
+from thud.base.note import Note, of_part
 from thud.recordings.checks import CHECKS
 from thud.recordings.differences import (
     FROM_CUBIC,
@@ -79,7 +79,7 @@ def repair(section: Section) -> Section:
     for cell in section.cells:
         force, notes = _filled(replace(cell, quantization=section.quantization), peak)
         forces.append(force)
-        said += (replace(note, others={**note.others, "part": cell.name}) for note in notes)
+        said += of_part(cell.name, notes)
     said += check_cells(section, forces)
     return replace(section, force=np.sum(forces, axis=0), cells=(), notes=tuple(said))
 

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError, ThudError
-from thud.base.note import Note
+from thud.base.note import Note, of_part
 from thud.base.units import display_unit
 from thud.studies.fitting.fit_result import Fit, FittedTarget
 from thud.studies.fitting.inference import (
@@ -318,10 +318,7 @@ def _residual_warnings(fit: Fit, unexplained: Array) -> tuple[list[Note], float]
         if own:
             excess = misfit.excess(target.impact, target.own, unexplained[rows])
             ratio = max(ratio, excess * float(np.sqrt(misfit.size / max(freedom, 1.0))))
-        if len(fit.targets) > 1:
-            part = {"part": f"target {number}"}
-            own = [replace(note, others={**note.others, **part}) for note in own]
-        result += own
+        result += of_part(f"target {number}", own) if len(fit.targets) > 1 else own
     return result, ratio
 
 
