@@ -89,7 +89,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     frequencies, energies = frequencies[1:], energies[:, 1:]
     noise = contact.background.density(frequencies) * rate / 2
     if chain is not None:
-        noise *= chain.noise_gain(frequencies)
+        noise *= np.maximum(np.abs(chain.response(frequencies)) ** -2, 1.0)
     k, index = np.unravel_index(np.argmax(energies / noise), energies.shape)
     frequency, decay, energy = frequencies[index], DECAYS[k], energies[k, index]
     if not (
