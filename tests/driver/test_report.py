@@ -28,9 +28,8 @@ from thud.base.note import Note
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
-from thud.recordings.config import Config, ReportConfig, read_config
+from thud.recordings.config import Config, read_config
 from thud.recordings.instruments import Plate
-from thud.recordings.picture import read_picture
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.recording import Recording
@@ -42,7 +41,7 @@ from thud.report.page import _range_picture, report_page
 from thud.report.pdf import html_to_pdf
 from thud.report.recording_files import table, uncertainty_text
 from thud.report.rows import criterion_row, freedom_text, risk_text
-from thud.report.write import write_report
+from thud.report.write import read_picture, write_report
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -667,8 +666,6 @@ def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
         ("humidity = 45.4", "humidity = 0.454", naming("report: humidity", "0.454", "1 to 100")),
         ("pressure = 101325.0", "pressure = 1013", naming("report: pressure", "1013", "50000")),
         ("number =", "nummer =", naming("report", "'nummer'", "number")),
-        ("mark.svg", "none.svg", naming("accreditation_mark", "none.svg", ".png")),
-        ("mark.svg", "lab.toml", naming("accreditation_mark", "no picture")),
         ("certificate =", "zertifikat =", naming("instruments", "'zertifikat'", "certificate")),
         ("diameter = 0.1803", "diameter = 180.3", naming("properties: diameter", "180.3")),
     ],
@@ -678,6 +675,17 @@ def test_wrong_fields_of_the_report_are_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
         stated(one, tmp_path, STATED.replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("mark", "words"), [("none.svg", (".svg", ".png", "300 kB")), ("lab.toml", ("no picture",))]
+)
+def test_marks_that_are_no_pictures_are_refused(
+    one: Recording, tmp_path: Path, mark: str, words: tuple[str, ...]
+) -> None:
+    recording = stated(one, tmp_path, STATED.replace("mark.svg", mark))
+    with pytest.raises(thud.InputError, match=naming("accreditation_mark", mark, *words)):
+        write_report(recording, tmp_path / "report")
 
 
 def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> None:
@@ -784,34 +792,6 @@ def test_rectangular_distributions_have_their_half_width_and_divisor() -> None:
         assert part["divisor"] == pytest.approx(np.sqrt(3))
         product = part["size"] / part["divisor"] * part["sensitivity"]
         assert product == pytest.approx(part["uncertainty"])
-
-
-@pytest.mark.parametrize(
-    ("changes", "warning"),
-    [
-        ({}, ""),
-        (
-            {"received": "2024-05-04", "issued": "2024-05-04"},
-            "the item was received on 2024-05-04, after the measurement on 2024-05-03",
-        ),
-        (
-            {"received": "2024-05-02", "issued": "2024-05-02"},
-            "the measurement was made on 2024-05-03, after the issue of the report on 2024-05-02",
-        ),
-    ],
-)
-def test_dates_in_the_wrong_order_raise_a_warning(
-    one: Recording, changes: dict[str, str], warning: str
-) -> None:
-    dates = {"received": "2024-05-03", "issued": "2024-05-03", **changes}
-    recording = many(one, 3, date="2024-05-03", report=ReportConfig(**dates))
-    found = [str(note) for note in recording.notes if note.code == "dates_in_wrong_order"]
-    assert found == ([warning] if warning else [])
-    # Without a date of the measurement, those of receipt and issue are compared.
-    undated = Config(report=ReportConfig(received="2024-05-04", issued="2024-05-02"))
-    assert [str(note) for note in undated.check_dates([])] == [
-        "the item was received on 2024-05-04, after the issue of the report on 2024-05-02"
-    ]
 
 
 def test_risk_that_rounds_to_certainty_is_a_bound() -> None:

@@ -132,7 +132,6 @@ WARNINGS = {
     "{frequency:.4g} Hz: its correction, {value:.2f} {unit} at 500 Hz, depends on [plate] alone",
     # Dates.
     "calibration_overdue": "its calibration was due on {due}, before the measurement",
-    "dates_in_wrong_order": "{event} on {day}, after {other} on {limit}",
     "date_unknown": "the date of the measurement cannot be read: whether a calibration was due "
     "before is not known",
     # Level in a room.

@@ -32,7 +32,6 @@ from thud.recordings.config_values import (
 )
 from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.instruments import Plate, RecorderFilter, check_plate
-from thud.recordings.picture import read_picture
 from thud.recordings.polarity import POLARITIES
 from thud.recordings.response import Chain
 
@@ -188,31 +187,20 @@ class Config(Table):
         return Chain(instruments) if instruments else None
 
     def check_dates(self, file_dates: Iterable[str]) -> list[Note]:
-        """Return a warning for each date that contradicts another one.
+        """Return a warning for each calibration that was due before the measurement.
 
-        These are calibrations that were due before the measurement, and dates of receipt and issue
-        in the wrong order. `file_dates` are those of the files, which count if no date is stated.
+        `file_dates` are those of the files, which count if no date is stated.
         """
-        read = [times.read_date(text) for text in ([self.date] if self.date else file_dates)]
-        days = sorted(day.date().isoformat() for day in read if day) or [""]
-        received, issued = self.report.received, self.report.issued
-        # Each pair should be in this order; dates that are not stated are empty.
-        pairs = (
-            ("the item was received", received, "the measurement", days[0]),
-            ("the measurement was made", days[-1], "the issue of the report", issued),
-            ("the item was received", received, "the issue of the report", issued),
-        )
         due = [entry for entry in self.instruments if isinstance(entry, Instrument) and entry.due]
-        notes = [
+        read = [times.read_date(text) for text in ([self.date] if self.date else file_dates)]
+        last = max((day.date().isoformat() for day in read if day), default="")
+        if due and not last:
+            return [Note("date_unknown")]
+        return [
             Note("calibration_overdue", entry.name or "an instrument", others={"due": entry.due})
             for entry in due
-            if entry.due < days[-1]
+            if entry.due < last
         ]
-        for event, day, other, limit in pairs:
-            if day and limit and day > limit:
-                others = {"event": event, "day": day, "other": other, "limit": limit}
-                notes.append(Note("dates_in_wrong_order", others=others))
-        return notes if days[-1] or not due else [*notes, Note("date_unknown")]
 
     @property
     def plate_checks(self) -> tuple[PlateCheck, ...]:
@@ -242,6 +230,5 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     mark = config.report.accreditation_mark
     if not mark:
         return config
-    path = file.parent / mark
-    read_picture(path)
-    return replace(config, report=replace(config.report, accreditation_mark=str(path)))
+    report = replace(config.report, accreditation_mark=str(file.parent / mark))
+    return replace(config, report=report)

@@ -9,11 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import require_kind
+from thud.base.checks import refuse, require_kind
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, content_of
-from thud.recordings.picture import read_picture
+from thud.recordings.channel import shown_path, shown_text
 
 if TYPE_CHECKING:
     import os
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from thud.recordings.recording import Recording
 
 JSON, HTML, PDF = "report.json", "report.html", "report.pdf"
+# Formats and maximum size of the accreditation mark, bytes.
+PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
+MAX_PICTURE = 300_000
 
 
 def write_report(
@@ -99,6 +102,21 @@ def page_contents(
         read_picture(Path(mark)) if mark else None,
     )
     return {HTML: page.encode(), **pdf_file(page, PDF, folder, laboratory_text(data))}
+
+
+def read_picture(path: Path) -> tuple[str, bytes]:
+    """Return media type and content of a picture; raise InputError if it cannot be used."""
+    kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
+    allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
+    problem = f"report: accreditation_mark = {shown_path(path)} cannot be used"
+    try:
+        content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or shown_text(error)
+        refuse(f"{problem} ({reason})", allowed, error)
+    if not kind or not content:
+        refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
+    return kind, content
 
 
 def write_files(
