@@ -7,7 +7,6 @@ import base64
 import hashlib
 import io
 import json
-import math
 import re
 import signal
 import socket
@@ -581,12 +580,13 @@ def test_headline_names_everything_that_is_not_known(client: TestClient) -> None
 
 
 @pytest.mark.parametrize(
-    ("effect", "is_open"), [(0.6, True), (0.4, False), (math.inf, True), (0.0, False)]
-)
-def test_warnings_without_effect_on_the_verdict_stay_folded(
-    effect: float, *, is_open: bool
-) -> None:
-    note = Note("effective_mass", effect=effect)
+    ("note", "is_open"),
+    [
+        (Note("aliasing", value=0.6), True), (Note("aliasing", value=0.4), False),
+        (Note("flat_top"), True), (Note("effective_mass"), False),
+    ],
+)  # fmt: skip
+def test_warnings_without_effect_on_the_verdict_stay_folded(note: Note, *, is_open: bool) -> None:
     criteria = [
         Criterion(name, Estimate(value, 0.0, "dB"), 10.0, 14.0)
         for name, value in {"octave_500": 10.5, "octave_31_5": 12.0}.items()

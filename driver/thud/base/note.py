@@ -28,9 +28,6 @@ class Note:
         Value, and the range that it should have; NaN if there is none.
     unit : str
         Unit of these numbers.
-    effect : float
-        Effect on the octave of 500 Hz that its uncertainty does not include, dB; zero if there is
-        none, infinite if it is unknown.
     others : mapping
         Further values of the sentence, by name. A ``"part"`` is the part of the subject,
         such as a load cell, that it is about.
@@ -42,7 +39,6 @@ class Note:
     low: float = math.nan
     high: float = math.nan
     unit: str = ""
-    effect: float = math.inf
     others: Mapping[str, float | str] = field(default_factory=dict, hash=False)
 
     @property

@@ -108,11 +108,11 @@ def check_restitution(
     mean, difference = average_restitution(drops, config, calibration)
     outside = max(-mean.value, mean.value - 1)
     if outside > 0 and outside > mean.expanded:
-        return (Note("restitution_impossible", value=mean.value, low=0, high=1, effect=0.0),)
+        return (Note("restitution_impossible", value=mean.value, low=0, high=1),)
     if not abs(difference.value) > difference.expanded:
         return ()
     note = Note(
-        "restitutions_differ", value=difference.value, high=difference.expanded, effect=0.0,
+        "restitutions_differ", value=difference.value, high=difference.expanded,
         others={"mass": average_mass(drops, config, calibration).value},
     )  # fmt: skip
     return (note,)

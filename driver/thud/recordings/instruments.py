@@ -404,18 +404,16 @@ def check_assumptions(
                 "percent": 100 * TOLERANCE,
                 "frequency": plate.f0 if plate else FLAT[1],
             }
-            notes.append(Note(code, value=float(sizes[band]), unit="dB", effect=0.0, others=others))
+            notes.append(Note(code, value=float(sizes[band]), unit="dB", others=others))
     slowest = min(drops, key=_effective_rate)
     if config.filter is None and _effective_rate(slowest) < slowest.sample_rate:
         bandwidth = slowest.contact.noise_bandwidth
-        notes.append(Note("noise_ends", value=bandwidth, unit="Hz", effect=0.0))
+        notes.append(Note("noise_ends", value=bandwidth, unit="Hz"))
     if limit is not None and limit < FLAT[1]:
         notes.append(Note("plate_not_flat", value=limit, low=FLAT[1], unit="Hz"))
     if plate is not None and seen == {None}:
         changes = mean_level_changes(drops, {"plate": plate.response})["plate"]
         change, others = float(np.nanmax(np.abs(changes))), {"frequency": plate.f0}
         if change > MIN_WARNED:
-            notes.append(
-                Note("plate_unclear", value=change, unit="dB", effect=change, others=others)
-            )
+            notes.append(Note("plate_unclear", value=change, unit="dB", others=others))
     return notes

@@ -193,7 +193,7 @@ def measure_drop(
     peak_force = _peak(contact)
     offset_step = find_offset_step(contact.background, impulse.value)
     if offset_step:
-        notes.append(Note("offset_step", value=offset_step, unit="N", effect=0.0))
+        notes.append(Note("offset_step", value=offset_step, unit="N"))
         errors = step_errors(offset_step, len(contact.gated))
         error_impulses = errors.sum(axis=1) / contact.sample_rate
         impulse = impulse.widened(float(np.abs(error_impulses).max()) / RECTANGULAR)
@@ -209,9 +209,7 @@ def measure_drop(
         expected = GRAVITY * flight / (2 * math.sqrt(2 * GRAVITY * config.height))
         if not ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
             landings, others = [], {"ratio": ratio, "height": config.height}
-            notes.append(
-                Note("no_bounce", value=1e3 * flight, unit="ms", effect=0.0, others=others)
-            )
+            notes.append(Note("no_bounce", value=1e3 * flight, unit="ms", others=others))
     ends = [contact.release, *(end for _, end in landings)]
     flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
     estimates, shared = measure_rebound(
@@ -221,7 +219,7 @@ def measure_drop(
     notes += (note for entry in CHECKS["contact"] for note in entry.check(section, contact))
     if len(flights) > 1:
         ratio = flights[1].value / flights[0].value
-        notes.append(Note("restitution_second", value=ratio, effect=0.0))
+        notes.append(Note("restitution_second", value=ratio))
     ringing, plate = find_ringing(contact, section.chain), config.resonance
     if ringing:
         notes.append(ringing.note)

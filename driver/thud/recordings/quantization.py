@@ -144,4 +144,4 @@ def check(section: Section, contact: Contact) -> tuple[Note, ...]:
     step, offset = contact.background.quantization.step, contact.background.quantization.offset
     if offset < MAX_OFFSET * contact.peak:
         return ()
-    return (Note("coarse_steps", value=offset, unit="N", effect=0.0, others={"step": step}),)
+    return (Note("coarse_steps", value=offset, unit="N", others={"step": step}),)

@@ -173,19 +173,19 @@ class Recording(ImpactOrRecording):
         config, known = self.config, [d for d in self.drops if math.isfinite(d.restitution.value)]
         notes: list[Note] = []
         if math.isnan(self.estimates["peaks"].value):
-            notes.append(Note("peaks_unknown", effect=0.0))
+            notes.append(Note("peaks_unknown"))
         if 0 < len(known) < len(self.drops):
             code, high = "restitution_partly_known", len(self.drops)
-            notes.append(Note(code, value=len(known), high=high, effect=0.0))
+            notes.append(Note(code, value=len(known), high=high))
         notes += check_restitution(self.drops, config, self.calibration_uncertainty)
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            notes.append(Note("effective_mass", effect=0.0))
+            notes.append(Note("effective_mass"))
         notes += (check.note for check in config.plate_checks if check.met is False)
         notes += config.check_dates(origin.date for origin in self.origins)
         notes += check_assumptions(self.drops, config, self.level_estimates())
         if self.not_stated:
             names = {"names": ", ".join(self.not_stated)}
-            notes.append(Note("uncertainty_not_stated", effect=0.0, others=names))
+            notes.append(Note("uncertainty_not_stated", others=names))
         return (*notes, *self.outliers)
 
     @property

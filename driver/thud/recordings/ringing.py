@@ -69,7 +69,7 @@ class Ringing:
         """Warning, whose effect is in the uncertainty."""
         code = "plate_rings_differently" if self.corrected else "plate_rings"
         others = {"frequency": self.frequency, "quality": self.quality}
-        return Note(code, value=self.amplitude, unit="N", effect=0.0, others=others)
+        return Note(code, value=self.amplitude, unit="N", others=others)
 
 
 def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None:

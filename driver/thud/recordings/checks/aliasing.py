@@ -41,4 +41,4 @@ def check(section: Section, contact: Contact) -> tuple[Note, ...]:
     error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
     if error < MAX_ERROR:
         return ()
-    return (Note("aliasing", value=error, unit="dB", effect=error, others={"frequency": rate / 2}),)
+    return (Note("aliasing", value=error, unit="dB", others={"frequency": rate / 2}),)
