@@ -769,3 +769,11 @@ def test_energy_of_bands_adds_up_to_neighbours() -> None:
         sums = [energy[a:b].sum() for a, b in pairwise(starts)]
         expected = getattr(octaves, attribute)[0]
         np.testing.assert_allclose(10 * np.log10(sums), expected, atol=1e-3)
+
+
+def test_every_stage_draws_itself() -> None:
+    stages = thud.read_recording("inputs/recordings/drop_1.csv").stages
+    assert stages is not None
+    levels = measure_levels([stages.drop])
+    drawn = (stages, stages.section, stages.repaired, stages.drop.contact, stages.drop, levels)
+    assert [len(stage.plot().axes) for stage in drawn] == [4, 1, 1, 1, 2, 1]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.plot.style import COLORS, GRAY, LEVEL, WIDTH, new_figure, octave_axis, own_style
-from thud.recordings.recorded_levels import measure_levels
+from thud.recordings.contact import Contact
+from thud.recordings.drops import Section
+from thud.recordings.measured_drop import Drop
+from thud.recordings.read_recording import Stages
+from thud.recordings.recorded_levels import DropLevels, measure_levels
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -15,13 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.recordings.contact import Contact
-    from thud.recordings.drops import Section
-    from thud.recordings.measured_drop import Drop
-    from thud.recordings.read_recording import Stages
-    from thud.recordings.recorded_levels import DropLevels
+    from thud.recordings.stage import Stage
 
-T = TypeVar("T")
 # Height of a panel, inch.
 HEIGHT = 2.05
 # Time around the contact that is drawn, s.
@@ -31,50 +30,27 @@ RANGE = 8.0
 
 
 @own_style()
-def draw_stages(stages: Stages) -> Figure:
-    """Draw the force as recorded, after each stage, and without background, and the levels."""
-    figure = new_figure(2 * HEIGHT, 2 * WIDTH)
-    (recorded, changed), (background, levels) = figure.subplots(2, 2)
-    _draw_section(recorded, stages.section)
-    _draw_changes(changed, stages)
-    _draw_contact(background, stages.drop.contact)
-    _draw_levels(levels, measure_levels([stages.drop]))
+def draw_stage(stage: Stage) -> Figure:
+    """Draw what a stage of the measurement returns, or a drop after each of them."""
+    panels = _panels(stage)
+    columns = min(len(panels), 2)
+    rows = len(panels) // columns
+    figure = new_figure(rows * HEIGHT, columns * WIDTH)
+    for axes, (draw, part) in zip(np.ravel(figure.subplots(rows, columns)), panels, strict=True):
+        draw(axes, part)
     return figure
 
 
-@own_style()
-def draw_section(section: Section) -> Figure:
-    """Draw the force of a drop and of its bounces, and their contacts."""
-    return _draw_alone(_draw_section, section)
-
-
-@own_style()
-def draw_contact(contact: Contact) -> Figure:
-    """Draw the force next to a contact, the removed background, and the gate of the levels."""
-    return _draw_alone(_draw_contact, contact)
-
-
-@own_style()
-def draw_levels(levels: DropLevels) -> Figure:
-    """Draw the levels of drops with their standard uncertainties, and the background."""
-    return _draw_alone(_draw_levels, levels)
-
-
-@own_style()
-def draw_drop(drop: Drop) -> Figure:
-    """Draw the contact of a drop, and its levels above the background."""
-    figure = new_figure(HEIGHT, 2 * WIDTH)
-    force, levels = figure.subplots(1, 2)
-    _draw_contact(force, drop.contact)
-    _draw_levels(levels, measure_levels([drop]))
-    return figure
-
-
-def _draw_alone(draw: Callable[[Axes, T], None], stage: T) -> Figure:
-    """Return a figure of one panel with a stage."""
-    figure = new_figure(HEIGHT)
-    draw(figure.subplots(), stage)
-    return figure
+def _panels(stage: Stage) -> list[tuple[Callable[[Axes, Any], None], Stage]]:
+    """Return what draws the panels of a stage, and of which part."""
+    if isinstance(stage, Stages):
+        return [(_draw_section, stage.section), (_draw_changes, stage), *_panels(stage.drop)]
+    if isinstance(stage, Drop):
+        return [(_draw_contact, stage.contact), (_draw_levels, measure_levels([stage]))]
+    draw: dict[type, Callable[[Axes, Any], None]] = {
+        Section: _draw_section, Contact: _draw_contact, DropLevels: _draw_levels,
+    }  # fmt: skip
+    return [(draw[type(stage)], stage)]
 
 
 def _draw_section(axes: Axes, section: Section) -> None:

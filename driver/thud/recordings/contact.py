@@ -11,7 +11,6 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from scipy.special import comb
 
-from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.impact.contact_time import THRESHOLD
 from thud.level.levels import low_pass
@@ -19,11 +18,11 @@ from thud.recordings.background import MAINS, N_HARMONIC, cells_between, uniform
 from thud.recordings.differences import robust_deviation
 from thud.recordings.flanks import find_edge
 from thud.recordings.quantization import MAX_BACKGROUND
+from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.level.estimate import Estimate
@@ -58,7 +57,7 @@ NOISE_BAND = (100.0, 600.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Contact(Immutable):
+class Contact(Stage):
     """Contact of one pulse; times are in s from the first sample of the window.
 
     Attributes
@@ -102,12 +101,6 @@ class Contact(Immutable):
     background_lengths: tuple[float, float]
     background: Background
     sample_rate: float
-
-    def plot(self) -> Figure:
-        """Draw the force next to the contact, the removed background, and the gate."""
-        from thud.plot.stage_figures import draw_contact
-
-        return draw_contact(self)
 
     @property
     def notes(self) -> tuple[Note, ...]:

@@ -12,16 +12,15 @@ from scipy.signal import find_peaks, peak_widths
 from tqdm import tqdm
 
 from thud.base.checks import refuse
-from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.recordings.config_values import parse_numbers
 from thud.recordings.differences import robust_deviation
 from thud.recordings.quantization import Quantization
+from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.recordings.config import Config
@@ -104,7 +103,7 @@ class Pulse:
 
 
 @dataclass(frozen=True, eq=False)
-class Section(Immutable):
+class Section(Stage):
     """Samples of a signal around one drop or bounce.
 
     `thud.recordings.repair.repair` and `thud.recordings.response.correct` take a section and return
@@ -152,12 +151,6 @@ class Section(Immutable):
     def background(self) -> NDArray[np.float64]:
         """Force before and after the contact, N."""
         return np.concatenate([self.force[: self.contact[0]], self.force[self.contact[1] :]])
-
-    def plot(self) -> Figure:
-        """Draw the force of the drop and its bounces."""
-        from thud.plot.stage_figures import draw_section
-
-        return draw_section(self)
 
 
 def find_drops(

@@ -14,7 +14,6 @@ import numpy as np
 from scipy.signal import resample
 
 from thud.base.checks import refuse
-from thud.base.immutable import Immutable
 from thud.base.note import Note, about
 from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
@@ -34,9 +33,9 @@ from thud.recordings.restitution import (
     measure_rebound,
 )
 from thud.recordings.ringing import find_ringing, is_in_record
+from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -61,7 +60,7 @@ ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_
 
 
 @dataclass(frozen=True, eq=False)
-class Drop(Immutable):
+class Drop(Stage):
     """One measured drop.
 
     Attributes
@@ -150,12 +149,6 @@ class Drop(Immutable):
         uncertainties too.
         """
         return np.array(measure_levels([self], bands, method).level[0])
-
-    def plot(self) -> Figure:
-        """Draw the force without background, its gate, and the levels."""
-        from thud.plot.stage_figures import draw_drop
-
-        return draw_drop(self)
 
 
 def measure_drop(

@@ -15,7 +15,6 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.base.checks import refuse, require_kind
-from thud.base.immutable import Immutable
 from thud.base.note import Note, about
 from thud.recordings.background import remove_background
 from thud.recordings.checks import copies
@@ -30,11 +29,10 @@ from thud.recordings.repair import repair
 from thud.recordings.response import correct
 from thud.recordings.signal import Signal, common_uncertainty
 from thud.recordings.signal_files import open_signals
+from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from matplotlib.figure import Figure
 
     from thud.recordings.force_units import Calibration
 
@@ -42,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Stages(Immutable):
+class Stages(Stage):
     """One drop after each stage of its measurement.
 
     Attributes
@@ -61,12 +59,6 @@ class Stages(Immutable):
     repaired: Section
     corrected: Section
     drop: Drop
-
-    def plot(self) -> Figure:
-        """Draw the force after each stage, and the levels."""
-        from thud.plot.stage_figures import draw_stages
-
-        return draw_stages(self)
 
 
 def measure_stages(section: Section, config: Config, calibration: float | None = None) -> Stages:

@@ -17,11 +17,11 @@ from thud.recordings.background import step_errors
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.contact import band_noise
 from thud.recordings.filters import filter_levels
+from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -43,7 +43,7 @@ DIVISORS = {METHOD: RECTANGULAR, OFFSET_STEP: RECTANGULAR}
 
 
 @dataclass(frozen=True, eq=False)
-class DropLevels(Immutable):
+class DropLevels(Stage):
     """Levels of drops.
 
     Attributes
@@ -79,12 +79,6 @@ class DropLevels(Immutable):
         """Combined standard uncertainty by `contributions`, dB, shape (n_drop, n_band)."""
         squares = [value**2 for value in self.contributions.values()]
         return np.asarray(np.sqrt(np.sum(squares, axis=0)))
-
-    def plot(self) -> Figure:
-        """Draw the levels with their standard uncertainty, and the background."""
-        from thud.plot.stage_figures import draw_levels
-
-        return draw_levels(self)
 
 
 @dataclass(frozen=True, eq=False)
