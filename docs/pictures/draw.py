@@ -12,12 +12,12 @@ import matplotlib as mpl
 from flagship import flagship
 from floors import floors, room
 from flow import flow
+from models import FIGURES
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 from results import RESULTS
 from sources import finite_elements, hollow_sphere, lumped_models, modal_ball
 
-from thud.plot.documentation import FIGURES
 from thud.plot.save_figures import save
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import sysconfig
 import warnings
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +25,6 @@ from thud.recordings.signal import Signal
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from types import ModuleType
-
-    from matplotlib.figure import Figure
 
     from thud.base.note import Note
 
@@ -98,14 +95,6 @@ def quiet_fit(*arguments: Any, **options: Any) -> thud.Fit:  # noqa: ANN401 - of
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", thud.FitWarning)
         return thud.fit(*arguments, **options)
-
-
-@cache
-def documentation_figure(name: str) -> Figure:
-    """Return a figure of the documentation, drawn once in a run."""
-    from thud.plot import documentation
-
-    return documentation.FIGURES[name]()
 
 
 def names_in(folder: Path) -> list[str]:

@@ -6,25 +6,14 @@ import os
 import re
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import (
-    INPUTS,
-    MINIMAL,
-    RESULT_FILES,
-    contents,
-    documentation_figure,
-    names_in,
-    naming,
-    python,
-)
+from conftest import INPUTS, MINIMAL, RESULT_FILES, contents, names_in, naming, python
 
 import thud
 from thud import cli
-from thud.plot import documentation
 
 if TYPE_CHECKING:
     from conftest import CaseFile, ErrorsOf, Run
@@ -136,26 +125,11 @@ def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().out.strip() == f"thud {thud.__version__}"
 
 
-@pytest.mark.slow
-def test_figures_of_the_paper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    figures = {name: documentation_figure(name) for name in documentation.FIGURES}
-    drawn_before = {name: partial(figures.get, name) for name in figures}
-    monkeypatch.setattr(documentation, "FIGURES", drawn_before)
-    assert cli.main(["figures", "-q", "-o", "drawn"]) == 0
-    names = (
-        *("ball_impedance", "compression"),
-        *("figure2_force_history", "figure3_levels", "figure4_free_modes", "figure5_motion"),
-        *("finite_element_force", "finite_element_levels"),
-        *("floor_chipboard", "floor_mobilities", "floor_motion", "loss_factor"),
-        *("modal_families", "momentum_flux", "standard_ball", "tyre_levels"),
-    )
-    drawn = names_in(tmp_path / "drawn")
-    assert drawn == sorted([*(f"{name}.svg" for name in names), "thud.txt"])
-
-
-def test_figures_that_cannot_be_saved_are_told(tmp_path: Path, errors_of: ErrorsOf) -> None:
+def test_results_that_cannot_be_saved_are_told(
+    case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
+) -> None:
     (tmp_path / "file").write_text("")
-    assert "file/drawn" in errors_of("figures", "-q", "-o", "file/drawn")
+    assert "file/drawn" in errors_of("run", "-q", str(case_file(MINIMAL)), "-o", "file/drawn")
 
 
 def test_empty_output_is_told(case_file: CaseFile, errors_of: ErrorsOf) -> None:

@@ -80,7 +80,6 @@ WRITERS = {
     "surrogate": _study("surrogate", "parameters.height = {low = 0.99, high = 1.01}\n"
                         "surrogate = {size = 64, error = 1.0}"),
     "fit": _study("fit", "target.levels = [39, 31, 23, 17, 12]\nparameters.mass = {}"),
-    "figures": Writer(["figures"], {}),
     "thud": Writer(["thud", "case.nml"], {"case.nml": MINIMAL}),
     "sets": Writer(["thud", "case.nml", "--samples", "table.csv"],
                    {"case.nml": MINIMAL, "table.csv": "height\n1\n0.5\n"}),
@@ -118,7 +117,6 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.chdir(tmp_path)
     # To draw them takes long, and is tested elsewhere.
     monkeypatch.setattr("thud.plot.save_figures._content", lambda *_: b"figure")
-    monkeypatch.setattr("thud.plot.documentation.FIGURES", {"figure1": object})
     monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
     monkeypatch.setattr(
         "thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"}

@@ -18,7 +18,6 @@ from thud.cli.case_commands import (
     EXAMPLES,
     EXPORT,
     compare_cases,
-    draw_figures,
     run_cases,
 )
 from thud.cli.command import (
@@ -142,11 +141,6 @@ COMMANDS = {
     "mobility": MOBILITY,
     **study_commands(),
     "examples": EXAMPLES,
-    "figures": Command(
-        "draw the figures of the paper and of the documentation",
-        (*output("the figures (default: outputs/figures)"), FORMAT, QUIET),
-        draw_figures,
-    ),
 }
 
 

@@ -1,4 +1,4 @@
-"""Commands on cases: run, compare, export, figures and inputs of the documentation."""
+"""Commands on cases: run, compare, export and inputs of the documentation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tqdm import tqdm
 from thud.base._schema import VERDICTS
 from thud.base.bridge import ask, notes
 from thud.base.checks import refuse
-from thud.base.display import draw_all, warn_if_not_drawn
+from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Results, inputs_folder, unique_path
 from thud.base.tables import format_rows
@@ -184,27 +184,6 @@ def compare_cases(options: argparse.Namespace) -> int:
     if not options.quiet:
         print_results(format_rows(page.rows()))
         print_path("Page", paths[-1])
-    return 0
-
-
-def draw_figures(options: argparse.Namespace) -> int:
-    """Draw the figures of the paper and of the documentation; return the exit code."""
-    from thud.plot import documentation, figure_files
-
-    results = results_of(options, "figures")
-    results.require()
-    contents: dict[str, bytes] = {}
-    hidden = not shows_progress(quiet=options.quiet)
-    for name, draw in tqdm(
-        documentation.FIGURES.items(), unit="figure", disable=hidden, leave=False
-    ):
-        with warnings.catch_warnings(record=True) as caught:
-            drawn = draw_all({name: draw})
-        print_notes(f"{name}: {warning.message}" for warning in caught)
-        contents |= figure_files(drawn, options.format)
-    results.write(contents)
-    if not options.quiet:
-        print_path("Figures", results.folder)
     return 0
 
 

@@ -1,7 +1,6 @@
 """Figures by theme: impacts, ball, floors, rooms, recordings, fits, studies, pages.
 
-`case_figures` draws the figures of a case, `thud.plot.documentation` the figures of the paper and
-of the documentation.
+`case_figures` draws the figures of a case.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Figures of the paper and of the documentation, drawn by `thud-driver figures`."""
+"""Figures of the paper and of the models: forces, levels, motion, floors, sets of the ball."""
 
 from __future__ import annotations
 
