@@ -42,18 +42,14 @@ def test_page_has_the_curves_of_the_picture() -> None:
     page = plots(comparison_html(IMPACTS, "floor", "rubber_ball", TABLE))
     assert len(page) == 3
     for axes, drawn in zip(figure.axes, page, strict=False):
-        layout = drawn["layout"]
-        assert layout["xaxis"]["title"]["text"] == axes.get_xlabel()
-        label = layout["yaxis"]["title"]["text"].replace("<br>", " ")
-        assert label == axes.get_ylabel().replace("\n", " ")
+        assert "{title}, {unit}".format(**drawn["x"]) == axes.get_xlabel()
+        assert drawn["y"]["title"].partition(" ")[0] == re.split(r"\s", axes.get_ylabel())[0]
         lines = [line for line in axes.lines if line.get_label() in {*IMPACTS, r"soft \$x^{\$"}]
-        curves = [curve for curve in drawn["data"] if "type" not in curve]
-        assert len(lines) == len(curves) == len(IMPACTS)
-        for line, curve in zip(lines, curves, strict=True):
+        assert [curve["style"] for curve in drawn["curves"]] == list(range(len(lines)))
+        assert len(lines) == len(IMPACTS)
+        for line, curve in zip(lines, drawn["curves"], strict=True):
             np.testing.assert_allclose(curve["y"], line.get_ydata(), rtol=1e-5)
-    assert page[0]["layout"]["yaxis"]["title"]["text"] == (
-        "Force on the floor,<br>low-passed at 1.25 kHz, kN"
-    )
+    assert page[0]["y"] == {"title": "Force on the floor, low-passed at 1.25 kHz", "unit": "kN"}
     low, high = figure.axes[0].get_xlim()
     assert low == 0
     assert high < 1.1e3 * SOFT.contact_time
@@ -61,21 +57,9 @@ def test_page_has_the_curves_of_the_picture() -> None:
 
 def test_tolerance_is_that_of_the_octaves() -> None:
     _, octaves, thirds = plots(comparison_html(IMPACTS, None, "tyre", TABLE))
-    (box,) = [curve for curve in octaves["data"] if curve.get("type") == "bar"]
     criteria = SHELL.assess("tyre").criteria[:5]
-    assert box["base"] == [c.lower for c in criteria]
-    assert np.add(box["base"], box["y"]) == pytest.approx([c.upper for c in criteria])
-    assert "Tolerance, tyre" in box["name"]
-    assert all("type" not in curve for curve in thirds["data"])
-
-
-def test_curves_are_told_apart_without_colour() -> None:
-    names = {f"{i}": SHELL for i in range(8)}
-    for plot in plots(comparison_html(names, None, "rubber_ball", TABLE)):
-        curves = [curve for curve in plot["data"] if "type" not in curve]
-        looks = {(c["line"]["dash"], c["line"]["color"], c["marker"]["symbol"]) for c in curves}
-        assert len(looks) == 8
-        assert len({curve["line"]["dash"] for curve in curves}) == 7
+    assert octaves["limits"] == [[c.lower, c.upper] for c in criteria]
+    assert "limits" not in thirds
 
 
 def test_names_and_cells_are_no_code() -> None:
@@ -83,7 +67,7 @@ def test_names_and_cells_are_no_code() -> None:
     assert "<i>" not in page
     assert "a &amp; b" in page
     assert "</script><b>" not in page
-    assert plots(page)[0]["data"][0]["name"] == "</script><b>"
+    assert plots(page)[0]["curves"][0]["name"] == "</script><b>"
 
 
 def test_page_suits_narrow_screens_and_dark_ones() -> None:
@@ -128,10 +112,10 @@ def test_browser_draws_the_curves_and_hides_them(tmp_path: Path) -> None:
     sync_api = pytest.importorskip("playwright.sync_api")
     html = comparison_html(IMPACTS, None, "rubber_ball", TABLE)
     with open_in_browser(tmp_path / "page.html", html) as page:
-        curves = page.locator(".area path[stroke]")
-        # Two curves in three plots; five octaves have a tolerance, the legend shows one more.
+        curves = page.locator(".plot .curve")
+        # Two curves in three plots; five octaves have a tolerance.
         sync_api.expect(curves).to_have_count(6)
-        sync_api.expect(page.locator(".band")).to_have_count(6)
+        sync_api.expect(page.locator(".limits")).to_have_count(5)
         page.locator(".legend button").first.click()
         sync_api.expect(curves).to_have_count(3)
 

@@ -205,7 +205,7 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
     thin = found.predictions["thin"]
     for axes, values in (
         (force, 10 * np.log10(thin.energy / thin.conductance)),
-        (energy, thin.energy),
+        (energy, 10 * np.log10(thin.energy)),
         (radiated, 100 * thin.radiated_share),
         (level, thin.level),
     ):
@@ -219,7 +219,7 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
     ):
         assert any(values == pytest.approx(wanted) for values in drawn)
     page = found.html()
-    assert page.count('"layout": ') == 4
+    assert page.count('"curves": ') == 4
     assert "Comparison of floors" in page
 
 

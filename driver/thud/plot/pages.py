@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-import html
-import json
-from pathlib import Path
-from string import Template
+import re
+from importlib import resources
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jinja2 import Environment, PackageLoader
 
 from thud.base.display import html_text
 from thud.floors.prediction_text import rating_title
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
-    TIME_LABEL,
     contact_force,
     draw_forces,
     draw_levels,
-    force_label,
 )
-from thud.plot.room_figures import FAST_LEVEL
 from thud.plot.style import (
     BAND_NAMES,
-    COLORS,
     LEVEL,
     RATING_SYMBOL,
     band_axis,
     escape_label,
+    force_name,
     iterate_curves,
     legend_above,
     level_label,
@@ -37,7 +33,6 @@ from thud.plot.style import (
     marker_style,
     new_figure,
     own_style,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -52,141 +47,51 @@ if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
     from thud.recordings.recording import ImpactResult
 
-
-# Line styles and markers of `thud.plot.style` by their names in ``curves.js``.
-_DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")
-_SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x")
+# Scripts and style of plots, which the explorer shares. The page is one script: its parts neither
+# import nor export.
+_SHARED = resources.files("thud") / "explorer/page"
+_SCRIPTS, _STYLE = ("page.js", "plot.js"), "plot.css"
+_MODULE = re.compile(r"^(?:import .*\n|export )", re.MULTILINE)
+_PAGES = Environment(loader=PackageLoader("thud.plot", ""), autoescape=True)
 
 
 def html_page(
     title: str,
     text: str,
     table: Sequence[Sequence[str]],
-    plots: Sequence[dict[str, Any]],
+    plots: Sequence[Mapping[str, Any]],
     warnings: Sequence[str] = (),
 ) -> str:
-    """Return a page of title, text, table (header row first) and plots, the first of full width.
+    """Return a page of title, text, table (header row first), warnings and plots.
 
-    Warnings are listed below the table.
-
-    A click on the legend hides the curve with the same index in all plots.
+    Plots are as `plot` of ``explorer/page/plot.js`` takes them; the first has the full width.
     """
-    head, *body = table
-    items = "".join(f"<li>{html.escape(warning)}</li>" for warning in warnings)
-    return _PAGE.substitute(
-        title=html.escape(title),
-        text=html_text(text),
-        head=_row(head, "th"),
-        rows="\n".join(_row(row, "td") for row in body),
-        warnings=f"<h2>Warnings</h2><ul>{items}</ul>" if items else "",
-        plots=json.dumps(plots).replace("<", r"\u003c"),
-        script=Path(__file__).with_name("curves.js").read_text(encoding="utf-8"),
+    script, style = (
+        "".join((_SHARED / name).read_text(encoding="utf-8") for name in names)
+        for names in (_SCRIPTS, (_STYLE,))
+    )
+    return _PAGES.get_template("page.html").render(
+        title=title,
+        text=text,
+        table=table,
+        warnings=warnings,
+        plots=plots,
+        symbols=html_text,
+        style=style,
+        script=_MODULE.sub("", script),
     )
 
 
-def curve_style(i: int, label: str) -> dict[str, Any]:
-    """Return name, line and marker of a curve by its index."""
-    return {
-        "name": label,
-        "line": {"color": COLORS[i % len(COLORS)], "dash": styled(i, _DASHES)},
-        "marker": {"symbol": styled(i, _SYMBOLS)},
-    }
+def _curve(i: int, name: str, x: Iterable[float], y: Iterable[float], *, marks: bool) -> object:
+    """Return a curve of a page by its index, with values of six digits; NaN is a gap."""
+    values = [float(f"{value:.6g}") + 0.0 if np.isfinite(value) else None for value in y]
+    return {"name": name, "style": i, "x": list(x), "y": values, "marks": marks}
 
 
-def curve_points(x: Iterable[Any], y: Iterable[float]) -> dict[str, list[Any]]:
-    """Return the points of a curve, with values of six digits."""
-    return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
-
-
-def plot_layout(x: str, y: str, kind: str = "linear", scale: str = "linear") -> dict[str, Any]:
-    """Return the titles and the kinds of the axes of a plot."""
-    return {
-        "xaxis": {"title": {"text": x}, "type": kind},
-        "yaxis": {"title": {"text": y.replace("\n", "<br>")}, "type": scale},
-    }
-
-
-def _row(cells: Sequence[str], tag: str) -> str:
-    # Names of cases may break behind an underscore.
-    shown = (html_text(cell).replace("_", "_<wbr>") for cell in cells)
-    return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in shown) + "</tr>"
-
-
-_PAGE = Template("""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>thud: $title</title>
-<style>
-:root { color-scheme: light dark; --text: #1a1a1a; --page: #ffffff; --line: #dddddd;
-  --band: #cccccc; }
-@media (prefers-color-scheme: dark) {
-  :root { --text: #e8e8e8; --page: #17191c; --line: #3a3d42;
-    --band: #55595f; }
-}
-body { font-family: sans-serif; margin: 1.5em auto; max-width: 80em; padding: 0 0.8em;
-  color: var(--text); background: var(--page); }
-h1 { font-size: 1.5em; }
-h2 { font-size: 1.1em; }
-.table { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.3em 0.8em; text-align: right; border-bottom: 1px solid var(--line); }
-th { vertical-align: bottom; max-width: 12em; overflow-wrap: break-word; }
-td { white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
-  background: var(--page); padding-left: 0; }
-@media (max-width: 40em) {
-  body { margin-top: 0.8em; }
-  table { font-size: 0.85em; }
-  th, td { padding: 0.35em 0 0.35em 0.9em; }
-  th { max-width: 7em; }
-  td { white-space: normal; min-width: 4.5em; max-width: 7em; }
-  th:first-child, td:first-child { max-width: 7.5em; overflow-wrap: break-word; }
-}
-.legend { display: flex; flex-wrap: wrap; gap: 0.4em 1.2em; margin-top: 1.5em; }
-.legend > * { overflow-wrap: anywhere; }
-.legend button { font: inherit; color: inherit; background: none; border: 0; padding: 0;
-  text-align: left; cursor: pointer; }
-.legend button[aria-pressed="false"] { opacity: 0.4; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 28em), 1fr));
-  gap: 1em; margin-top: 1em; }
-.plots > div { height: 24em; min-width: 0; position: relative; }
-.plots > div:first-child { grid-column: 1 / -1; }
-.area { height: 100%; }
-.plots svg { display: block; }
-.plots .readout svg { display: inline; }
-.plots text { fill: var(--text); font-size: 13px; }
-sub { line-height: 0; }
-.grid { stroke: var(--line); }
-.band { fill: var(--band); }
-.cursor { stroke: var(--text); }
-.readout { position: absolute; top: 8px; right: 10px; padding: 0.2em 0.5em; font-size: 0.9em;
-  background: var(--page); border: 1px solid var(--line); pointer-events: none; }
-.readout.left { right: auto; left: 6em; }
-</style>
-</head>
-<body>
-<h1>$title</h1>
-<p>$text</p>
-<div class="table" role="region" aria-label="Table" tabindex="0"><table>
-<thead>$head</thead>
-<tbody>
-$rows
-</tbody>
-</table></div>
-$warnings
-<div class="legend"></div>
-<div class="plots"></div>
-<script>
-$script
-drawPlots(
-$plots
-);
-</script>
-</body>
-</html>
-""")
+def _band_axis(frequency: NDArray[np.float64], bands: BandSet) -> dict[str, Any]:
+    """Return the x axis of a plot of a page against bands."""
+    names = [f"{value:g}" for value in frequency]
+    return {"title": BAND_NAMES[bands], "unit": "Hz", "bands": names}
 
 
 @own_style()
@@ -218,59 +123,50 @@ def comparison_html(
 
     The table is rows of text, header row first.
     """
-    forces: list[dict[str, Any]] = []
-    levels: dict[BandSet, list[dict[str, Any]]] = {"octave": [], "third": []}
-    for i, (label, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        style = curve_style(i, label)
-        time, newton = contact_force(impact, kind)
-        forces.append({**style, "mode": "lines", **curve_points(time, newton), "showlegend": True})
-        for bands, traces in levels.items():
-            points = curve_points(_names(bands), impact.levels(bands, force=kind))
-            traces.append({**style, "mode": "lines+markers", **points, "showlegend": False})
-    levels["octave"].append(_tolerance(source))
-    level = level_label(impacts, force)
-    plots = [
-        {"data": forces, "layout": plot_layout(TIME_LABEL, force_label(impacts, force))},
-        *(
-            {"data": traces, "layout": plot_layout(f"{BAND_NAMES[bands]}, Hz", level, "category")}
-            for bands, traces in levels.items()
-        ),
+    name = force_name(impacts, force)
+    level_title = "Force exposure level" + f" ({name})" * (name != "force")
+    curves = list(enumerate(iterate_curves(impacts, force)))
+    forces = {
+        "x": {"title": "Time since first touch", "unit": "ms"},
+        "y": {"title": f"{name.capitalize()}, low-passed at 1.25 kHz", "unit": "kN"},
+        "curves": [
+            _curve(i, label, *contact_force(impact, kind), marks=False)
+            for i, (label, impact, kind) in curves
+        ],
+    }
+    bands: tuple[BandSet, ...] = ("octave", "third")
+    levels = [
+        {
+            "x": _band_axis(get_bands(band_set).nominal, band_set),
+            "y": {"title": level_title, "unit": "dB", "reference": " re 1 N"},
+            "curves": [
+                _curve(i, label, range(len(level)), level, marks=True)
+                for i, (label, impact, kind) in curves
+                for level in [impact.levels(band_set, force=kind)]
+            ],
+        }
+        for band_set in bands
     ]
+    levels[0]["limits"] = np.transpose(octave_limits(source)).tolist()
     return html_page(
         "Comparison of models and recordings",
         "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
-        "are the tolerances of the standards, which one-third-octave bands do not have.",
+        f"are the tolerances of the standards for the {source.replace('_', ' ')}, which "
+        "one-third-octave bands do not have.",
         table,
-        plots,
+        [forces, *levels],
     )
 
 
-def _names(bands: BandSet) -> list[str]:
-    return [f"{frequency:g}" for frequency in get_bands(bands).nominal]
-
-
-def _tolerance(source: LimitsSource) -> dict[str, Any]:
-    """Return the tolerance of each octave as a gray box."""
-    lower, upper = octave_limits(source)
-    return {
-        "type": "bar",
-        "name": f"Tolerance, {source.replace('_', ' ')}",
-        "x": _names("octave"),
-        "y": (upper - lower).tolist(),
-        "base": lower.tolist(),
-        "showlegend": True,
-    }
-
-
-# Labels of the steps from force to room, and whether their axes are logarithmic.
-_STEPS = {
-    LEVEL.replace(" level", "\nlevel"): False,
-    "Energy into\nthe floor, J": True,
-    "Radiated share\nof the losses, %": False,
-    FAST_LEVEL: False,
-}
-# Maximum number of characters of the name of a floor in one line.
-_NAME = 18
+# Titles, units and references of the steps from force to room.
+_STEPS = (
+    ("Force exposure level", "dB", " re 1 N"),
+    ("Energy into the floor", "dB", " re 1 J"),
+    ("Radiated share of the losses", "%", ""),
+    ("Maximum Fast level", "dB", " re 20 µPa"),
+)
+# Maximum number of characters of the name of a floor and of the title of a step in one line.
+_NAME, _TITLE = 18, 17
 # Difference below which forces are drawn as one, dB.
 _SAME = 0.05
 
@@ -284,11 +180,9 @@ def draw_floors(comparison: FloorComparison) -> Figure:
     ratings, *panels = figure.subplots(5, 1, height_ratios=[rows, 1.4, *[1] * 3])
     steps = zip(*map(_step_values, predictions), strict=True)
     nominal = next(iter(predictions)).frequency
-    for axes, (label, logarithmic), curves in zip(panels[::-1], _STEPS.items(), steps, strict=True):
+    for axes, (title, unit, reference), curves in zip(panels[::-1], _STEPS, steps, strict=True):
         band_axis(axes, nominal, "third")
-        axes.set_ylabel(label)
-        if logarithmic:
-            axes.set_yscale("log")
+        axes.set_ylabel(fill(f"{title}, {unit}{reference}", _TITLE))
         if axes is panels[-1] and len(curves) > 1 and np.ptp(curves, axis=0).max() < _SAME:
             axes.plot(curves[0], color="black", marker=".", linewidth=1)
             axes.text(
@@ -308,23 +202,18 @@ def draw_floors(comparison: FloorComparison) -> Figure:
 
 def floors_html(comparison: FloorComparison) -> str:
     """Return a page of interactive plots and the table."""
-    traces: list[list[dict[str, Any]]] = [[] for _ in _STEPS]
-    for i, (name, prediction) in enumerate(comparison.predictions.items()):
-        style = curve_style(i, name)
-        names = [f"{frequency:g}" for frequency in prediction.frequency]
-        for step, values in zip(traces, _step_values(prediction), strict=True):
-            points = curve_points(names, values)
-            step.append(
-                {**style, "mode": "lines+markers", **points, "showlegend": step is traces[-1]}
-            )
+    predictions = comparison.predictions
+    steps = zip(*map(_step_values, predictions.values()), strict=True)
     plots = [
         {
-            "data": data,
-            "layout": plot_layout(
-                f"{BAND_NAMES['third']}, Hz", label, "category", "log" if logarithmic else "linear"
-            ),
+            "x": _band_axis(next(iter(predictions.values())).frequency, "third"),
+            "y": {"title": title, "unit": unit, "reference": reference},
+            "curves": [
+                _curve(i, name, range(len(y)), y, marks=True)
+                for i, (name, y) in enumerate(zip(predictions, values, strict=True))
+            ],
         }
-        for data, (label, logarithmic) in zip(traces, _STEPS.items(), strict=True)
+        for (title, unit, reference), values in zip(_STEPS, steps, strict=True)
     ]
     text = "Levels in the room below, and the chain that leads to them: force, energy, floor, room."
     # The first plot has the full width: the level in the room.
@@ -334,8 +223,9 @@ def floors_html(comparison: FloorComparison) -> str:
 
 def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
     """Return the values of each step of a prediction."""
-    force = 10 * np.log10(prediction.energy / prediction.conductance)
-    return force, prediction.energy, 100 * prediction.radiated_share, prediction.level
+    energy = 10 * np.log10(prediction.energy)
+    force = energy - 10 * np.log10(prediction.conductance)
+    return force, energy, 100 * prediction.radiated_share, prediction.level
 
 
 def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:

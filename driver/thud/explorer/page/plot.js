@@ -66,9 +66,10 @@ export function interpolate(x, y, at) {
   return y[low] + part * (y[high] - y[low]);
 }
 
-/** Return a short line in the style of a curve, for legends. */
-export function swatch(style) {
-  const line = svgElement("line", { x1: 0, y1: 6, x2: 26, y2: 6, class: `curve style${style % STYLES}` });
+/** Return a short line in the style of a curve, for legends, with its mark if it has marks. */
+export function swatch(style, hasMarks = false) {
+  const line = svgElement("g", { class: `curve style${style % STYLES}` }, svgElement("path", { d: "M0 6h26" }));
+  if (hasMarks) line.append(MARKS[style % MARKS.length](13, 6));
   return svgElement("svg", { width: 26, height: 12, "aria-hidden": "true", class: "swatch" }, line);
 }
 
@@ -199,7 +200,7 @@ function showValues(content, at, readout) {
   const position = content.x.bands ? content.x.bands[Math.min(content.x.bands.length - 1, Math.max(0, Math.round(at)))] : rounded(at);
   const lines = content.curves.map((curve) => {
     const nearest = curve.x.reduce((best, x, i) => (Math.abs(x - at) < Math.abs(curve.x[best] - at) ? i : best), 0);
-    return element("div", {}, swatch(curve.style), ` ${rounded(curve.y[nearest], content.y.unit)}`);
+    return element("div", {}, swatch(curve.style, curve.marks), ` ${rounded(curve.y[nearest], content.y.unit)}`);
   });
   readout.replaceChildren(`${position} ${content.x.unit}`, ...lines);
 }
