@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 FLOOR = 0.02
 # The same of contact time and peak force, relative, and of the restitution.
 FLOORS = 0.001
+# Quantities that have a stated error, besides the levels.
+SCALARS = ("contact_time", "restitution", "peak_force")
 # Numerical error above which an impact carries a warning, and error that must not be without, dB.
 WARNED, MAXIMUM = 0.2, 0.5
 DENSITY = 900.0, 1300.0
@@ -222,10 +224,9 @@ def main() -> None:
             print(i, "no reference:", error, flush=True)
             continue
         errors.append(np.abs(here - fine))
-        stated.append(impact.numerical_error.level)
+        stated.append(impact.level_error)
         rests.append(rest)
-        own = impact.numerical_error
-        limit = np.array([own.contact_time, own.restitution, own.peak_force])
+        limit = np.array([impact.quantity(f"{name}_error") for name in SCALARS])
         floors = FLOORS * np.array([scalars[0], 1.0, scalars[2]])
         difference = np.abs(scalars - fine_scalars)
         scalars_covered.append(difference <= np.maximum(limit, floors))

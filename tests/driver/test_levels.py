@@ -219,14 +219,16 @@ def test_verdict_is_undecided_if_all_known_criteria_conform() -> None:
         assert [one.name in repr(found) for one in criteria] == [
             one is not good and one.conforms == result for one in criteria
         ]
-    cells = ("octave 31.5", "39 dB", "", "38 to 40", "conforms")
-    assert good.rows()[1] == cells
+    cells = ("31.5 Hz, dB", "39.00", "", "38 to 40", "conforms")
+    assert good.cells() == cells
     uncertain = replace(good, estimate=Estimate(39.0, 0.1, "dB"))
-    assert uncertain.rows()[1] == (*cells[:2], "0.2", *cells[3:])
-    assert [one.rows()[1][-1] for one in (low, high, unknown)] == [
-        "too low", "too high", "not known"
+    assert uncertain.cells() == (*cells[:2], "0.2", *cells[3:])
+    lacking = replace(good, estimate=Estimate(39.0, 0.1, "dB", not_stated=("calibration",)))
+    assert lacking.cells() == (*cells[:2], "0.2 †", cells[3], "undecided")
+    assert [one.cells()[-1] for one in (low, high, unknown)] == [
+        "too low", "too high", "undecided"
     ]  # fmt: skip
-    assert unknown.rows()[1][1] == ""
+    assert unknown.cells()[1] == ""
 
 
 def test_recorded_force_has_what_lies_below_1250_hz() -> None:

@@ -104,7 +104,7 @@ def _outside(impact: thud.Impact) -> dict[str, bool]:
         "sample_rate in Hz": rate < 8000,
         # Unknown errors are NaN.
         "numerical error": not np.max(
-            [shown.numerical_error.level for shown in (impact, on_floor) if shown is not None]
+            [shown.level_error for shown in (impact, on_floor) if shown is not None]
         ) <= 0.2,
         "gravity times contact time": not free and fall > 0.201,
         "wall thickness over outer radius": isinstance(case.model, thud.HollowSphere)

@@ -25,7 +25,6 @@ from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
 from thud.floors.prediction_text import class_text, rating_title
 from thud.impact.compute import compute
-from thud.level.estimate import NUMERICAL_ERROR
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
 from thud.plot.impact_figures import contact_force
@@ -112,7 +111,7 @@ def answer_case(case: Case) -> Answer:
     answer = common_answer(impact, assessed, *contact_force(impact, force))
     answer["force"]["title"] = FORCE_NAMES[force]
     notes = list(impact.notes)
-    error = float(impact.numerical_error.level.max())
+    error = float(impact.level_error.max())
     # A warning states that the error is unknown.
     if not math.isnan(error):
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
@@ -175,7 +174,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     name, band = criterion.name.rpartition("octave_")[1:]
     expanded = round(scale * criterion.estimate.expanded, 6)
     # Numerical errors are often too small to be shown.
-    is_computed = criterion.uncertainty_name == NUMERICAL_ERROR
+    is_computed = criterion.is_computed
     smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
     return {
         "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),

@@ -71,7 +71,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     room
         Room below the floor, for `Impact.room_level`.
     verify
-        Compute again at a finer resolution, for `Impact.finer`; also with a case.
+        Compute again at a finer resolution, for the numbers ``"finer_..."`` of
+        `Impact.model_quantities`; also with a case.
     **options
         Options of the model, such as ``momentum_flux="retarding"``; see `HollowSphere`,
         `ModalBall`, `FiniteElement`, `MeasuredModes`, `HuntCrossley` and `TwoMass`.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import ImpactQuantities
+from thud.base._schema import QUANTITIES, ImpactQuantities
 from thud.base.checks import require_choice, require_whole
 from thud.base.extras import data_frame, require_extra
 from thud.case.case import case_text
@@ -20,8 +20,6 @@ from thud.level.estimate import Estimate
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
@@ -34,27 +32,6 @@ if TYPE_CHECKING:
     from thud.impact.motion import Motion
     from thud.impact.room_level import RoomLevel
     from thud.level.assessment import Verdict
-
-
-OCTAVE_NAMES = ("octave_31_5", "octave_63", "octave_125", "octave_250", "octave_500")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ImpactNumbers:
-    """Main numbers of an impact, or their errors.
-
-    Attributes
-    ----------
-    level : ndarray, shape (5,)
-        Levels of the octaves 31.5 to 500 Hz of the force on the floor, dB.
-    contact_time, restitution, peak_force : float
-        Contact time, s, coefficient of restitution, and peak force, N.
-    """
-
-    level: NDArray[np.float64]
-    contact_time: float
-    restitution: float
-    peak_force: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -128,19 +105,13 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         return self.case.limits.source
 
     @property
-    def numerical_error(self) -> ImpactNumbers:
-        """Errors due to the resolution: modes, rings, elements, time steps and samples.
+    def level_error(self) -> NDArray[np.float64]:
+        """Numerical errors of the octave levels of the force on the floor, dB, shape (5,).
 
         They are NaN if no other resolution can be computed.
         """
-        return _numbers(lambda name: getattr(self, f"{name}_error"))
-
-    @property
-    def finer(self) -> ImpactNumbers | None:
-        """Numbers at a finer resolution; None without the key `verify`."""
-        if "finer_contact_time" not in self.model_quantities:
-            return None
-        return _numbers(lambda name: self.model_quantities[f"finer_{name}"])
+        names = (name for name in QUANTITIES if name.startswith("octave_"))
+        return np.array([getattr(self, name) for name in names])
 
     @property
     def contact_time_as_recorded(self) -> float:
@@ -216,7 +187,7 @@ class Impact(ImpactQuantities, ImpactOrRecording):
     def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
     ) -> Verdict:
-        """Assess the source by the criteria of the standards, with `numerical_error`.
+        """Assess the source by the criteria of the standards, with the numerical errors.
 
         A criterion is undecided if the numerical error, which is that of the force on the floor,
         is unknown or could change the result.
@@ -228,12 +199,11 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         force
             ``"floor"`` or ``"elastic"``; by default the assessed force.
         """
-        errors = self.numerical_error
-        levels = zip(self.levels(force=force), errors.level, strict=True)
+        levels = zip(self.levels(force=force), self.level_error, strict=True)
         return assess_levels(
             [Estimate.computed(float(level), float(error)) for level, error in levels],
-            Estimate.computed(self.contact_time, errors.contact_time),
-            Estimate.computed(self.restitution, errors.restitution),
+            Estimate.computed(self.contact_time, self.contact_time_error),
+            Estimate.computed(self.restitution, self.restitution_error),
             peak_count(self.force(force), self.sample_rate),
             self.case.ball.mass,
             self.case.drop.height,
@@ -290,10 +260,3 @@ class Impact(ImpactQuantities, ImpactOrRecording):
             "floor_force_N": self.floor_force,
             **self.model_histories,
         }
-
-
-def _numbers(value: Callable[[str], float]) -> ImpactNumbers:
-    """Return numbers whose values are those of their names."""
-    names = ("contact_time", "restitution", "peak_force")
-    level = np.array([value(name) for name in OCTAVE_NAMES])
-    return ImpactNumbers(level=level, **{name: value(name) for name in names})

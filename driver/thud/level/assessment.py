@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -22,6 +21,7 @@ from thud.base.checks import (
     require_pair,
 )
 from thud.base.display import Displayed
+from thud.base.immutable import Immutable
 from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
@@ -33,9 +33,6 @@ if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
 
 _BISECTIONS = 40
-_SPREAD_COLUMNS = (
-    "criterion", "value", "range", "limits", "probability (95 %)", "main unknown", "result",
-)  # fmt: skip
 
 
 def wilson_interval(inside: int, count: int) -> tuple[float, float]:
@@ -47,7 +44,7 @@ def wilson_interval(inside: int, count: int) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-class Outcome(Displayed):
+class Outcome(Immutable):
     """Base of criteria and verdicts: true if it conforms, false if it does not.
 
     Attributes
@@ -85,9 +82,10 @@ class Outcome(Displayed):
         """Wilson's interval (95 %) of the probability that a drop conforms, if many were made."""
         return self.counts and wilson_interval(*self.counts)
 
-    def _shown_interval(self) -> str:
+    def _last_cells(self) -> tuple[str, ...]:
+        """Return the cells of probability and main unknown, if many drops were made."""
         ends = dict.fromkeys(f"{100 * end:.0f}" for end in self.interval or ())
-        return f"{' to '.join(ends)} %"
+        return (f"{' to '.join(ends)} %", "") if ends else ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,10 +127,9 @@ class Criterion(Outcome):
         return self.estimate.unit
 
     @property
-    def uncertainty_name(self) -> str:
-        """``"numerical error"`` for a computed value, else ``"uncertainty (95 %)"``."""
-        names = {contribution.name for contribution in self.estimate.contributions}
-        return NUMERICAL_ERROR if names == {NUMERICAL_ERROR} else "uncertainty (95 %)"
+    def is_computed(self) -> bool:
+        """Whether the uncertainty is a numerical error, not that of a measurement."""
+        return {part.name for part in self.estimate.contributions} == {NUMERICAL_ERROR}
 
     @property
     def quantity(self) -> Quantity:
@@ -162,12 +159,10 @@ class Criterion(Outcome):
         if math.isnan(value) or not math.isfinite(expanded):
             return undecided
         below, above = value + expanded < self.lower, value - expanded > self.upper
-        if self.estimate.upper_bound:
-            return fails if below else undecided
-        if below or above:
+        if below or (above and not self.estimate.upper_bound):
             return fails
         inside = value - expanded >= self.lower and value + expanded <= self.upper
-        return conforms if inside else undecided
+        return conforms if inside and not self.estimate.upper_bound else undecided
 
     @property
     def allowance(self) -> float:
@@ -211,41 +206,35 @@ class Criterion(Outcome):
 
     def __repr__(self) -> str:
         """Return value, limits and result."""
-        _, (name, value, _, limits, result) = replace(self, range=None).rows()
-        if self.range:
-            value, result = self._shown_range() or value, self.conforms
-        return f"<Criterion, {name}: {f'{value} {result}'.strip()}, allowed {limits}>"
+        label, value, width, *_, result = self.cells()
+        shown = (width if self.range else "") or value
+        return f"<Criterion, {label}: {f'{shown} {result}'.strip()}, allowed {self.shown_limits}>"
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        result = Result(self.conforms, self.conforms)
+    def cells(self) -> tuple[str, ...]:
+        """Return the row of the criterion in `Verdict.rows`.
+
+        The uncertainty is marked by † if it lacks a contribution that is not stated.
+        """
+        quantity, scale = self.quantity, self.quantity.display_scale
+        first, result = (quantity.label, quantity.show(self.value)), self.conforms
         if self.range:
-            shown = self._shown_range()
-            interval = self._shown_interval() if shown else ""
-            values = (self.quantity.label, self.quantity.show(self.value), shown)
-            row = (*values, self.shown_limits, interval, self.main_unknown, result)
-            return [_SPREAD_COLUMNS, row]
-        header = ("criterion", "value", self.uncertainty_name, "limits", "result")
-        name = re.sub(r"(\d)_(\d)", r"\1.\2", self.name).replace("_", " ")
-        limits = f"{self.lower:g} to {self.upper:g}"
-        if math.isnan(self.value):
-            return [header, (name, "", "", limits, "not known")]
-        value = f"{self.value:.4g} {self.unit}".strip()
-        expanded = f"{self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
+            digits = max(quantity.decimals - 1, 1)
+            ends = [f"{end * scale:z.{digits}f}" for end in self.range]
+            if ends[0] == ends[1]:
+                last = "", self.shown_limits, "", ""
+            else:
+                interval, _ = self._last_cells()
+                last = " to ".join(ends), self.shown_limits, interval, self.main_unknown
+            return (*first, *last, Result(result, result))
+        expanded = f"{scale * self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
+        expanded = expanded.replace("nan", "unknown") + " †" * bool(self.estimate.not_stated)
         if result == VERDICTS[1]:
-            result = Result("too low" if self.value < self.lower else "too high", self.conforms)
-        return [header, (name, value, expanded.replace("nan", "unknown"), limits, result)]
-
-    def _shown_range(self) -> str:
-        """Return the range in the display unit; empty if its ends are equal."""
-        quantity = self.quantity
-        digits = max(quantity.decimals - 1, 1)
-        ends = [f"{end * quantity.display_scale:z.{digits}f}" for end in self.range or ()]
-        return " to ".join(ends) if len(set(ends)) > 1 else ""
+            result = "too low" if self.value < self.lower else "too high"
+        return (*first, expanded.strip(), self.shown_limits, Result(result, self.conforms))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verdict(Outcome):
+class Verdict(Outcome, Displayed):
     """Result of an assessment.
 
     Attributes
@@ -286,11 +275,12 @@ class Verdict(Outcome):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        header, *_ = self.criteria[0].rows()
-        rows = [criterion.rows()[1] for criterion in self.criteria]
-        interval = (self._shown_interval(), "") if self.counts else ()
-        result = Result(self.conforms, self.conforms)
-        return [header, *rows, ("all criteria", "", "", "", *interval, result)]
+        width = NUMERICAL_ERROR if self.criteria[0].is_computed else "uncertainty (95 %)"
+        many = ("probability (95 %)", "main unknown") if self.counts else ()
+        header = ("criterion", "value", "range" if many else width, "limits", *many, "result")
+        last = ("all criteria", "", "", "", *self._last_cells())
+        rows = [criterion.cells() for criterion in self.criteria]
+        return [header, *rows, (*last, Result(self.conforms, self.conforms))]
 
     def to_csv(self) -> str:
         """Return the criteria as CSV, SI units, levels in dB; the last row is that of all."""

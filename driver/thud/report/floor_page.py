@@ -310,16 +310,16 @@ def _about_columns(floor: PredictedFloor) -> str:
 
 def _about_computation(floor: PredictedFloor) -> str:
     """Return the error of solving the equations, as stated for the source."""
-    errors = getattr(floor.prediction.source, "numerical_error", None)
+    errors = getattr(floor.prediction.source, "level_error", np.array(np.nan))
     solved = (
         "The equations of floor and room are solved without random numbers: the same input gives "
         "the same result. The error of leaving out their higher modes is not stated."
     )
-    if errors is None or not np.isfinite(errors.level).all():
+    if not np.isfinite(errors).all():
         return f"{solved} The numerical error of the force is not known."
     return (
         f"{solved} The numerical error of the force, estimated from a coarser computation, is at "
-        f"most {errors.level.max():.2g} dB in its octaves. This says nothing on whether the "
+        f"most {errors.max():.2g} dB in its octaves. This says nothing on whether the "
         "equations describe the building."
     )
 
