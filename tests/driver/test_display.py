@@ -134,7 +134,7 @@ def test_dataset_of_an_impact_has_units_and_provenance(
 
 def test_dataset_of_an_ensemble_is_that_of_a_study() -> None:
     heights = {"height": [0.5, 1.0, 500.0]}
-    many = thud.solve_many(heights, bands="third", forces=True)
+    many = thud.solve_many(heights, thud.Case(levels=thud.Levels(bands="third")), forces=True)
     found = many.to_xarray()
     fixed = {"bands": "both"}
     study = thud.sweep(

@@ -60,7 +60,9 @@ def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> N
     rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
     parameters = {"mass": 2.45, "height": heights, "momentum_flux": flux}
     expected = thud.solve_many(parameters, model="hollow_sphere")
-    thirds = thud.solve_many(parameters, bands="third", model="hollow_sphere")
+    thirds = thud.solve_many(
+        parameters, thud.Case(model=thud.HollowSphere(), levels=thud.Levels(bands="third"))
+    )
     assert [row["sample"] for row in rows] == [str(i + 1) for i in range(40)]
     np.testing.assert_array_equal([float(row["height"]) for row in rows], heights)
     assert [row["momentum_flux"] for row in rows] == list(flux)

@@ -1,30 +1,101 @@
-"""Impacts and ensembles as xarray datasets, with units and meanings."""
+"""Results of impacts and of many drops, by name, and as xarray datasets with units and meanings."""
 
 from __future__ import annotations
 
 import math
 import platform
+from collections import Counter
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
-from thud.base._schema import BANDS, QUANTITIES, VERDICTS
+from thud.base._schema import BANDS, QUANTITIES, RATED_BANDS, SAMPLE_QUANTITIES, VERDICTS
 from thud.base.bridge import compiler, version, without_units
+from thud.base.extras import require_extra
+from thud.base.key import Quantity
+from thud.base.note import Note
 from thud.case.keys import find_key
-from thud.impact.outcomes import DIMENSIONS, FREQUENCIES, RESULTS
 from thud.level.levels import FORCES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    import xarray as xr
     from numpy.typing import NDArray
 
-    from thud.base.key import Key, Quantity
+    from thud.base.key import Key
     from thud.case.case import Case
     from thud.impact.ensemble import Ensemble
     from thud.recordings.recording import ImpactResult
+
+NO_ERRORS = Note("no_numerical_errors")
+# Nominal frequencies, Hz, by the name of the dimension: of force levels, and of levels in a room.
+FREQUENCIES = {bands: entry["nominal"] for bands, entry in BANDS.items()} | {
+    "rated_third": RATED_BANDS["third"]
+}
+# Dimension of the force exposure levels, of the elastic force, of the force on a rigid floor and of
+# that on the floor of the case.
+LEVELS: dict[str, str] = {
+    f"{force}_{bands}": bands for bands in BANDS for force in ("elastic", "floor", "contact")
+}
+# Second dimension of results; the first is the sample.
+DIMENSIONS = LEVELS | {"room_third": "rated_third"}
+
+
+def _level(force: str, bands: str) -> Quantity:
+    """Return the declaration of the levels of a force in bands."""
+    meaning = f"force exposure level of the {force} force, re 1 N and 1 s"
+    title = f"{force} level" if bands == "octave" else f"{force} {bands} level"
+    return Quantity(f"{force}_{bands}", title, "L_{FE}", "dB", "dB", 1.0, 2, meaning)
+
+
+def _number(name: str, meaning: str) -> Quantity:
+    """Return the declaration of a pure number, a truth value or a text."""
+    return Quantity(name, name, "", "", "", 1.0, 0, meaning)
+
+
+# All results of samples, including those of surrogates and of their training, in their order.
+RESULTS = {
+    **{name: QUANTITIES[name] for name in SAMPLE_QUANTITIES},
+    **{name: _level(name.partition("_")[0], bands) for name, bands in LEVELS.items()},
+    "margin": QUANTITIES["margin"],
+    "conforms": _number("conforms", "all criteria of the standard are met"),
+    "status": _number("status", "0: computed; otherwise the exit code of the error"),
+    "reason": _number("reason", "why there are no results"),
+    "floor_work": QUANTITIES["floor_work"],
+    "room_third": Quantity(
+        "room_third", "level in the room", "L_{i,Fmax}", "dB", "dB", 1.0, 1,
+        "maximum Fast level in the room, re 20 uPa",
+    ),
+    "room_rating": QUANTITIES["room_rating"],
+    "undecided": _number("undecided", "the verdict could change by the errors of the surrogate"),
+    "peaks": QUANTITIES["peak_count"],
+}  # fmt: skip
+
+
+def sample_warnings(
+    status: NDArray[np.integer], reason: NDArray[np.object_], conforms: NDArray[np.bool_] | None
+) -> tuple[Note, ...]:
+    """Return warnings of samples without results, and of sources that do not conform.
+
+    Parameters
+    ----------
+    status, reason
+        Exit code and message of each sample, as in `Ensemble`, of any shape.
+    conforms
+        Whether each source conforms, of the same shape; None if levels in a room are not rated.
+    """
+    failed = status != 0
+    result = []
+    if failed.any():
+        ((cause, _),) = Counter(reason[failed]).most_common(1)
+        count = float(failed.sum())
+        others = {"reason": cause}
+        result.append(Note("samples_failed", value=count, high=failed.size, others=others))
+    if conforms is not None and (unlike := ~failed & ~conforms).any():
+        result.append(Note("samples_not_standard", value=float(unlike.sum()), high=failed.size))
+    return tuple(result)
 
 
 def impact_dataset(
@@ -35,7 +106,11 @@ def impact_dataset(
     """Return the dataset of an impact or a recording: histories, levels and known quantities.
 
     The names of histories end with units. The dataset is writable, unlike the arrays of the impact.
+    Raise InputError if xarray is not installed.
     """
+    with require_extra("studies"):
+        import xarray as xr
+
     variables: dict[str, Any] = {}
     for column, values in histories.items():
         (name,) = without_units({column: values})
@@ -58,7 +133,10 @@ def impact_dataset(
 
 
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
-    """Return the dataset of an ensemble, with the dimension ``sample``."""
+    """Return the dataset of an ensemble; raise InputError if xarray is not installed."""
+    with require_extra("studies"):
+        import xarray as xr
+
     coordinates, variables = sample_variables(ensemble.results)
     for name, values in ensemble.parameters.items():
         key, _ = find_key(name, ensemble.case)
@@ -111,6 +189,9 @@ def _frequencies(used: Iterable[str]) -> dict[str, Any]:
 
 def case_attributes(case: Case) -> dict[str, str]:
     """Return the case and the software of results as attributes of a dataset."""
+    with require_extra("studies"):
+        import xarray as xr
+
     return {
         "model": case.model.name if case.model else "",
         "assessed_force": case.levels.force,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import KEYS, Limits, SampleQuantities
+from thud.base._schema import KEYS, SampleQuantities
 from thud.base.bridge import ask
 from thud.base.checks import (
     refuse,
@@ -20,11 +20,10 @@ from thud.base.checks import (
     require_whole,
 )
 from thud.base.display import Displayed
-from thud.base.extras import require_extra
 from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key
-from thud.impact.outcomes import NO_ERRORS, RESULTS, sample_warnings
+from thud.impact.datasets import NO_ERRORS, RESULTS, ensemble_dataset, sample_warnings
 from thud.level.levels import FORCES
 
 if TYPE_CHECKING:
@@ -34,7 +33,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LimitsSource, ModelName
+    from thud.base._schema import ModelName
     from thud.base.key import Key
     from thud.base.note import Note
 
@@ -130,7 +129,7 @@ class Ensemble(SampleQuantities, Displayed):
 
     @property
     def results(self) -> dict[str, NDArray[Any]]:
-        """Results that were computed, by their names in `thud.impact.outcomes.RESULTS`."""
+        """Results that were computed, by their names in `thud.impact.datasets.RESULTS`."""
         values = {name: getattr(self, name, None) for name in RESULTS}
         return {name: array for name, array in values.items() if array is not None}
 
@@ -158,25 +157,17 @@ class Ensemble(SampleQuantities, Displayed):
 
         Raise InputError if xarray is not installed.
         """
-        with require_extra("studies"):
-            from thud.impact.datasets import ensemble_dataset
-
         return ensemble_dataset(self)
 
 
-def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
+def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     parameters: Mapping[str, ArrayLike] | pd.DataFrame,
     case: Case | None = None,
     *,
     model: ModelName | None = None,
     threads: int | None = None,
     levels: bool = True,
-    bands: BandSet | None = None,
     forces: bool = False,
-    sample_rate: float | None = None,
-    duration: float | None = None,
-    substeps: int | None = None,
-    source: LimitsSource | None = None,
     progress: bool = False,
 ) -> Ensemble:
     """Compute many drops on a rigid floor and, if the case has a floor, on this floor.
@@ -195,7 +186,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         the name of a key of floor or room is not unique, its group precedes it, as in
         ``"plate.loss_factor"``.
     case
-        Values of all other keys; by default the standard ball from 1 m.
+        Values of all other keys, such as the bands of the levels in addition to octaves; by default
+        the standard ball from 1 m.
     model
         Source model in place of the model of the case, with its default options.
     threads
@@ -203,15 +195,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         the threads of its parent do not exist in it.
     levels
         Also compute levels and verdicts, which takes longer.
-    bands
-        Bands of the levels in addition to octaves, such as ``"third"``; by default the bands of
-        the case.
     forces
         Return the force histories, which take 16 bytes for each instant of each sample.
-    sample_rate, duration, substeps
-        As in `solve`, for all samples; by default the values of the case.
-    source
-        ``"rubber_ball"`` or ``"tyre"``, whose limits apply; by default the source of the case.
     progress
         Show a progress bar.
 
@@ -224,8 +209,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Raises
     ------
     InputError
-        If a key is unknown, arrays are not numeric or do not broadcast, the case, the bands
-        or the number of threads are invalid, or the results do not fit in memory.
+        If a key is unknown, arrays are not numeric or do not broadcast, the case or the number of
+        threads are invalid, or the results do not fit in memory.
     """
     from tqdm import tqdm
 
@@ -238,14 +223,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         base = replace(base, model=new_model(model, {}))
     if base.model is None:
         refuse("the case has no source model", "a case with a model, or model = its name")
-    sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
-    keywords = {name: value for name, value in sampling.items() if value is not None}
-    base = replace(
-        impact_only(base),
-        sampling=replace(base.sampling, **keywords),  # type: ignore[arg-type]
-        levels=replace(base.levels, bands=base.levels.bands if bands is None else bands),
-        limits=Limits(source) if source is not None else base.limits,
-    )
+    base = impact_only(base)
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
@@ -255,8 +233,6 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     try:
         # Without parameters, there is only the drop of the case.
         columns, numbers = _columns(dict(parameters) or {"height": base.drop.height}, base)
-        for name in {*keywords, *(["source"] if source else [])} & columns.keys():
-            refuse(f"{name!r} is stated twice", "once, as a parameter or as a keyword")
         # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
         size = _MAX_VALUES // (_SAMPLE_VALUES + len(FORCES) * length)

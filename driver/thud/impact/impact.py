@@ -11,7 +11,7 @@ import numpy as np
 
 from thud.base._schema import QUANTITIES, ImpactQuantities
 from thud.base.checks import require_choice, require_whole
-from thud.base.extras import data_frame, require_extra
+from thud.base.extras import data_frame
 from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
 from thud.level.assessment import assess_levels
@@ -236,8 +236,7 @@ class Impact(ImpactQuantities, ImpactOrRecording):
 
         Snapshots are not included. Raise InputError if xarray is not installed.
         """
-        with require_extra("studies"):
-            from thud.impact.datasets import case_attributes, impact_dataset
+        from thud.impact.datasets import case_attributes, impact_dataset
 
         return impact_dataset(
             self, self.histories(), case_attributes(self.case) | self.model_quantities

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from thud.base.checks import require_whole
-from thud.base.extras import data_frame, require_extra
+from thud.base.extras import data_frame
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import assess_levels
@@ -289,8 +289,7 @@ class Recording(ImpactOrRecording):
 
         Raise InputError if xarray is not installed.
         """
-        with require_extra("studies"):
-            from thud.impact.datasets import impact_dataset
+        from thud.impact.datasets import impact_dataset
 
         histories = {"floor_force_N": self.force()}
         return impact_dataset(self, histories, {"recording": self.name})

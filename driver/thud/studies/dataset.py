@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import attributes, case_attributes, sample_variables
-from thud.impact.outcomes import FREQUENCIES, RESULTS
+from thud.impact.datasets import (
+    FREQUENCIES,
+    RESULTS,
+    attributes,
+    case_attributes,
+    sample_variables,
+)
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.sampling import sampler_versions
 

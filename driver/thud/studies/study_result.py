@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.display import Displayed
 from thud.base.tables import format_rows
-from thud.impact.outcomes import NO_ERRORS, sample_warnings
+from thud.impact.datasets import NO_ERRORS, sample_warnings
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,7 @@ from thud.base.checks import refuse
 from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
 from thud.case.keys import find_key
-from thud.impact.outcomes import LEVELS
+from thud.impact.datasets import LEVELS
 from thud.studies.blocks import compute_samples, read_identity, result_names
 from thud.studies.directory import StudyDirectory, require_version
 from thud.studies.parameter import Parameter

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from thud.impact.outcomes import FREQUENCIES, RESULTS
+from thud.impact.datasets import FREQUENCIES, RESULTS
 from thud.studies.blocks import read_dataset
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study_result import SampleResult

@@ -27,7 +27,7 @@ from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OUTPUT_GROUP, value_in, with_values
-from thud.impact.outcomes import FREQUENCIES, LEVELS, RESULTS
+from thud.impact.datasets import FREQUENCIES, LEVELS, RESULTS
 from thud.level.assessment import get_criteria
 from thud.studies.study_result import StudyResult
 
