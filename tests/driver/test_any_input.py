@@ -11,8 +11,8 @@ from conftest import REPOSITORY, naming
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 import thud
-from thud.recordings.table import read_table, time_and_force
-from thud.recordings.times import read_record
+from thud.recordings.table import read_table
+from thud.studies.fitting.force_record import read_record, time_and_force
 
 FLAGSHIP = (REPOSITORY / "inputs/rubber_ball_100cm.nml").read_text()
 

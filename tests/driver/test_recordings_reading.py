@@ -41,7 +41,6 @@ from thud.recordings.formats.text import read_channels
 from thud.recordings.instruments import Plate, RecorderFilter
 from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.signal import Signal
-from thud.recordings.times import uniform_grid
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -381,27 +380,7 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
     # Of 1764 times rounded to 1 us the slope is off by 1e-6 sqrt(1 / 1764**3) steps and more.
     assert signal.sample_rate == pytest.approx(44100, rel=4e-6)
     (note,) = signal.notes
-    assert (note.code, note.value) == ("times_rounded", pytest.approx(1e-6))
-
-
-def test_rounded_times_miss_the_grid_by_a_digit_at_most() -> None:
-    exact = 1.25e-4 * np.arange(1001)
-    rounded = np.floor(exact / 1e-5 + 1e-6) * 1e-5
-    _, step, (told,) = uniform_grid(rounded, "t.csv")
-    assert step == pytest.approx(1.25e-4, rel=1e-6)
-    assert told.value == pytest.approx(1e-5)
-    # Half a digit below the time, and another one below the mean.
-    rounded[501] -= 1e-5
-    with pytest.raises(InputError, match=naming("t.csv", "row 502")):
-        uniform_grid(rounded, "t.csv")
-
-
-def test_digits_of_many_times_are_counted_at_even_and_odd_rows() -> None:
-    time = np.arange(70_000.0)
-    time[1::4] += 0.05
-    time[3::4] -= 0.05
-    with pytest.raises(InputError, match=naming("uniformly")):
-        uniform_grid(time, "t.csv")
+    assert (note.code, note.value) == ("times_rounded", pytest.approx(5e-7, rel=0.1))
 
 
 def table_of(row: Callable[[int, float, float], str]) -> str:
@@ -734,7 +713,7 @@ def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
         ("0.5,1,5,2\n0.5,2,5\n", naming("line 2", 3, 4)),
         ("1.5,0\n2,\n", naming("line 2", "''")),
         ("0;1\n1;2\n", naming("2 rows")),
-        ("".join(f"{i**2};1\n" for i in range(9)), naming("row", 0.12)),
+        ("".join(f"{i**2};1\n" for i in range(9)), naming("row", "1.2")),
         ("".join(f"{-i};1\n" for i in range(9)), naming("-1 s", "1000 s")),
         ("".join("0;1\n" for _ in range(9)), naming("0 s", "1000 s")),
         ("".join(f"{i};1\n" for i in range(9)), naming("rate", "1 Hz")),
@@ -1165,21 +1144,19 @@ EXCEL = datetime(2026, 11, 23, 9, 58, 59, 980000)  # noqa: DTZ001 - spreadsheets
         ("Date;Force [kN]", "%M:%S.%f"),
     ],
 )
-def test_date_times_are_an_axis(title: str, shown: str, tmp_path: Path) -> None:
-    # Over a minute.
+def test_dates_and_times_of_day_show_no_rate(title: str, shown: str, tmp_path: Path) -> None:
     force = 1e-3 * half_sine(8000.0)
     mark = "," if ",%f" in shown else "."
     path = tmp_path / "excel.csv"
     rows = (
-        f"{(EXCEL + timedelta(seconds=i / 8000)).strftime(shown)};{value:.6f}".replace(".", mark)
-        if mark == "," and "%d" not in shown
-        else (EXCEL + timedelta(seconds=i / 8000)).strftime(shown)
-        + f";{value:.6f}".replace(".", mark)
+        (EXCEL + timedelta(seconds=i / 8000)).strftime(shown) + f";{value:.6f}".replace(".", mark)
         for i, value in enumerate(force)
     )
     path.write_text(title + "\n" + "\n".join(rows), encoding="utf-8")
-    signal, found = read_all(path)
-    assert signal.sample_rate == pytest.approx(8000, rel=1e-7)
+    with pytest.raises(InputError, match=naming("sample rate is not known", "sample_rate")):
+        read_all(path)
+    signal, found = read_all(path, sample_rate=8000)
+    assert signal.sample_rate == 8000
     np.testing.assert_allclose(found, 1e3 * force, atol=1e-3)
 
 
@@ -1201,35 +1178,6 @@ def test_headers_are_read_in_encodings_of_spreadsheets(
     (channel,) = read_channels(path)
     assert (channel.sample_rate, channel.unit) == (8000.0, "N")
     assert channel.name == re.split("[ （]", titles)[0]  # noqa: RUF001 - as printed
-
-
-def test_coarse_times_of_day_show_no_rate(tmp_path: Path) -> None:
-    path = tmp_path / "excel.csv"
-
-    def write(digits: int, *, lost: int = 0) -> None:
-        rows = "\n".join(
-            f"10:00:{i / 8000:0{digits + 3}.{digits}f};{value:.2f}"
-            for i, value in enumerate(half_sine(8000.0))
-            if not lost <= i < lost + 3 or not lost
-        )
-        path.write_text("Zeit;Kraft [N]\n" + rows, encoding="utf-8")
-
-    write(3)
-    with pytest.raises(InputError, match=naming("sample rate is not known", "too coarse")):
-        read_all(path)
-    assert read_all(path, sample_rate=8000)[0].sample_rate == 8000
-    write(6, lost=100)
-    with pytest.raises(InputError, match=naming("times", "not uniformly spaced")):
-        read_all(path)
-
-
-def test_damaged_date_times_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "excel.csv"
-    rows = [f"10:00:00.{i:03d};{value:.2f}" for i, value in enumerate(half_sine(8000.0))]
-    rows[20] = "soon;5"
-    path.write_text("Time;Force [N]\n" + "\n".join(rows), encoding="utf-8")
-    with pytest.raises(InputError, match=naming("line 22", "soon", "is not a time")):
-        read_all(path)
 
 
 def siemens_structure(force: NDArray[np.float64], rate: float) -> dict[str, Any]:

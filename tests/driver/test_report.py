@@ -33,7 +33,7 @@ from thud.recordings.instruments import Plate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.recording import Recording
-from thud.recordings.times import read_date
+from thud.recordings.words import read_date
 from thud.report.contents import FIELDS, missing_fields, report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_notes, shorten

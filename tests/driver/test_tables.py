@@ -14,8 +14,8 @@ from recording_files import opened
 
 import thud
 from thud.base.units import UNITS, find_unit
-from thud.recordings.table import read_table, time_and_force
-from thud.recordings.times import seconds_of_day
+from thud.recordings.table import read_table
+from thud.studies.fitting.force_record import time_and_force
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -226,6 +226,7 @@ def test_ten_thousand_layouts_are_read_right_or_refused(tmp_path: Path) -> None:
 LAYOUTS = [
     ("lbf", "Time [s] Force [lbf]", "{t} {a}"),
     ("lbf", "# Time [s]   Force [lbf]", "{t} {a}"),
+    ("lbf", "# Time [s]   Force [lbf]", "{t},{a}"),
     ("lbf", "Time [s]\tForce [lbf]", "{t}   {a}"),
     ("lbf", "Time [s];Force [lbf];", "{t};{a}"),
     ("lbf", "Time [s],Force [lbf]", "{t},{a},"),
@@ -288,7 +289,6 @@ def test_ordinary_layouts_are_read_with_their_units(
     ("head", "row", "words"),
     [
         ("Time [s];F1 [N];F2 [N]", "{t};{f}", naming("line 1", "3 titles", "2 columns")),
-        ("Time;F1", "{t};{f};{f}", naming("line 1", "2 titles", "3 columns")),
         ("t, sec   State   a, V   F1, N   F9 [lbf]", "{t},,{f},{f}", naming("line 1")),
         ("# Force [lbf]", "{t};{f}", naming("line 1", "1 title", "2 columns")),
         ("# force in lbf", "{t} {f}", naming("line 1", "2 columns")),
@@ -299,7 +299,6 @@ def test_ordinary_layouts_are_read_with_their_units(
         ("Unit: kN\nTime;Force [N]", "{t};{f}", naming("column 2", "kN", "N")),
         ("Y_Unit_Label;N;N;m/s2\nTime;F1;F2", "{t};{f};{f}", naming("column 1, 'Time'", "'N'")),
         ("x,State,F1 [N]\n,start,0.00", ",,{f}", naming("line 2", "'start'")),
-        ("# Time [s]   Force [lbf]", "{t},{f}", naming("line 1", "1 title", "2 columns")),
         ("Column 1: Time [s]\nColumn 2: Force [lbf]", "{t}\t{f}", naming("line 1", "2 columns")),
         ("Time [s];Force [lbf]\nTime [s];Force [N]", "{t};{f}", naming("line 1", "second line")),
     ],
@@ -323,21 +322,3 @@ def test_units_and_titles_that_do_not_fit_are_refused(
 )  # fmt: skip
 def test_spellings_of_units(text: str, unit: str) -> None:
     assert find_unit(text) == unit
-
-
-@pytest.mark.parametrize(
-    ("text", "time"), [("15:30,00", 930.0), ("15:30", 930.0), ("3:15:30", 11_730.0)]
-)
-def test_fractions_of_seconds_show_minutes(text: str, time: float) -> None:
-    assert seconds_of_day(text) == time
-
-
-@pytest.mark.parametrize("decimals", [4, 5])
-def test_exact_clock_shows_its_rate(decimals: int, tmp_path: Path) -> None:
-    path = tmp_path / "plate.csv"
-    rows = [
-        f"10:00:{i / 1e4:0{decimals + 3}.{decimals}f};{force:.3f}" for i, force in enumerate(PULSE)
-    ]
-    path.write_text("\n".join(["Clock;Force [N]", *rows]), encoding="utf-8")
-    (signal,) = opened(path)
-    assert signal.sample_rate == pytest.approx(1e4, rel=1e-9)

@@ -22,9 +22,9 @@ from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
 from thud.floors.survey import levels_csv, rating_table, read_room_levels
 from thud.recordings.config import read_config
-from thud.recordings.table import read_table, time_and_force
-from thud.recordings.times import read_record
+from thud.recordings.table import read_table
 from thud.studies.compression_fit import fit_compression
+from thud.studies.fitting.force_record import read_record, time_and_force
 
 if TYPE_CHECKING:
     import random

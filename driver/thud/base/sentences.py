@@ -18,9 +18,8 @@ PROCESSING = {
     "unit_of_data_type": "the data set has no label of a unit; it is a force in units of "
     "{value:.6g} {unit}",
     "factor_not_applied": "{factor} of the file was not applied; the calibration replaces it",
-    "times_rounded": "the times, rounded to {value:.1g} {unit}, were replaced by a grid of "
+    "times_rounded": "the times, up to {value:.1g} {unit} off, were replaced by a grid of "
     "{rate:.7g} Hz",
-    "times_coarse": "the times of day are too coarse to show the sample rate",
     # Background.
     "offset_removed": "an offset of {value:.3g} {unit} was removed",
     "drift_removed": "a drift of {value:.3g} {unit} was removed",

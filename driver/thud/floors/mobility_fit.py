@@ -359,7 +359,7 @@ def _read(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     """Return frequencies, values and quantity, which is None if the file does not state it."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
-    table = read_table(path, _ALLOWED, lambda title: _words(title)[0] in _TITLES)
+    table = read_table(path, _ALLOWED)
     words = [_words(column.name) for column in table.columns]
     kinds = [_TITLES.get(first, "") for first, *_ in words]
     if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:

@@ -12,7 +12,6 @@ from thud.base.errors import InputError
 from thud.base.files import read_toml
 from thud.base.note import Note
 from thud.level.levels import SOURCES
-from thud.recordings import times
 from thud.recordings.channel import regular_file, shown_path
 from thud.recordings.config_values import (
     Choice,
@@ -34,6 +33,7 @@ from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.instruments import Plate, RecorderFilter, check_plate
 from thud.recordings.polarity import POLARITIES
 from thud.recordings.response import Chain
+from thud.recordings.words import read_date
 
 if TYPE_CHECKING:
     import os
@@ -192,7 +192,7 @@ class Config(Table):
         `file_dates` are those of the files, which count if no date is stated.
         """
         due = [entry for entry in self.instruments if isinstance(entry, Instrument) and entry.due]
-        read = [times.read_date(text) for text in ([self.date] if self.date else file_dates)]
+        read = [read_date(text) for text in ([self.date] if self.date else file_dates)]
         last = max((day.date().isoformat() for day in read if day), default="")
         if due and not last:
             return [Note("date_unknown")]

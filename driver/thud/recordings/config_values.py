@@ -19,8 +19,8 @@ from thud.base.checks import (
 from thud.base.errors import InputError
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
-from thud.recordings import times
 from thud.recordings.force_units import Calibration, plain_number, read_chain
+from thud.recordings.words import read_date
 
 MAX_TEXT = 500
 # Maximum number of digits of the number of a drop.
@@ -90,7 +90,7 @@ def to_day(value: object, key: str) -> str:
 def to_date(value: object, key: str) -> str:
     """Return a date as text in ISO 8601; empty if not stated."""
     text = to_day(value, key)
-    read = times.read_date(text) if text else None
+    read = read_date(text) if text else None
     if text and read is None:
         refuse_value(key, value, 'a date, such as "2024-05-03"')
     return read.date().isoformat() if read else ""

@@ -219,11 +219,9 @@ def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, lis
     """Return the sample rate, Hz, stated or of the file."""
     rate = channel.sample_rate if stated is None else stated
     if rate is None:
-        coarse = [note for note in channel.notes if note.code == "times_coarse"]
-        reason = "".join(f" ({note})" for note in coarse)
         refuse(
-            f"{name}: the sample rate is not known{reason}",
-            "sample_rate in Hz, or a column of times",
+            f"{name}: the sample rate is not known",
+            "sample_rate in Hz, or a column of times in s",
             subject="sample_rate",
         )
     if not RATES[0] <= rate <= RATES[1]:

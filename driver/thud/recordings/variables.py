@@ -204,7 +204,7 @@ def _holds_times(vector: Vector) -> bool:
     """
     if vector.column:
         may_be = vector.column == 1
-    elif is_time(vector.title):
+    elif is_time(*split_title(vector.title)):
         return True
     else:
         may_be = vector.title.rpartition("_")[2].casefold() in TIME

@@ -1,26 +1,18 @@
-"""Words, units and numbers in titles, headers and cells of files."""
+"""Words of titles and headers of files: names, units, sample rate, dates, factors."""
 
 from __future__ import annotations
 
-import csv
 import re
+from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thud.base.units import find_unit, size_of
+from thud.recordings.cells import MARKS, read_quantity
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-# Separators of columns by precedence; a line without any of them is separated by blanks.
-SEPARATORS = ("\t", ";", ",")
-# Decimal marks; the mark that is not the decimal one groups digits, as do the characters below.
-MARKS = {".": "point", ",": "comma"}
-GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
-# Begin of a comment. Programs by Microsoft's compilers write 1.#IND, 1.#QNAN and 1.#INF for NaN and
-# infinity, which are no numbers here.
-COMMENT = re.compile(r"#(?!(?<=\d[.,]#)(?:IND|QNAN|SNAN|INF))")
 
 
 def _words(text: str) -> frozenset[str]:
@@ -49,19 +41,11 @@ TIME_UNIT = _words("timeunit timeunits xunit xunits xunitlabel unitsx unittime z
 TIME = _words(
     "time times t zeit temps tempo sec seconds xvalue abscissa timestamps 시간 시각 時間 時刻"
 )
-# Names of channels that show the encoding of a header.
-_FORCE = _words("kraft stoßkraft 힘 충격력 하중 力 衝撃力 荷重")
-WORDS = RATE | STEP | DATE | UNIT | TIME_UNIT | TIME | _FORCE
-
 # "Force [kN]", "Force (kN) 1"; "Force / kN", "Force, kN"; "Force in kN", "Force_kN", "Force kN".
 BRACKETS = re.compile(r"\[([^][]{0,30})\]|\{([^{}]{0,30})\}|\(((?:[^()]|\([^()]*\)){0,30})\)")
 LOOSE = re.compile(r"(?P<name>.*?\S)(?P<mark>\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s,_]{1,12})\s*")
 # Words that are no units after a blank, or after an underscore.
 _AMBIGUOUS = {"": {"g", "h", "min", "K", "rad"}, "_": {"h", "K"}}
-QUANTITY = re.compile(
-    rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
-    re.IGNORECASE,
-)
 # Names of factors and offsets; of factors that convert to a unit, which apply if no unit is stated.
 _FACTOR = re.compile(
     r"(amp|amplifier|channel|data|force|raw|sensor|signal|unit|y)?"
@@ -72,77 +56,10 @@ _OFFSET = frozenset({"addoffset", "offset", "intercept"})
 _SENSITIVITY = _words("sensitivity calibration")
 # Full-width brackets of Japanese and Korean titles, and those of ASCII.
 _BRACKETS = str.maketrans("\uff08\uff09\uff3b\uff3d", "()[]")
+_DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
+_TIME_FORMATS = ("", " %H:%M:%S", " %H:%M")
 # Maximum length of a title or value.
 MAX_LENGTH = 200
-
-
-def _numbers(decimal: str) -> re.Pattern[str]:
-    """Return the pattern of numbers with a decimal mark; the first group separates thousands.
-
-    A decimal comma needs a digit behind it: the comma in ``0, 1.5`` separates columns.
-    """
-    mark = re.escape(decimal)
-    fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
-    grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
-    return re.compile(
-        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:[ed][-+]?\d+)?"
-        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*{fraction})",
-        re.ASCII | re.IGNORECASE,
-    )
-
-
-NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
-
-
-def is_number(cell: str) -> bool:
-    """Whether a cell is a number with either decimal mark."""
-    return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
-
-
-def to_number(cell: str, decimal: str) -> float | None:
-    """Return the number in a cell; None if the cell is not a number with this decimal mark.
-
-    >>> to_number("1.234,5", ","), to_number("1.234,5", ".")
-    (1234.5, None)
-    """
-    match = NUMBERS[decimal].fullmatch(cell)
-    if match is None:
-        return None
-    # Fortran writes 1.5D+03.
-    return float(
-        re.sub("[dD]", "e", cell.replace(match["group"] or "\0", "").replace(decimal, "."))
-    )
-
-
-def find_separator(line: str) -> str | None:
-    """Return the separator of the columns of a line, None for blanks.
-
-    >>> find_separator("0,1 1,5")
-    >>> find_separator("0, 1.5")
-    ','
-    >>> find_separator('"0,1","1,5"')
-    ','
-    """
-    bare = re.sub('"[^"]*"', "0", line)
-    separator = next((mark for mark in SEPARATORS if mark in bare), None)
-    words = re.split(" +", bare)
-    # A comma next to a blank is no decimal comma.
-    are_numbers = all(is_number(word) and not word.startswith(",") for word in words)
-    return None if separator == "," and len(words) > 1 and are_numbers else separator
-
-
-def split_line(line: str, separator: str | None) -> list[str]:
-    """Return the cells of a line without the blanks and quotes around them.
-
-    >>> split_line('"0,1" ;1,5', ";")
-    ['0,1', '1,5']
-    """
-    if '"' in line:
-        words = csv.reader([line], delimiter=separator or " ", skipinitialspace=True)
-        return [cell.strip() for cell in next(words)]
-    if separator is None:  # other blanks group digits
-        return re.split("[ \t]+", line)
-    return [cell.strip() for cell in line.split(separator)]
 
 
 def plain(name: str) -> str:
@@ -183,14 +100,13 @@ def marked_units(text: str) -> list[str]:
     return ["".join(groups) for groups in BRACKETS.findall(text)] + at_end
 
 
-def is_time(title: str) -> bool:
-    """Whether a title names a column of times."""
-    name, unit = split_title(title)
+def is_time(name: str, unit: str) -> bool:
+    """Whether name and unit of a column are those of times."""
     return plain(name) in TIME or size_of(unit)[0] == "s"
 
 
 def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
-    """Return a number and the unit after it; None if there is no number.
+    """Return a number and the unit after it; None if it is none, or its unit is not known.
 
     If the text is a number with either decimal mark, `decimal` is the mark. Without it the mark is
     the point, and None is returned for an ambiguous number such as 51,200.
@@ -198,15 +114,11 @@ def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     >>> read_number("51,2 kHz")
     (51.2, 'kHz')
     """
-    match = QUANTITY.fullmatch(str(text).strip().strip("\"'").strip()[:MAX_LENGTH])
-    if not match:
+    cell = str(text).strip().strip("\"'").strip()[:MAX_LENGTH]
+    found = {mark: read for mark in MARKS if (read := read_quantity(cell, mark))}
+    if not found or (len(set(found.values())) > 1 and not decimal and "," in cell):
         return None
-    values = {mark: to_number(match["number"], mark) for mark in MARKS}
-    known = {value for value in values.values() if value is not None}
-    if not known or (len(known) > 1 and not decimal and "," in match["number"]):
-        return None
-    value = values[decimal or "."] if len(known) > 1 else known.pop()
-    return (value, match["unit"].strip(" []()")) if value is not None else None
+    return found.get(decimal or ".") or next(iter(found.values()))
 
 
 def find_rate(items: Iterable[tuple[str, str]], decimal: str = "") -> float | None:
@@ -262,3 +174,22 @@ def text_of(value: object) -> str:
     if isinstance(item, bytes):
         return item.decode("utf-8", "replace")
     return "" if isinstance(item, list | tuple) or item is None else str(item)
+
+
+def read_date(text: str) -> datetime | None:
+    """Return a date written in ISO 8601 or one of the other known formats; None if in none.
+
+    >>> read_date("03.05.2024").date().isoformat()
+    '2024-05-03'
+    """
+    line = " ".join(text.split())
+    try:
+        return datetime.fromisoformat(line).replace(tzinfo=None)
+    except ValueError:
+        pass
+    for form in (date + time for date in _DATE_FORMATS for time in _TIME_FORMATS):
+        try:
+            return datetime.strptime(line, form)  # noqa: DTZ007 - files state no time zone
+        except ValueError:
+            continue
+    return None

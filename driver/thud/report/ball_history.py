@@ -16,7 +16,7 @@ from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
-from thud.recordings.times import read_date
+from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
 from thud.report.rows import NOT_KNOWN, Style, criterion_style, limits_of, number, value_text
 

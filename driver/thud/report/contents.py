@@ -15,7 +15,7 @@ from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.config import Instrument
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import compare_methods
-from thud.recordings.times import read_date
+from thud.recordings.words import read_date
 from thud.report.notes import sentences
 from thud.report.rows import SCATTER
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.recordings.background import Background
-    from thud.recordings.times import Record
+    from thud.studies.fitting.force_record import Record
     from thud.studies.fitting.force_target import ForceTarget
 
     Array = NDArray[np.float64]

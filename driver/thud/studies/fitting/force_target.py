@@ -13,8 +13,8 @@ from thud.impact.impact import Impact
 from thud.level.levels import FORCES, RECORDED_BAND
 from thud.recordings.channel import MIN_SAMPLES
 from thud.recordings.recording import Recording
-from thud.recordings.times import Record, read_record
 from thud.studies.fitting.force_misfit import ForceMisfit
+from thud.studies.fitting.force_record import Record, read_record
 from thud.studies.fitting.misfit import require_positive
 from thud.studies.fitting.record_noise import MIN_HUM, find_pulse, trimmed
 
