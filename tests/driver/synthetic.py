@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.level.estimate import Estimate
-from thud.recordings.background import Background, uniform_bounds
+from thud.recordings.background import Background, uniform_cells
 from thud.recordings.contact import Contact
 from thud.recordings.drops import Section, cut_section, find_drops
 from thud.recordings.measured_drop import Drop
@@ -146,7 +146,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     gate = (round(before * rate) - 4, round((before + 0.02) * rate) + 5)
     variances = np.array([max(density or 2 * deviation**2 / rate, 1e-30), 0, 0, 0, 0])
     # The offset of white noise, from all the quiet.
-    n_cell = len(uniform_bounds(*gate, rate)) - 1
+    n_cell = len(uniform_cells(*gate, rate)[0])
     offset = np.full((n_cell, n_cell), variances[0] / 2 * rate / quiet.sum())
     touch, release = Estimate(before, 0), Estimate(before + 0.02, 0)
     force = half_sine(rate, before, len(time)) + noise

@@ -16,10 +16,9 @@ from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
 from thud.recordings import drops, flanks, measured_drop
 from thud.recordings.background import (
-    background_means,
-    cells_between,
+    cell_means,
     remove_background,
-    uniform_bounds,
+    uniform_cells,
 )
 from thud.recordings.checks import aliasing
 from thud.recordings.contact import Contact, find_contact
@@ -31,39 +30,41 @@ RATE = 25600.0
 
 def test_quiet_cells_grow_away_from_the_contact() -> None:
     """Of 0.5 ms up to 5 ms, 2 ms up to 25 ms, 3 ms up to 0.1 s."""
-    force = np.zeros(int(2.2 * RATE))
-    (begins, ends), _ = background_means(force, int(RATE), int(1.2 * RATE), RATE, 0.0)
-    after = begins > 1.1
-    edges = np.append(begins[after], ends[-1]) - begins[after][0]
+    force = half_sine(RATE, 1.0, int(2.2 * RATE))
+    section = Section("drop", force, RATE, 0, (int(RATE), int(1.02 * RATE)))
+    _, background = remove_background(section)
+    begins, ends = background.cells
+    after = begins > 1.01
+    edges = np.append(begins[after], ends[-1]) - background.ends[1] + 0.5 / RATE
     np.testing.assert_allclose(np.diff(edges), (ends - begins)[after])
     width, begin = np.diff(edges), edges[:-1]
-    assert edges[0] == 0
+    assert edges[0] == pytest.approx(0, abs=1e-9)
     assert edges[-1] == pytest.approx(0.1, abs=1.5 / RATE)
     for low, high, expected in ((0, 5e-3, 5e-4), (5e-3, 25e-3, 2e-3), (25e-3, 0.1, 3e-3)):
         inside = (begin > low - 1e-4) & (begin < high - 1e-4)
         np.testing.assert_allclose(width[inside], expected, atol=1.01 / RATE)
         assert width[inside].sum() == pytest.approx(high - low, abs=1.01 / RATE)
     # Cells that are longer than the background are left out.
-    (begins, _), _ = background_means(force, 100, int(1.2 * RATE), RATE, 0.0)
-    assert begins[0] > -1 / RATE
+    cut = int(0.99 * RATE)
+    section = Section("drop", force[cut:], RATE, 0, (int(RATE) - cut, int(1.02 * RATE) - cut))
+    _, background = remove_background(section)
+    assert background.cells[0][0] > -1 / RATE
 
 
 def test_cells_have_their_samples_and_means() -> None:
-    edges = uniform_bounds(10, 10 + int(0.0203 * RATE), RATE)
-    assert (edges[0], edges[-1]) == (10, 10 + int(0.0203 * RATE))
-    # 101.5 cells of 0.2 ms.
-    assert len(edges) - 1 == round(int(0.0203 * RATE) / RATE / 2e-4)
-    assert np.ptp(np.diff(edges)) <= 1
-    begins, ends = cells_between(edges, RATE, 0.01)
-    # Each sample stands for the time half an interval around it.
-    np.testing.assert_allclose(begins, (edges[:-1] - 0.5) / RATE - 0.01)
-    np.testing.assert_allclose(ends - begins, np.diff(edges) / RATE)
+    begins, ends = uniform_cells(10, 10 + int(0.0203 * RATE), RATE)
+    # Each sample is the middle of its interval; 101.5 cells of 0.2 ms.
+    assert (begins[0], ends[-1]) == pytest.approx((9.5 / RATE, (9.5 + int(0.0203 * RATE)) / RATE))
+    assert len(begins) == round(int(0.0203 * RATE) / RATE / 2e-4)
+    np.testing.assert_allclose(begins[1:], ends[:-1])
+    assert np.ptp(ends - begins) < 1.01 / RATE
+    # What lies between two sides is in no cell.
     force = np.arange(2000.0) ** 2
-    quiet, mean = background_means(force, 700, 1300, RATE, 0.04)
-    for begin, end, value in zip(*quiet, mean, strict=True):
-        first, stop = (round((time + 0.04) * RATE + 0.5) for time in (begin, end))
-        assert value == pytest.approx(force[first:stop].mean())
-        assert stop <= 700 or first >= 1300
+    sides = np.array([100, 300, 700]), np.array([1300, 1500, 2000])
+    cells, mean = cell_means(force, RATE, *sides)
+    expected = [(100, 300), (300, 700), (1300, 1500), (1500, 2000)]
+    np.testing.assert_allclose(np.transpose(cells) * RATE + 0.5, expected)
+    np.testing.assert_allclose(mean, [force[first:stop].mean() for first, stop in expected])
 
 
 def with_covariance(seed: int = 1) -> Contact:

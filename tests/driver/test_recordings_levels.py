@@ -19,7 +19,7 @@ from synthetic import make_drop, with_force
 import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
-from thud.recordings.background import Background, cells_between, uniform_bounds
+from thud.recordings.background import Background, cell_means, uniform_cells
 from thud.recordings.budgets import average_estimates, find_deviant
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.config import Config
@@ -173,12 +173,8 @@ def test_noise_that_rises_towards_0_hz() -> None:
     """Brown noise, 1/f**2, less its prediction from the quiet, against realisations."""
     rate, count, density = 8000.0, 60, 100.0
     drop = make_drop(rate=rate)
-    middle = sum(drop.gate) / 2 / rate
     quiet = [np.arange(0, drop.gate[0], 8), np.arange(drop.gate[1], len(drop.time), 8)]
-    cells = [cells_between(edges, rate, middle) for edges in quiet]
-    both = tuple(np.concatenate(pair) for pair in zip(*cells, strict=True))
-    inner = uniform_bounds(*drop.gate, rate)
-    contact = cells_between(inner, rate, middle)
+    contact = uniform_cells(*drop.gate, rate)
     variances = np.array([1e-9, 0, density, 0, 0])
     rng = np.random.default_rng(3)
     # Increments of the variance 2 pi**2 S f**2 / rate give the density S.
@@ -186,10 +182,9 @@ def test_noise_that_rises_towards_0_hz() -> None:
     energies = []
     for _ in range(count):
         noise = np.cumsum(rng.normal(scale=deviation, size=len(drop.time)))
-        means = [np.add.reduceat(noise[: e[-1]], e[:-1]) / np.diff(e) for e in quiet]
-        background = Background(both, np.concatenate(means), variances, 1500.0)
+        background = Background(*cell_means(noise, rate, *quiet), variances, 1500.0)
         under = np.interp(
-            (np.arange(*drop.gate)) / rate - middle,
+            np.arange(*drop.gate) / rate,
             (contact[0] + contact[1]) / 2,
             background.predict(contact),
         )

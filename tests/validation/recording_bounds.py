@@ -25,7 +25,7 @@ from thud.base.errors import InputError
 from thud.impact.contact_time import THRESHOLD, contact_span
 from thud.level.estimate import Estimate
 from thud.recordings import background as background_module
-from thud.recordings.background import MAINS, Background
+from thud.recordings.background import MAINS, Background, cell_means, uniform_cells
 from thud.recordings.contact import Contact, band_functionals, find_contact
 from thud.recordings.drops import Section
 from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
@@ -199,12 +199,11 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     variances[0] = max(variances[0], 1e-12 * float(clean.max()) ** 2)
     peak = float(clean.max())
     variances[3 + MAINS.index(draw.mains)] = (draw.hum * peak) ** 2 / 2
-    middle = (first + last) / 2 / rate
-    with mock.patch.object(background_module, "DISTANCES", ALL_DISTANCES):
-        quiet, mean = background_module.background_means(clean, first, last, rate, middle)
-    background = Background(quiet, mean, variances, peak)
-    edges = background_module.uniform_bounds(first, last, rate)
-    covariance = background.error_covariance(background_module.cells_between(edges, rate, middle))
+    distances = np.unique(np.rint(ALL_DISTANCES * rate).astype(int))
+    before = first - distances[distances <= first][::-1]
+    after = last + distances[distances <= len(clean) - last]
+    background = Background(*cell_means(clean, rate, before, after), variances, peak)
+    covariance = background.error_covariance(uniform_cells(first, last, rate))
     contact = Contact(
         Estimate(onset, 0),
         Estimate(onset + contact_time, 0),
@@ -248,8 +247,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     tau = (edges[1:] + edges[:-1]) / 2
     slope = np.pi * contact.peak / (release - touch)
     shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
-    begin = touch - sum(contact.span) / 2 / rate
-    cells = begin + edges[:-1], begin + edges[1:]
+    cells = touch + edges[:-1], touch + edges[1:]
     covariance = contact.background.error_covariance(cells)
     covariance += np.eye(count) * contact.background.variances[0] / 2 / (edges[1] - edges[0])
     normal = shapes @ np.linalg.solve(covariance, shapes.T)

@@ -64,8 +64,6 @@ MIN_CELLS = 22
 # in variances of the noise, up to which it is the cause.
 TIME_CONSTANTS = np.geomspace(0.1, 30, 200)
 INCREASE = 9.0
-# Steps at these fractions of the gate are compared with the interpolated background.
-INSTANTS = np.linspace(0, 1, 33)
 # Minimum drift and hum that are noted, in standard deviations.
 MIN_DEVIATIONS = 3.0
 
@@ -74,7 +72,7 @@ MIN_DEVIATIONS = 3.0
 class Background(Immutable):
     """Background of a contact: generalized least squares from cells beside it.
 
-    Times of cells are from the middle of the contact. Predictions exclude the errors by
+    Times of cells are from the first sample of the section. Predictions exclude the errors by
     quantization and the white noise of the predicted samples.
 
     Attributes
@@ -92,10 +90,10 @@ class Background(Immutable):
         Covariance of the natural logarithms of the variances.
     quantization : Quantization
         Errors that the noise does not average.
-    middle : float
-        Middle of the contact, s from the first sample.
     ends : tuple of float
-        End of the background before the contact, and its begin after it, s from the first sample.
+        End of the background before the contact, and its begin after it, s.
+    step : float
+        Change of the offset at an unknown instant between both, N; zero if there is none.
     tones : tuple of Note
         Tones that were removed before the fit.
     """
@@ -106,8 +104,8 @@ class Background(Immutable):
     peak: float
     log_covariance: NDArray[np.float64] = field(default_factory=lambda: np.zeros((5, 5)))
     quantization: Quantization = field(default_factory=Quantization)
-    middle: float = 0.0
     ends: tuple[float, float] = (0.0, 0.0)
+    step: float = 0.0
     tones: tuple[Note, ...] = ()
 
     def density(self, frequency: ArrayLike) -> NDArray[np.float64]:
@@ -115,21 +113,24 @@ class Background(Immutable):
         powers = np.asarray(frequency, dtype=np.float64)[..., None] ** -np.arange(3.0)
         return np.asarray(powers @ self.variances[:3])
 
-    def density_deviation(self, frequency: float) -> float:
-        """Return the standard uncertainty of the density at a frequency, N2/Hz."""
-        change = self.variances[:3] * frequency ** -np.arange(3.0)
-        return float(np.sqrt(change @ self.log_covariance[:3, :3] @ change))
-
     def deviation_between(self, lower: float, upper: float) -> float:
         """Return the standard deviation of the noise between two frequencies, N."""
         widths = (upper - lower, np.log(upper / lower), 1 / lower - 1 / upper)
         return float(np.sqrt(self.variances[:3] @ widths))
 
     def covariance(self, cells: Cells, other: Cells) -> NDArray[np.float64]:
-        """Return the covariance of two sets of cells, N2, [n_cell, n_other], but white noise."""
+        """Return the covariance of two sets of cells, N2, [n_cell, n_other], but white noise.
+
+        A step at an instant that is uniformly distributed between the ends has the variance
+        step**2 times the fraction of this time that has passed at the earlier of two instants.
+        """
         trend = (OFFSET * self.peak) ** 2, (DRIFT * self.peak) ** 2
         scales = np.array([*self.variances[1:], *trend])
-        return np.tensordot(scales, unit_covariances(cells, other), 1)
+        covariance = np.tensordot(scales, unit_covariances(cells, other), 1)
+        if self.step:
+            passed = (np.interp((a + b) / 2, self.ends, (0, 1)) for a, b in (cells, other))
+            covariance += self.step**2 * np.minimum.outer(*passed)
+        return np.asarray(covariance)
 
     @cached_property
     def whiten(self) -> NDArray[np.float64]:
@@ -140,14 +141,10 @@ class Background(Immutable):
         unit = np.eye(len(factor))
         return freeze(np.asarray(solve_triangular(factor, unit, lower=True, check_finite=False)))
 
-    @cached_property
-    def _weights(self) -> NDArray[np.float64]:
-        """Inverse of the covariance of the cells times their means."""
-        return np.asarray(self.whiten.T @ (self.whiten @ self.mean))
-
     def predict(self, cells: Cells) -> NDArray[np.float64]:
         """Return the expected background in cells, N."""
-        return np.asarray(self._weights @ self.covariance(self.cells, cells))
+        weights = self.whiten.T @ (self.whiten @ self.mean)
+        return np.asarray(weights @ self.covariance(self.cells, cells))
 
     def error_covariance(self, cells: Cells) -> NDArray[np.float64]:
         """Return the covariance of the error of this prediction, N2."""
@@ -156,17 +153,19 @@ class Background(Immutable):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """Tones, drift and hum, as far as they exceed three standard deviations."""
+        """Tones, step, drift and hum, the last two from three standard deviations on."""
         notes = [*self.tones]
+        if self.step:
+            notes.append(Note("offset_step", value=self.step, unit="N"))
+        weights = self.whiten.T @ (self.whiten @ self.mean)
         middle, width = (self.cells[0] + self.cells[1]) / 2, self.cells[1] - self.cells[0]
         prior = (DRIFT * self.peak) ** 2
-        drift = float(prior * self._weights @ middle)
+        drift = float(prior * weights @ middle)
         known = float(np.sum((self.whiten @ middle) ** 2))
         if abs(drift) > MIN_DEVIATIONS * math.sqrt(max(prior - prior**2 * known, 0.0)):
             notes.append(Note("drift_removed", value=drift, unit="N/s"))
         k = int(np.argmax(self.variances[3:]))
-        waves = _waves(self.cells)[k]
-        hum = self.variances[3 + k] * waves @ (waves.T @ self._weights)
+        hum = self.variances[3 + k] * unit_covariances(self.cells, self.cells)[2 + k] @ weights
         amplitude = math.sqrt(2 * np.mean(hum**2))
         if amplitude > MIN_DEVIATIONS * math.sqrt(np.mean(self.variances[0] / width) / len(hum)):
             others = {"frequency": MAINS[k]}
@@ -184,7 +183,7 @@ def remove_background(
     of the noise to another section; if None, it is fitted to this one.
     """
     force, rate, (first, stop) = section.force, section.sample_rate, section.contact
-    count, middle = len(force), (first + stop) / 2 / rate
+    count = len(force)
     tones, notes = find_tones(force, rate, section.contact)
     quiet = force - tones
     # At most half of a short background is cut off.
@@ -200,62 +199,83 @@ def remove_background(
     reach = fifth + REACH * (fifth - half)
     before_stop = int(np.clip(reach[0], first / 2, before_stop))
     after_start = int(np.clip(reach[1], after_start, (stop + count) / 2))
-    cells, mean = background_means(quiet, before_stop, after_start, rate, middle)
-    if noise is None:
-        variances, log_covariance = fit_noise(cells, mean, peak)
-        variances[0] = max(variances[0], section.quantization.density)
-        quantization = section.quantization
-    else:
-        variances, log_covariance = noise.variances, noise.log_covariance
-        quantization = noise.quantization
+    distances = np.unique(np.rint(DISTANCES * rate).astype(int))
+    before = before_stop - distances[distances <= before_stop][::-1]
+    after = after_start + distances[distances <= count - after_start]
     background = Background(
-        cells, mean, variances, peak, log_covariance, quantization, middle,
-        (before_stop / rate, after_start / rate), notes,
+        *cell_means(quiet, rate, before, after), np.zeros(5), peak,
+        quantization=section.quantization, ends=(before_stop / rate, after_start / rate),
+        tones=notes,
     )  # fmt: skip
+    if noise is None:
+        background = fit_background(background, float(quiet[first:stop].sum() / rate))
+    else:
+        background = replace(
+            background, variances=noise.variances, log_covariance=noise.log_covariance,
+            quantization=noise.quantization,
+        )  # fmt: skip
     length = int(MAX_BACKGROUND * rate)
-    begin, end = max(0, before_stop - length), min(count, after_start + length)
-    bounds = [
-        uniform_bounds(begin, before_stop, rate, QUIET_CELL),
-        uniform_bounds(before_stop, after_start, rate),
-        uniform_bounds(after_start, end, rate, QUIET_CELL),
-    ]
-    predicted = cells_between(np.unique(np.concatenate(bounds)), rate, middle)
-    time, centers = np.arange(count) / rate - middle, (predicted[0] + predicted[1]) / 2
-    return quiet - np.interp(time, centers, background.predict(predicted)), background
+    sides = (
+        uniform_cells(max(0, before_stop - length), before_stop, rate, QUIET_CELL),
+        uniform_cells(before_stop, after_start, rate),
+        uniform_cells(after_start, min(count, after_start + length), rate, QUIET_CELL),
+    )
+    begin, end = (np.concatenate(edges) for edges in zip(*sides, strict=True))
+    predicted = background.predict((begin, end))
+    return quiet - np.interp(np.arange(count) / rate, (begin + end) / 2, predicted), background
 
 
-def cells_between(bounds: NDArray[np.intp], rate: float, middle: float) -> Cells:
-    """Return begins and ends of cells, s from the middle of the contact; bounds are in samples."""
-    time = np.asarray((bounds - 0.5) / rate - middle, dtype=np.float64)
+def uniform_cells(start: int, stop: int, rate: float, width: float = CONTACT_CELL) -> Cells:
+    """Return uniform cells of about a width, s, from a first to before a stop sample, rate in Hz.
+
+    A sample is the middle of the interval from one half before it to one half after it.
+    """
+    count = max(1, round((stop - start) / rate / width))
+    time = (np.unique(np.rint(np.linspace(start, stop, 1 + count))) - 0.5) / rate
     return time[:-1], time[1:]
 
 
-def uniform_bounds(
-    start: int, stop: int, rate: float, width: float = CONTACT_CELL
-) -> NDArray[np.intp]:
-    """Return bounds of cells of about a width, s, in samples at a rate, Hz."""
-    count = max(1, round((stop - start) / rate / width))
-    return np.unique(np.rint(np.linspace(start, stop, 1 + count)).astype(int))
-
-
-def cell_means(force: NDArray[np.float64], bounds: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Return the means of a force, N, over cells with bounds in samples."""
-    total: NDArray[np.float64] = np.add.reduceat(force[: bounds[-1]], bounds[:-1])
-    return total / np.diff(bounds)
-
-
-def background_means(
-    force: NDArray[np.float64], before_stop: int, after_start: int, rate: float, middle: float
+def cell_means(
+    force: NDArray[np.float64], rate: float, *sides: NDArray[np.intp]
 ) -> tuple[Cells, NDArray[np.float64]]:
-    """Return the background cells on both sides of a contact, and their mean forces, N."""
-    distances = np.unique(np.rint(DISTANCES * rate).astype(int))
-    sides = (
-        before_stop - distances[distances <= before_stop][::-1],
-        after_start + distances[distances <= len(force) - after_start],
-    )
-    begins, ends = zip(*(cells_between(side, rate, middle) for side in sides), strict=True)
-    mean = [cell_means(force, side) for side in sides if len(side) > 1]
-    return (np.concatenate(begins), np.concatenate(ends)), np.concatenate(mean)
+    """Return the cells between the bounds of each side, in samples, and the means of a force, N."""
+    bounds = np.concatenate(sides)
+    time = (bounds - 0.5) / rate
+    mean = np.add.reduceat(force[: bounds[-1]], bounds[:-1]) / np.diff(bounds)
+    gaps = np.cumsum([len(side) for side in sides[:-1]], dtype=int) - 1
+    begin, end, mean = (np.delete(values, gaps) for values in (time[:-1], time[1:], mean))
+    return (begin, end), mean
+
+
+def fit_background(background: Background, impulse: float) -> Background:
+    """Return a background with the fitted noise, and with a step of the offset if there is one.
+
+    The step is fitted together with offset, drift, hum and noise. It is none if the droop of an
+    amplifier after the impulse of the contact, N s, explains the background: -1/tau times the
+    impulse, decaying with the time constant tau.
+    """
+    cells, mean, peak = background.cells, background.mean, background.peak
+    time = (cells[0] + cells[1] - sum(background.ends)) / 2
+    after = np.asarray(time > 0, dtype=np.float64)
+    fits = []
+    for column in (None, after):
+        likely, covariance = fit_noise(cells, mean, peak, column)
+        # The means of log-normal variables.
+        variances = np.exp(likely + np.diagonal(covariance) / 2)
+        variances[0] = max(variances[0], background.quantization.density)
+        fits.append(replace(background, variances=variances, log_covariance=covariance))
+        if min(len(time) - after.sum(), after.sum()) < MIN_CELLS:
+            return fits[0]
+    plain, other = fits
+    column, white = other.whiten @ after, other.whiten @ mean
+    step = float(column @ white / (column @ column))
+    if abs(step) < max(MIN_RATIO / math.sqrt(column @ column), MIN_STEP * peak):
+        return plain
+    squares = float(np.sum((white - step * column) ** 2))
+    droop = -impulse / TIME_CONSTANTS * np.exp(-time[:, None] / TIME_CONSTANTS) * after[:, None]
+    rest = other.whiten @ (mean[:, None] - droop)
+    is_droop = np.min(np.sum(rest**2, axis=0)) < squares + INCREASE
+    return plain if is_droop else replace(other, step=step)
 
 
 def fit_noise(
@@ -264,13 +284,12 @@ def fit_noise(
     peak: float,
     column: NDArray[np.floating] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the expected variances of the noise, and the covariance of their logarithms.
+    """Return the most likely logarithms of the variances of the noise, and their covariance.
 
-    Arguments and results are as in `Background`; times are relative to about the middle of the
-    contact. A multiple of `column`, [n_cell], of about the peak may be in the means. The posterior
-    of the logarithms is approximated as normal, from Newton's method. The prior densities increase
-    with the variances up to about those of PRIOR_DEVIATION, so that the estimate of absent noise is
-    small and not zero.
+    Arguments are as in `Background`. A multiple of `column`, [n_cell], of about the peak may be in
+    the means. The posterior of the logarithms is approximated as normal, from Newton's method. The
+    prior densities increase with the variances up to about those of PRIOR_DEVIATION, so that the
+    estimate of absent noise is small and not zero.
     """
     colored = unit_covariances(cells, cells)
     unit = np.array([np.diag(0.5 / (cells[1] - cells[0])), *colored[:4]])
@@ -300,9 +319,7 @@ def fit_noise(
             length /= 4
         if abs(gain) < TOLERANCE:
             break
-    covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
-    # The mean of a log-normal variable.
-    return np.exp(best + np.diagonal(covariance) / 2), covariance
+    return best, np.asarray(np.linalg.inv(curvature), dtype=np.float64)
 
 
 def _log_posterior(
@@ -333,40 +350,6 @@ def _log_posterior(
     return float(value), score, 0.5 * products @ inverse @ products.T + np.diag(SLOPE)
 
 
-def find_offset_step(background: Background, impulse: float) -> float:
-    """Return the step of the offset between the ends of a contact, N; zero if there is none.
-
-    A step is fitted together with offset, drift, hum and noise. It is none if the droop of an
-    amplifier after the impulse of the contact, N s, explains the background: -1/tau times the
-    impulse, decaying with the time constant tau.
-    """
-    cells, mean, peak = background.cells, background.mean, background.peak
-    time = (cells[0] + cells[1]) / 2
-    after = np.asarray(time > 0, dtype=np.float64)
-    if min(len(time) - after.sum(), after.sum()) < MIN_CELLS:
-        return 0.0
-    variances, _ = fit_noise(cells, mean, peak, column=after)
-    whiten = replace(background, variances=variances).whiten
-    column, white = whiten @ after, whiten @ mean
-    step = float(column @ white / (column @ column))
-    if abs(step) < max(MIN_RATIO / math.sqrt(column @ column), MIN_STEP * peak):
-        return 0.0
-    squares = float(np.sum((white - step * column) ** 2))
-    droop = -impulse / TIME_CONSTANTS * np.exp(-time[:, None] / TIME_CONSTANTS) * after[:, None]
-    rest = whiten @ (mean[:, None] - droop)
-    return 0.0 if np.min(np.sum(rest**2, axis=0)) < squares + INCREASE else step
-
-
-def step_errors(step: float, count: int) -> NDArray[np.float64]:
-    """Return errors of a force if its offset changed at one of several instants, N, [k, count].
-
-    The removed background is the line between both offsets.
-    """
-    line = np.linspace(0, step, count)
-    index = np.arange(count)
-    return np.array([line - step * (index >= instant * count) for instant in INSTANTS])
-
-
 def unit_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     """Return unit covariances of the means over two sets of cells: [6, n_cell, n_other].
 
@@ -382,20 +365,16 @@ def unit_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     integrals = [size**2 * (0.75 - 0.5 * np.log(size)), -(np.pi**2) / 6 * size**3]
     signs = np.array([1, -1, -1, 1])
     pink, brown = np.tensordot(integrals, signs, (1, 0)) / np.multiply.outer(b - a, d - c)
-    hum = _waves(cells) @ _waves(other).swapaxes(1, 2)
+    # Each harmonic has two frequencies: of the mains plus and minus its deviation.
+    order = np.arange(1, N_HARMONIC + 1)
+    mains = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
+    frequency = np.multiply.outer(mains, order).reshape(len(MAINS), 1, -1)
+    weight = np.tile(np.sqrt(0.5) / order, 2)
+    waves, others = (
+        weight * np.sinc(frequency * (end - begin)[:, None])
+        * np.exp(1j * np.pi * frequency * (begin + end)[:, None])
+        for begin, end in (cells, other)
+    )  # fmt: skip
+    hum = (waves @ others.conj().swapaxes(1, 2)).real
     drift = np.multiply.outer((a + b) / 2, (c + d) / 2)
     return np.array([pink, brown, *hum, np.ones_like(drift), drift])
-
-
-def _waves(cells: Cells) -> NDArray[np.float64]:
-    """Return means over cells of the waves of each hum, [n_mains, n_cell, n_wave].
-
-    Each harmonic has waves of two fundamentals, MAINS plus and minus MAINS_DEVIATION.
-    """
-    middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
-    order = np.arange(1, N_HARMONIC + 1)
-    fundamentals = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
-    frequency = (fundamentals[:, None] * order[:, None]).reshape(len(MAINS), 1, -1)
-    weight = np.repeat(np.sqrt(0.5) / order, 2) * np.sinc(frequency * width[:, None])
-    phase = 2 * np.pi * frequency * middle[:, None]
-    return np.concatenate([weight * np.cos(phase), weight * np.sin(phase)], axis=-1)

@@ -14,7 +14,7 @@ from scipy.special import comb
 from thud.base.note import Note
 from thud.impact.contact_time import THRESHOLD
 from thud.level.levels import low_pass
-from thud.recordings.background import MAINS, N_HARMONIC, cells_between, uniform_bounds
+from thud.recordings.background import MAINS, N_HARMONIC, uniform_cells
 from thud.recordings.differences import robust_deviation
 from thud.recordings.flanks import find_edge
 from thud.recordings.quantization import MAX_BACKGROUND
@@ -206,7 +206,6 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
         max(int((touch.value - 3 * touch.uncertainty) * rate) - margin, 0),
         min(int((release.value + 3 * release.uncertainty) * rate) + margin + 1, len(force)),
     )
-    cells = cells_between(uniform_bounds(*gate, rate), rate, background.middle)
     length = int(MAX_BACKGROUND * rate)
     span = (max(0, gate[0] - length), min(len(force), gate[1] + length))
     correction_error = CORRECTION_ERROR / chain.highest if chain else 0.0
@@ -225,7 +224,7 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
         force[slice(*span)],
         (section.force - force)[slice(*span)],
         gate,
-        background.error_covariance(cells),
+        background.error_covariance(uniform_cells(*gate, rate)),
         (background.ends[0], len(force) / rate - background.ends[1]),
         background,
         rate,
@@ -283,9 +282,10 @@ def band_noise(drops: Sequence[Drop], bands: Bands) -> NDArray[np.float64]:
             squares = float((covariance**2).sum())
             # The noise in `values` makes the first term too large by twice the second, on average.
             variance = max(4 * float(values @ covariance @ values) - 2 * squares, 2 * squares)
-            frequency = (lower + upper) / 2
-            relative = background.density_deviation(frequency) / background.density(frequency)
-            variance += (noise * float(relative)) ** 2 + further**2
+            density = background.variances[:3] * ((lower + upper) / 2) ** -np.arange(3.0)
+            relative = density / density.sum()
+            variance += noise**2 * float(relative @ background.log_covariance[:3, :3] @ relative)
+            variance += further**2
             # An error e changes the energy by 2 (R f)' R e + |R e|**2.
             changes = errors @ rows.T
             quantized = ((changes + 2 * values) * changes).sum(axis=1)

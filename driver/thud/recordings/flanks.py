@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 
 from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
 from thud.level.estimate import Estimate
-from thud.recordings.background import cell_means, cells_between
+from thud.recordings.background import cell_means
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,16 +64,15 @@ def find_edge(
     `force` is that of the section without its background, N. Times are from its first sample;
     begin and end are at 1 % of the peak.
     """
-    rate, middle = section.sample_rate, background.middle
+    rate = section.sample_rate
     index = section.contact[0 if side > 0 else 1]
     end = background.ends[0 if side > 0 else 1]
     step = side * max(1, round(CELL * rate))
     bounds = np.arange(round(end * rate), int(index + side * LENGTH * rate), step)[::side]
     bounds = bounds[(bounds >= 0) & (bounds <= len(force))]
-    cells = cells_between(bounds, rate, middle)
-    time = side * ((cells[0] + cells[1]) / 2 + middle)[::side]
     smooth = np.convolve(force, SMOOTHING, mode="same") / background.peak
-    level = cell_means(smooth, bounds)[::side]
+    cells, means = cell_means(smooth, rate, bounds)
+    time, level = side * (cells[0] + cells[1])[::side] / 2, means[::side]
     noise = background.error_covariance(cells) + background.quantization.offset**2
     noise += np.diag(background.variances[0] / 2 / (cells[1] - cells[0]))
     noise = noise[::side, ::side] / background.peak**2

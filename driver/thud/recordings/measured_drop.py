@@ -17,7 +17,7 @@ from thud.base.checks import refuse
 from thud.base.note import Note, about
 from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
-from thud.recordings.background import find_offset_step, remove_background, step_errors
+from thud.recordings.background import remove_background
 from thud.recordings.checks import CHECKS
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.differences import robust_deviation
@@ -84,8 +84,6 @@ class Drop(Stage):
         height is known, else up to two.
     notes : tuple of Note
         Processing of the signal, and possible faults.
-    offset_step : float
-        Change of the offset during the contact, N; zero if there is none.
     ringing : Ringing or None
         Ringing of the plate after the contact.
     plate_recorded : bool or None
@@ -105,7 +103,6 @@ class Drop(Stage):
     shared_effects: dict[str, dict[str, float]] = field(default_factory=dict)
     bounces: tuple[float, ...] = ()
     notes: tuple[Note, ...] = ()
-    offset_step: float = 0.0
     ringing: Ringing | None = None
     plate_recorded: bool | None = None
 
@@ -184,13 +181,6 @@ def measure_drop(
     variance = contact.covariance_of(ones)[0, 0]
     impulse = Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
     peak_force = _peak(contact)
-    offset_step = find_offset_step(contact.background, impulse.value)
-    if offset_step:
-        notes.append(Note("offset_step", value=offset_step, unit="N"))
-        errors = step_errors(offset_step, len(contact.gated))
-        error_impulses = errors.sum(axis=1) / contact.sample_rate
-        impulse = impulse.widened(float(np.abs(error_impulses).max()) / RECTANGULAR)
-        peak_force = peak_force.widened(float(np.abs(errors).max()) / RECTANGULAR)
     # The first flight gives the restitution; without the height two flights are compared.
     landings = _landings(section, contact, 1 if config.height else 2)
     if config.height and landings:
@@ -232,7 +222,6 @@ def measure_drop(
         shared_effects=shared,
         bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
         notes=about(section.name, notes),
-        offset_step=offset_step,
         ringing=ringing,
         plate_recorded=is_in_record(recorded, contact, plate) if recorded and plate else None,
     )

@@ -13,7 +13,6 @@ from thud.base.checks import require_choice
 from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Contribution, Estimate
 from thud.level.levels import force_exposure_levels, get_bands
-from thud.recordings.background import step_errors
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.contact import band_noise
 from thud.recordings.filters import filter_levels
@@ -38,8 +37,8 @@ ENERGY_DECIBEL = 10 / math.log(10)
 # differ by less than 0.01 dB.
 PADDING, N_SCALING = 4, 5
 # Contributions that drops share: half widths of rectangular distributions.
-METHOD, OFFSET_STEP = "method", "offset step"
-DIVISORS = {METHOD: RECTANGULAR, OFFSET_STEP: RECTANGULAR}
+METHOD = "method"
+DIVISORS = {METHOD: RECTANGULAR}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +60,8 @@ class DropLevels(Stage):
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_drop, n_band)
-        Standard uncertainties, dB, by noise, method, offset step, and quantization if the
-        background lies within a step.
+        Standard uncertainties, dB, by noise, method, and quantization if the background lies within
+        a step.
     """
 
     names: tuple[str, ...]
@@ -131,11 +130,7 @@ def measure_levels(
     contributions = {
         NOISE: ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         METHOD: np.abs(measured - exact) / RECTANGULAR,
-        OFFSET_STEP: np.zeros(level.shape),
     }
-    for i, drop in enumerate(drops):
-        if drop.offset_step:
-            contributions[OFFSET_STEP][i] = _step_uncertainty(drop, bands, exact[i])
     if quantized.any():
         contributions["quantization"] = ENERGY_DECIBEL * quantized / 10 ** (level / 10)
     names = tuple(drop.name for drop in drops)
@@ -159,18 +154,6 @@ def _levels(drops: Sequence[Drop], bands: BandSet, method: str) -> NDArray[np.fl
         )
         for contact in contacts
     ])  # fmt: skip
-
-
-def _step_uncertainty(
-    drop: Drop, bands: BandSet, exact: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the standard uncertainty due to a step of the offset during the contact, dB."""
-    force, rate = drop.contact.gated, drop.contact.sample_rate
-    changed = [
-        force_exposure_levels(force + error, rate, bands)
-        for error in step_errors(drop.offset_step, len(force))
-    ]
-    return np.asarray(np.abs(np.array(changed) - exact).max(axis=0) / RECTANGULAR)
 
 
 def average_levels(

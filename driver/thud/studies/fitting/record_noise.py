@@ -19,7 +19,7 @@ from thud.recordings.background import (
     MAINS,
     N_HARMONIC,
     Background,
-    cells_between,
+    cell_means,
     fit_noise,
     unit_covariances,
 )
@@ -145,20 +145,10 @@ class BackgroundRecord:
         first, stop = self.pulse
         most = int(MAX_BACKGROUND * self.rate)
         counts = [min(length, most) // width for length in (first, len(self.force) - stop)]
-        edges = (
-            first - width * np.arange(1 + counts[0])[::-1],
-            stop + width * np.arange(1 + counts[1]),
-        )
-        begins, ends = zip(
-            *(cells_between(side, self.rate, self.middle) for side in edges), strict=True
-        )
-        means = [
-            np.add.reduceat(self.force[: side[-1]], side[:-1]) / width
-            for side in edges
-            if len(side) > 1
-        ]
-        mean = np.concatenate(means)
-        return (np.concatenate(begins), np.concatenate(ends)), mean - np.median(mean)
+        before = first - width * np.arange(1 + counts[0])[::-1]
+        after = stop + width * np.arange(1 + counts[1])
+        (begin, end), mean = cell_means(self.force, self.rate, before, after)
+        return (begin - self.middle, end - self.middle), mean - np.median(mean)
 
     def background(self, tones: Sequence[float] = ()) -> Background:
         """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
@@ -169,12 +159,10 @@ class BackgroundRecord:
         waves = cell_waves(cells, tones)
         residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        expected, log_covariance = fit_noise(cells, residual, peak)
-        # Weights need the most likely noise, below the mean of the log-normal posterior; the waves
-        # have absorbed part of it.
-        variances = expected * np.exp(-np.diagonal(log_covariance) / 2)
+        logarithms, log_covariance = fit_noise(cells, residual, peak)
+        # The waves have absorbed part of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        return Background(cells, residual, scale * variances, peak, log_covariance)
+        return Background(cells, residual, scale * np.exp(logarithms), peak, log_covariance)
 
     def tones(self) -> tuple[float, ...]:
         """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
