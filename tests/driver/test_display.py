@@ -73,6 +73,18 @@ def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
     assert repr(thud.Case("one", model=None, modes=thud.Modes())) == "<Case one: free modes>"
 
 
+def test_a_table_has_one_list_of_columns(flagship: thud.Impact) -> None:
+    level = thud.TappingLevel(np.array([50.0, 63.0]), np.array([60.04, np.nan]))
+    assert level.rows() == [("band, Hz", "L_n, dB"), ("50", "60.0"), ("63", "")]
+    assert level.to_csv() == "band_Hz,L_n_dB\n50,60.04\n63,nan\n"
+    for result in (thud.get_bands(), thud.free_modes(count=2), thud.predict_level(
+        flagship, thud.Plate(), thud.Room()
+    )):  # fmt: skip
+        table = result.to_dataframe()
+        assert len(table) == len(result.rows()) - 1
+        assert table.columns[0].endswith("_Hz")
+
+
 def test_unknown_criteria_are_not_met(flagship: thud.Impact) -> None:
     record = recorded(flagship)
     cells = {row[0]: row for row in record.assess().rows()}

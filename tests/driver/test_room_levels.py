@@ -12,7 +12,7 @@ from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud.cli import main
-from thud.floors.survey import levels_csv, rating_table
+from thud.floors.survey import rating_table
 from thud.level.rating import CLASS_LIMITS
 
 if TYPE_CHECKING:
@@ -384,7 +384,7 @@ def test_bounds_of_times_are_not_those_of_levels(tmp_path: Path, column: str, wo
 
 def test_tables_hold_the_numbers_of_the_survey() -> None:
     found = replace(GOOD, background=np.array([20.0, 20, 20, 38]))
-    lines = [line.split(",") for line in levels_csv(found).decode().splitlines()]
+    lines = [line.split(",") for line in found.to_csv().splitlines()]
     columns = dict(zip(lines[0], np.array(lines[1:], dtype=float).T, strict=True))
     assert columns["nominal_Hz"].tolist() == list(OCTAVES)
     for title, values in (

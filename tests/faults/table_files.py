@@ -20,7 +20,7 @@ import thud
 from thud.base.bridge import ask
 from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
-from thud.floors.survey import levels_csv, rating_table, read_room_levels
+from thud.floors.survey import rating_table, read_room_levels
 from thud.recordings.config import read_config
 from thud.recordings.table import read_table
 from thud.studies.compression_fit import fit_compression
@@ -96,7 +96,7 @@ def _read_mobility(path: Path, chance: random.Random) -> str:
 
 def _read_levels(path: Path, chance: random.Random) -> str:
     found = read_room_levels(path, volume=chance.choice([None, 41.4, 1e5]))
-    said = levels_csv(found).decode() + format_rows(found.rows()) + format_rows(rating_table(found))
+    said = found.to_csv() + format_rows(found.rows()) + format_rows(rating_table(found))
     return said if INNER.search(said + "".join(map(str, found.notes))) else ""
 
 

@@ -274,13 +274,13 @@ PREDICT = Command(
 
 def rate(options: argparse.Namespace) -> int:
     """Rate measured levels, print and save the result; return the exit code."""
-    from thud.floors.survey import levels_csv, rating_table, read_room_levels
+    from thud.floors.survey import rating_table, read_room_levels
 
     room = read_room_levels(options.levels, volume=options.volume)
     shown = f"{format_rows(room.rows())}\n\n{format_rows(rating_table(room))}"
     if (scatter := room.position_uncertainty) is not None:
         shown += f"\n\n  Standard uncertainty from the scatter of the positions: {scatter:.1f} dB"
-    file = "room_levels.csv", levels_csv(room)
+    file = "room_levels.csv", room.to_csv().encode()
     return save_result(options, options.levels, room, shown, file, "room_levels")
 
 

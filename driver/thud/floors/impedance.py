@@ -11,7 +11,7 @@ import numpy as np
 from thud.base._schema import BandSet, InfinitePlate
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind
-from thud.base.display import Displayed
+from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text, impact_only
 from thud.impact.compute import new_floor_impact
 from thud.impact.impact import Impact
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import FloorOptions
+    from thud.base.tabulated import Columns
 
     Array = NDArray[np.float64]
 
@@ -31,12 +32,10 @@ if TYPE_CHECKING:
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
 # Frequency points in each band.
 _POINTS_PER_BAND = 64
-# Fraction of the impact velocity below which samples are used for the tangent.
-_SLOW_FRACTION = 0.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BallImpedance(Displayed):
+class BallImpedance(Tabulated):
     """Impedance of a source during its impact, and the floors on which it matters.
 
     A linear source in permanent contact acts on a floor of impedance Z with the force
@@ -58,9 +57,6 @@ class BallImpedance(Displayed):
         Level of the contact force − level of the blocked force, dB.
     estimate : ndarray, shape (n_floor, n_band)
         Complex impedance from the force on each floor, N s/m.
-    tangent_mass, tangent_stiffness, tangent_damping : float
-        Mass, kg, stiffness, N/m, and damping, N s/m, of the source about its maximum deflection on
-        a rigid floor.
     """
 
     case: Case
@@ -69,41 +65,16 @@ class BallImpedance(Displayed):
     resistance: Array
     change: Array
     estimate: NDArray[np.complex128]
-    tangent_mass: float
-    tangent_stiffness: float
-    tangent_damping: float
 
     def __repr__(self) -> str:
-        """Return the tangent and the range of the impedance."""
+        """Return the range of the impedance."""
         size = np.abs(self.impedance)
-        return (
-            f"<BallImpedance: {size.min():.0f} to {size.max():.0f} N s/m in bands; at maximum "
-            f"deflection {self.tangent_mass:.2f} kg, {self.tangent_stiffness / 1e3:.1f} kN/m, "
-            f"loss factor {self.tangent_loss_factor:.2f}>"
-        )
+        return f"<BallImpedance: {size.min():.0f} to {size.max():.0f} N s/m in {self.bands}s>"
 
     @property
     def impedance(self) -> NDArray[np.complex128]:
         """Complex impedance in bands, N s/m, shape (n_band,), from the highest resistance."""
         return np.asarray(self.estimate[-1])
-
-    @property
-    def tangent_loss_factor(self) -> float:
-        """Loss factor at the natural frequency of the tangent mass and stiffness."""
-        return self.tangent_damping / math.sqrt(self.tangent_stiffness * self.tangent_mass)
-
-    def tangent(self, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return the impedance of the tangent mass on spring and damper, N s/m, shape (n,).
-
-        It applies to steady vibration about the maximum deflection, not to the short impact.
-        Frequencies, Hz, are greater than 0.
-        """
-        values = require_array("frequency", frequency, (1,), "iuf")
-        if not (values > 0).all():
-            refuse_value("frequency", float(values.min()), "above 0")
-        s = 2j * np.pi * values
-        spring = self.tangent_damping + self.tangent_stiffness / s
-        return np.asarray(1 / (1 / (s * self.tangent_mass) + 1 / spring))
 
     def limit(self, decibels: float = 1.0) -> Array:
         """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
@@ -128,16 +99,14 @@ class BallImpedance(Displayed):
             result[band] = 10 ** np.interp(-log_change, -column[ends], log_resistance[ends])
         return result
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and a row of text for each band."""
-        header = ("band, Hz", "impedance, N s/m", "phase, degrees", "1 dB below, N s/m")
-        lines = zip(self.frequency, self.impedance, self.limit(), strict=True)
-        cells = [
-            (f"{f:g}", f"{abs(z):.0f}", f"{np.angle(z, deg=True):.0f}",
-             f"{self.resistance[0]:.0f} or less" if np.isnan(limit) else f"{limit:.0f}")
-            for f, z, limit in lines
-        ]  # fmt: skip
-        return [header, *cells]
+    def columns(self) -> Columns:
+        """Return impedance and `limit` in bands."""
+        return {
+            "band, Hz": (self.frequency, "g"),
+            "impedance, N s/m": (np.abs(self.impedance), ".0f"),
+            "phase, degrees": (np.angle(self.impedance, deg=True), ".0f"),
+            "1 dB below, N s/m": (self.limit(), ".0f"),
+        }
 
     def plot(self, floors: Mapping[str, FloorOptions] | None = None) -> Figure:
         """Draw the impedances of source and floors, and the change of levels by the floors.
@@ -199,7 +168,6 @@ def ball_impedance(
         )
         pairs = zip(spectrum, _band_spectra(force, source.sample_rate, bands), strict=True)
         estimates.append([value * np.vdot(f, fb - f) / np.vdot(f, f) for fb, f in pairs])
-    mass, stiffness, damping = _tangent(source)
     return BallImpedance(
         case=source.case,
         bands=bands,
@@ -207,9 +175,6 @@ def ball_impedance(
         resistance=np.array(floors, dtype=np.float64),
         change=np.array(changes),
         estimate=np.array(estimates),
-        tangent_mass=mass,
-        tangent_stiffness=stiffness,
-        tangent_damping=damping,
     )
 
 
@@ -237,23 +202,3 @@ def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDAr
         waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(points, time[:end]))
         result.append(waves @ force[:end])
     return result
-
-
-def _tangent(source: Impact) -> tuple[float, float, float]:
-    """Return mass, stiffness and damping about the maximum deflection, by least squares.
-
-    F - F_0 = k d + c d' and F = -m d'', while d' is less than a quarter of the impact velocity.
-    """
-    deepest = int(np.argmax(source.deflection))
-    slow = np.abs(source.velocity) < _SLOW_FRACTION * source.impact_velocity
-    first = deepest - int(np.argmin(slow[deepest::-1])) + 1
-    stop = deepest + int(np.argmin(slow[deepest:]))
-    span = slice(first, stop)
-    columns = np.stack(
-        [np.ones(stop - first), source.deflection[span], source.velocity[span]], axis=1
-    )
-    scale = np.abs(columns).max(axis=0)
-    solution = np.linalg.lstsq(columns / scale, source.floor_force[span], rcond=None)[0] / scale
-    acceleration = np.gradient(source.velocity, 1 / source.sample_rate)[span]
-    mass = -float(source.floor_force[span] @ acceleration / (acceleration @ acceleration))
-    return mass, float(solution[1]), float(solution[2])

@@ -26,6 +26,7 @@ from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import data_frame
 from thud.base.note import Note
+from thud.base.tabulated import column_rows
 from thud.base.units import UNITS, find_unit
 from thud.case.case import Case
 from thud.impact.floor_impact import mobility
@@ -163,11 +164,15 @@ class MobilityFit(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text of the errors."""
-        body = [
-            (f"{band:g}", f"{100 * error:.2g}", "" if np.isnan(level) else f"{level:+z.2f}")
-            for band, (error, level) in self.band_errors().items()
-        ]
-        return [("octave, Hz", "error, %", "real part, dB"), *body]
+        errors = self.band_errors()
+        relative, level = zip(*errors.values(), strict=True)
+        return column_rows(
+            {
+                "octave, Hz": (errors, "g"),
+                "error, %": (100 * np.array(relative), ".2g"),
+                "real part, dB": (level, "+z.2f"),
+            }
+        )
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the measured mobility and the fit, m/(N s), complex.

@@ -15,7 +15,7 @@ import numpy as np
 from thud.base._schema import RectangularFloor
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_number
-from thud.base.display import Displayed
+from thud.base.tabulated import Tabulated
 from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import FloorOptions, Room
+    from thud.base.tabulated import Columns
     from thud.recordings.recording import ImpactResult
 
     Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ MAX_POSITIONS = 1000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ModalRoom(Displayed):
+class ModalRoom(Tabulated):
     """Levels in a modal room below a floor, for positions of ball and microphone.
 
     Attributes
@@ -80,16 +81,15 @@ class ModalRoom(Displayed):
     pressure: Array
     sample_rate: float
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and a row of text for each band."""
-        header = (
-            "band, Hz", "mean, dB", "standard deviation, dB", "minimum, dB", "maximum, dB",
-        )  # fmt: skip
-        columns = (
-            self.mean, self.spread, self.level.min(axis=(0, 1)), self.level.max(axis=(0, 1)),
-        )  # fmt: skip
-        cells = [[f"{v:.1f}" for v in column] for column in columns]
-        return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+    def columns(self) -> Columns:
+        """Return the levels in bands."""
+        return {
+            "band, Hz": (self.frequency, "g"),
+            "mean, dB": (self.mean, ".1f"),
+            "standard deviation, dB": (self.spread, ".1f"),
+            "minimum, dB": (self.level.min(axis=(0, 1)), ".1f"),
+            "maximum, dB": (self.level.max(axis=(0, 1)), ".1f"),
+        }
 
     def plot(self) -> Figure:
         """Draw the levels of all positions."""

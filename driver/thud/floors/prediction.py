@@ -12,8 +12,8 @@ import numpy as np
 from thud.base._schema import LIMITS, VERDICTS, Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
-from thud.base.display import Displayed
 from thud.base.note import Note
+from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 from thud.floors import prediction_text
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
+    from thud.base.tabulated import Columns
     from thud.recordings.recording import ImpactResult
 
     Array = NDArray[np.float64]
@@ -49,7 +50,7 @@ MIN_PLAUSIBLE = 30.0
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class RoomPrediction(RoomLevel, Displayed):
+class RoomPrediction(RoomLevel, Tabulated):
     """Level that an impact causes in the room below.
 
     Attributes are those of `RoomLevel` and the following.
@@ -161,21 +162,17 @@ class RoomPrediction(RoomLevel, Displayed):
         rated = np.isin(measured.frequency, self.frequency)
         return np.asarray(measured.level[rated] - self.level)
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and a row of text for each band."""
-        header = (
-            "band, Hz", "level, dB", "standard uncertainty, dB", "simply supported, dB",
-            "clamped, dB", "standardized, dB", "energy, mJ",
-        )  # fmt: skip
-        columns = (
-            self.level, self.uncertainty, self.simple_level, self.clamped_level, self.standardized,
-            1e3 * self.energy,
-        )  # fmt: skip
-        cells = [
-            [f"{value:{form}}" for value in column]
-            for column, form in zip(columns, (*[".1f"] * 5, ".3g"), strict=True)
-        ]
-        return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+    def columns(self) -> Columns:
+        """Return the levels in bands."""
+        return {
+            "band, Hz": (self.frequency, "g"),
+            "level, dB": (self.level, ".1f"),
+            "standard uncertainty, dB": (self.uncertainty, ".1f"),
+            "simply supported, dB": (self.simple_level, ".1f"),
+            "clamped, dB": (self.clamped_level, ".1f"),
+            "standardized, dB": (self.standardized, ".1f"),
+            "energy, mJ": (1e3 * self.energy, ".3g"),
+        }
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw force, energy, floor and levels in the room, with measured levels if stated."""

@@ -16,8 +16,8 @@ import numpy as np
 
 from thud.base.bridge import ask
 from thud.base.checks import refuse
-from thud.base.display import Displayed
 from thud.base.note import Note
+from thud.base.tabulated import Tabulated
 from thud.level.levels import BANDWIDTHS
 from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
 from thud.recordings.table import read_table
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
+    from thud.base.tabulated import Columns
 
     Array = NDArray[np.float64]
 
@@ -71,7 +72,7 @@ LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RoomLevels(Displayed):
+class RoomLevels(Tabulated):
     """Levels of a heavy/soft impact source in the room below, in bands.
 
     Attributes
@@ -175,29 +176,19 @@ class RoomLevels(Displayed):
             result.append(Note("not_standardized", others=others))
         return tuple(result)
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and a row of text for each band."""
-        standardized = self.standardized
+    def columns(self) -> Columns:
+        """Return levels, reverberation times and background in bands, where they are known."""
         columns = {
-            "mean, dB": self.measured,
-            "spread, dB": self.spread,
-            "background, dB": self.background,
-            "L_i,Fmax, dB": None if self.background is None else self.level,
-            "T, s": None if standardized is None else self.reverberation_time,
-            "standardized, dB": standardized,
+            "nominal, Hz": (self.frequency, "g"),
+            "mean, dB": (self.measured, "z.1f"),
+            "spread, dB": (self.spread, "z.1f"),
+            "background, dB": (self.background, "z.1f"),
+            "level, dB": (self.level, "z.1f"),
+            "is upper bound": (self.is_upper_bound, "d"),
+            "reverberation time, s": (self.reverberation_time, ".2f"),
+            "standardized, dB": (self.standardized, "z.1f"),
         }
-        present = {title: values for title, values in columns.items() if values is not None}
-        marks = ["< " if is_bound else "" for is_bound in self.is_upper_bound]
-        bounded = {"L_i,Fmax, dB", "standardized, dB"}
-        cells = [
-            [
-                f"{mark if title in bounded else ''}{value:z.{2 if title == 'T, s' else 1}f}"
-                for mark, value in zip(marks, values, strict=True)
-            ]
-            for title, values in present.items()
-        ]
-        header = (f"{self.bands}, Hz", *present)
-        return [header, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+        return {title: column for title, column in columns.items() if column[0] is not None}
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardized levels and the background."""
@@ -281,19 +272,6 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
             )
     volume = None if volume is None else require_volume(volume)
     return RoomLevels(Path(path).stem, bands, frequency, levels, background, time, volume)
-
-
-def levels_csv(result: RoomLevels) -> bytes:
-    """Return the levels as a CSV table with a header row."""
-    columns = {
-        "nominal_Hz": result.frequency, "mean_dB": result.measured, "spread_dB": result.spread,
-        "background_dB": result.background, "level_dB": result.level,
-        "is_upper_bound": result.is_upper_bound.astype(int),
-        "reverberation_time_s": result.reverberation_time, "standardized_dB": result.standardized,
-    }  # fmt: skip
-    present = {title: values for title, values in columns.items() if values is not None}
-    rows = ([f"{value:.10g}" for value in row] for row in zip(*present.values(), strict=True))
-    return "".join(f"{','.join(row)}\n" for row in (present, *rows)).encode()
 
 
 def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:

@@ -10,7 +10,7 @@ import numpy as np
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_kind
-from thud.base.display import Displayed
+from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
+    from thud.base.tabulated import Columns
 
 
 # Rounded mid frequencies of the one-third-octave bands 50 to 3150 Hz; bands from 100 Hz are rated.
@@ -37,7 +38,7 @@ MAX_RATIO = 1.26
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TappingLevel(Displayed):
+class TappingLevel(Tabulated):
     """Normalized level of the tapping machine below a homogeneous floor, in bands.
 
     Attributes
@@ -73,10 +74,9 @@ class TappingLevel(Displayed):
         """Rated levels in tenths of a decibel, rounded half up (ISO 717-2)."""
         return np.asarray(np.floor(10 * self.level[RATED] + 0.5))
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and a row of text for each band."""
-        result = zip(self.frequency, self.level, strict=True)
-        return [("band, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in result)]
+    def columns(self) -> Columns:
+        """Return the levels."""
+        return {"band, Hz": (self.frequency, "g"), "L_n, dB": (self.level, ".1f")}
 
     def __repr__(self) -> str:
         """Return weighted level and adaptation term."""

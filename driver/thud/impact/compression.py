@@ -9,6 +9,7 @@ from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask, without_units
 from thud.base.display import Displayed
 from thud.base.extras import data_frame
+from thud.base.tabulated import column_rows
 from thud.case.case import Case, case_text, new_model
 
 if TYPE_CHECKING:
@@ -47,9 +48,13 @@ class CompressionCurve(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and about ten rows of text."""
-        indices = range(0, len(self.force), max(1, len(self.force) // 10))
-        rows = [(f"{1e3 * self.deflection[i]:.2f}", f"{self.force[i]:.2f}") for i in indices]
-        return [("deflection, mm", "force, N"), *rows]
+        step = max(1, len(self.force) // 10)
+        return column_rows(
+            {
+                "deflection, mm": (1e3 * self.deflection[::step], ".2f"),
+                "force, N": (self.force[::step], ".2f"),
+            }
+        )
 
     def plot(self) -> Figure:
         """Return a figure of the force against the deflection."""

@@ -11,6 +11,7 @@ from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_array, require_choice, require_kind, require_pair
 from thud.base.immutable import Immutable
+from thud.base.tabulated import column_rows
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact
 from thud.level.levels import BANDWIDTHS, force_exposure_levels
@@ -124,11 +125,15 @@ class FloorImpact(Impact):
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each octave."""
         energy = self.injected_energy()
-        columns = (self.blocked_levels(), self.levels(force="floor"), self.difference())
-        header = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
-        cells = [[f"{value:.2f}" for value in column] for column in columns]
-        energies = [f"{value:.3g}" for value in energy.energy]
-        return [header, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
+        return column_rows(
+            {
+                "octave, Hz": (energy.frequency, "g"),
+                "blocked, dB": (self.blocked_levels(), ".2f"),
+                "contact, dB": (self.levels(force="floor"), ".2f"),
+                "difference, dB": (self.difference(), ".2f"),
+                "energy, J": (energy.energy, ".3g"),
+            }
+        )
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the histories, also the force on a rigid floor and the motion of the floor."""

@@ -11,8 +11,8 @@ import numpy as np
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.bridge import ask, notes, without_units
 from thud.base.checks import refuse, require_array, require_kind
-from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning
+from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text
 from thud.impact.motion import write_vtu
 
@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 
     from thud.base.bridge import Bundle
     from thud.base.note import Note
+    from thud.base.tabulated import Columns
 
 
 @dataclass(frozen=True, eq=False)
-class FreeModes(Displayed):
+class FreeModes(Tabulated):
     """Axisymmetric elastic modes without twist, by ascending frequency.
 
     Nodes are ordered from the lowest point to the highest and from the inner surface to the outer
@@ -81,11 +82,13 @@ class FreeModes(Displayed):
         names = (f"mode {i}, {f:.3f} Hz" for i, f in enumerate(self.frequency, 1))
         write_vtu(path, self.start, dict(zip(names, self.shape, strict=True)))
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        columns = zip(self.frequency, self.harmonic, self.participation, strict=True)
-        rows = [(f"{f:.2f}", f"{harmonic}", f"{part:.3f}") for f, harmonic, part in columns]
-        return [("frequency, Hz", "harmonic", "participation"), *rows]
+    def columns(self) -> Columns:
+        """Return frequencies, harmonics and participations."""
+        return {
+            "frequency, Hz": (self.frequency, ".2f"),
+            "harmonic": (self.harmonic, "d"),
+            "participation": (self.participation, ".3f"),
+        }
 
 
 def free_modes(

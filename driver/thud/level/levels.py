@@ -10,10 +10,12 @@ import numpy as np
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_number
-from thud.base.display import Displayed
+from thud.base.tabulated import Tabulated
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.tabulated import Columns
 
 
 BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
@@ -25,7 +27,7 @@ RECORDED_BAND = 1250.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Bands(Displayed):
+class Bands(Tabulated):
     """Frequency bands of base 10 (IEC 61260-1), ascending; the arrays are read-only.
 
     Attributes
@@ -47,11 +49,9 @@ class Bands(Displayed):
         """Return the nominal frequencies."""
         return f"<Bands: {', '.join(f'{f:g}' for f in self.nominal)} Hz>"
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        rows = zip(*vars(self).values(), strict=True)
-        header = tuple(f"{name}, Hz" for name in vars(self))
-        return [header, *(tuple(f"{f:.4g}" for f in row) for row in rows)]
+    def columns(self) -> Columns:
+        """Return the frequencies."""
+        return {f"{name}, Hz": (values, ".4g") for name, values in vars(self).items()}
 
 
 _BANDS = {
