@@ -22,11 +22,10 @@ from thud.explorer.messages import in_words
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.motion import motion_of
 from thud.explorer.series import curve, to_json
-from thud.floors.prediction import predict_level
-from thud.floors.prediction_text import class_text, rating_title
+from thud.floors.prediction import predict_level, rating_title
 from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.level.rating import rated_bands
+from thud.level.rating import class_text, rated_bands
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.report.predicted_floor import CONTRIBUTIONS
@@ -236,4 +235,6 @@ def _ratings_text(prediction: RoomPrediction) -> str:
     ratings = [
         f"{rating_title(prediction, name)} {entry}" for name, entry in prediction.ratings.items()
     ]
-    return "; ".join(filter(None, [*ratings, class_text(prediction), f"octaves {levels}"]))
+    return "; ".join(
+        filter(None, [*ratings, class_text(prediction.korean_class), f"octaves {levels}"])
+    )

@@ -6,7 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import VERDICTS
-from thud.floors.prediction_text import class_text, rating_title, source_note
+from thud.floors.prediction import rating_title, source_note
+from thud.level.rating import class_text
 from thud.report.page import STANDARDS
 from thud.report.predicted_floor import CAVEAT, verdict_text
 
@@ -121,8 +122,8 @@ def room_headline(prediction: RoomPrediction) -> dict[str, str]:
     required, rating = prediction.requirement, prediction.rating
     also = f", standard uncertainty {rating.uncertainty:.1f} dB"
     parts = [
-        rating_title(prediction, rating.name), verdict_text(prediction), class_text(prediction),
-        source_note(prediction), CAVEAT,
+        rating_title(prediction, rating.name), verdict_text(prediction),
+        class_text(prediction.korean_class), source_note(prediction), CAVEAT,
     ]  # fmt: skip
     detail = "; ".join(filter(None, parts))
     level = f"{rating.rounded} dB"

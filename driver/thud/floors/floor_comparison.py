@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base._schema import RATINGS
 from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
@@ -15,8 +14,13 @@ from thud.base.files import Page
 from thud.base.tables import Result
 from thud.case.case import Case
 from thud.case.constructions import Construction, with_floor
-from thud.floors.prediction import RoomPrediction, predict_level
-from thud.floors.prediction_text import rating_text, rating_title, source_note
+from thud.floors.prediction import (
+    RoomPrediction,
+    predict_level,
+    rating_text,
+    rating_title,
+    source_note,
+)
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
 from thud.level.rating import rated_bands
@@ -56,14 +60,8 @@ class FloorComparison(Displayed, Page):
         """Return header and rows of text, with a column for each floor."""
         # The standards of the ratings are for the ball.
         titled = min(self.predictions.values(), key=lambda prediction: prediction.is_ball)
-        titles = (
-            "", "floor", "force", "source",
-            *(f"{rating_title(titled, name)}, dB (standard uncertainty)" for name in RATINGS),
-            "class (KS F 2863-2)", "required, dB",
-            *(f"{frequency:g} Hz octave, dB" for frequency in rated_bands("octave")),
-            "energy into the bearing floor, 50 to 630 Hz, mJ", "tapping machine, L_n,w (C_I), dB",
-        )  # fmt: skip
-        rows = zip(titles, *(_column(*item) for item in self.predictions.items()), strict=True)
+        columns = [_column(*item, titled) for item in self.predictions.items()]
+        rows = [(title, *(column[title] for column in columns)) for title in columns[0]]
         # Rows that say something of a floor.
         return [row for row in rows if row[0] not in _OPTIONAL or any(row[1:])]
 
@@ -130,47 +128,39 @@ def compare_floors(
     return FloorComparison(result)
 
 
-def _column(name: str, prediction: RoomPrediction) -> tuple[str, ...]:
-    """Return the column of a floor in `FloorComparison.rows`."""
-    return (
-        name,
-        prediction.floor.name.replace("_", " "),
-        prediction.force,
-        _source(prediction),
-        *(f"{rating.rounded} ({rating.uncertainty:.1f})" for rating in prediction.ratings.values()),
-        _class(prediction),
-        _required(prediction),
-        *(f"{level:.1f}" for level in prediction.octave_level),
-        f"{1e3 * prediction.energy.sum():.3g}",
-        _tapping(prediction),
-    )
-
-
-def _class(prediction: RoomPrediction) -> str:
-    """Return the class in few words, as columns are as wide as their cells; empty without one."""
-    korean = prediction.korean_class
-    return "" if korean is None else f"class {korean}" if korean else "no class"
-
-
-def _source(prediction: RoomPrediction) -> str:
-    """Return the source, or what is wrong with it; empty for a ball that conforms."""
-    name = "" if prediction.is_ball else str(prediction.source.limits_source)
-    return ", ".join(filter(None, (name, source_note(prediction))))
-
-
-def _required(prediction: RoomPrediction) -> str:
-    """Return the requirement of a room and the verdict on it; empty without one."""
-    required = prediction.requirement
-    if required is None:
-        return ""
-    chance = f"{100 * required.probability:.0f} %"
-    text = f"{required.limit:g} ({required.rating.name}): {required.verdict}, {chance}"
-    return Result(text, required.verdict)
-
-
-def _tapping(prediction: RoomPrediction) -> str:
-    """Return the level of the tapping machine below a floor; a dash if it cannot be predicted."""
-    if not has_tapping_level(prediction.floor, prediction.room):
-        return "–"
-    result = tapping_level(prediction.floor, prediction.room)
-    return f"{result.weighted} ({result.adaptation})"
+def _column(name: str, prediction: RoomPrediction, titled: RoomPrediction) -> dict[str, str]:
+    """Return the column of a floor by the titles of rows, those of ratings as of `titled`."""
+    korean, required = prediction.korean_class, prediction.requirement
+    source = "" if prediction.is_ball else str(prediction.source.limits_source)
+    floor, tapping = prediction.floor, "–"
+    if has_tapping_level(floor, prediction.room):
+        level = tapping_level(floor, prediction.room)
+        tapping = f"{level.weighted} ({level.adaptation})"
+    return {
+        "": name,
+        "floor": floor.name.replace("_", " "),
+        "force": prediction.force,
+        "source": ", ".join(filter(None, (source, source_note(prediction)))),
+        **{
+            f"{rating_title(titled, key)}, dB (standard uncertainty)": (
+                f"{rating.rounded} ({rating.uncertainty:.1f})"
+            )
+            for key, rating in prediction.ratings.items()
+        },
+        "class (KS F 2863-2)": (
+            "" if korean is None else f"class {korean}" if korean else "no class"
+        ),
+        "required, dB": Result(
+            f"{required.limit:g} ({required.rating.name}): {required.verdict}, "
+            f"{100 * required.probability:.0f} %",
+            required.verdict,
+        )
+        if required
+        else "",
+        **{
+            f"{frequency:g} Hz octave, dB": f"{level:.1f}"
+            for frequency, level in zip(rated_bands("octave"), prediction.octave_level, strict=True)
+        },
+        "energy into the bearing floor, 50 to 630 Hz, mJ": f"{1e3 * prediction.energy.sum():.3g}",
+        "tapping machine, L_n,w (C_I), dB": tapping,
+    }

@@ -135,15 +135,6 @@ class Requirement:
         return f"{self.rating}; {self.chance}"
 
 
-def meets(level: ArrayLike, limit: float) -> NDArray[np.bool_]:
-    """Return whether levels, rounded, are at most a limit; NaN is not.
-
-    >>> meets([49.49, 49.5], 49.0).tolist()
-    [True, False]
-    """
-    return np.asarray(level) < excess_level(limit)
-
-
 def excess_level(limit: float) -> float:
     """Return the lowest level that, rounded, exceeds a limit.
 
@@ -159,15 +150,18 @@ def class_of(level: float) -> int:
     >>> class_of(49.49), class_of(49.5)
     (4, 0)
     """
-    return next((i for i, limit in enumerate(CLASS_LIMITS, 1) if meets(level, limit)), 0)
+    classes = enumerate(CLASS_LIMITS, 1)
+    return next((number for number, limit in classes if level < excess_level(limit)), 0)
 
 
-def class_text(korean_class: int) -> str:
-    """Return a class of KS F 2863-2 with its limit.
+def class_text(korean_class: int | None) -> str:
+    """Return a class of KS F 2863-2 with its limit; empty for None.
 
     >>> class_text(4)
     'class 4 (at most 49 dB)'
     """
+    if korean_class is None:
+        return ""
     number = korean_class or len(CLASS_LIMITS)
     limit = f"at most {CLASS_LIMITS[number - 1]:g} dB"
     return f"class {number} ({limit})" if korean_class else f"no class (class {number}: {limit})"

@@ -11,7 +11,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader
 
 from thud.base.display import html_text
-from thud.floors.prediction_text import rating_title
+from thud.floors.prediction import rating_title
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (

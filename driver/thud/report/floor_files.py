@@ -11,7 +11,7 @@ from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text, marked
 from thud.base.workbooks import workbook
-from thud.floors.prediction_text import source_note
+from thud.floors.prediction import source_note
 from thud.level.rating import rated_bands
 from thud.report.predicted_floor import CAVEAT, sheets, tables, verdict_text
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.case.keys import humanize
-from thud.floors.prediction_text import class_text, rating_title, source_note
+from thud.floors.prediction import rating_title, source_note
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
+from thud.level.rating import class_text
 from thud.report.fonts import FAMILY
 from thud.report.markup import css_string, escaped, inline_svg, labeled, notes, pair_rows, symbols
 from thud.report.predicted_floor import (
@@ -210,7 +211,7 @@ def _box(floor: PredictedFloor) -> list[str]:
     lines = [
         verdict_text(prediction),
         f"{rating_title(prediction, name)} in the room below, 50 to 630 Hz",
-        class_text(prediction) * (name == "octaves"),
+        class_text(prediction.korean_class) * (name == "octaves"),
         source_note(prediction).capitalize(),
         CAVEAT.capitalize(),
     ]

@@ -23,11 +23,15 @@ from thud.base.errors import ThudError
 from thud.base.units import display_unit
 from thud.case.constructions import Layer
 from thud.case.keys import humanize
-from thud.floors.prediction import BANDS, predict_level
-from thud.floors.prediction_text import class_text, rating_title, source_note
+from thud.floors.prediction import (
+    BANDS,
+    predict_level,
+    rating_title,
+    source_note,
+)
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.levels import get_bands
-from thud.level.rating import rated_bands
+from thud.level.rating import class_text, rated_bands
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -141,7 +145,7 @@ class PredictedFloor:
     def ratings(self) -> list[tuple[str, float, float, str]]:
         """Title, value, standard uncertainty, dB, and text of each rating, the asked one first."""
         prediction = self.prediction
-        korean = class_text(prediction)
+        korean = class_text(prediction.korean_class)
         classes = korean and f"; KS F 2863-2: {korean}"
         ratings = sorted(prediction.ratings.values(), key=lambda entry: entry != prediction.rating)
         return [

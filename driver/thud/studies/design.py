@@ -10,7 +10,7 @@ from thud.base._schema import CLASS_LIMITS, RATINGS, Room
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import DENSITY, value_in
-from thud.level.rating import meets
+from thud.level.rating import excess_level
 from thud.studies.sample_kind import SampleKind
 from thud.studies.study import wall_volume
 from thud.studies.study_result import SampleResult
@@ -99,9 +99,9 @@ class Design(SampleResult):
             ("rating", RATINGS[self.rating_name]),
         ]
         if self.rating_name == "octaves":
-            count = int(meets(room_rating, CLASS_LIMITS[-1]).sum())
+            count = int((room_rating < excess_level(CLASS_LIMITS[-1])).sum())
             rows.append((f"class {len(CLASS_LIMITS)} or better (KS F 2863-2)", str(count)))
-        met = room_rating.copy(data=meets(room_rating, self.required))
+        met = room_rating < excess_level(self.required)
         if self.required:
             rows.append((f"rating at most {self.required:g} dB", f"{int(met.sum())} of {size}"))
             if met.any():
