@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 
     Column = Sequence[str]
 
-# Columns of a terminal.
+# Columns of a terminal, blanks between columns of a table, and the longest word that stays whole.
 WIDTH = 80
 _GAP = 2
-# Labels and words up to this width stay whole.
 _MAX_WORD = WIDTH // 2 - _GAP
 # Cells are broken after spaces and underscores, but "1.2 ± 0.1", "5 %" and "3 to 4" stay whole.
 _WORD = re.compile(r"(?:[^ _]| (?=[±%]|to \S)|(?<=±) |(?<= to) )*[ _]*")
@@ -70,8 +69,17 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
     octave  level
     31.5    39
     """
-    label, *columns = zip(*rows, strict=True)
-    return "\n\n".join(_format_columns([label, *part]) for part in _distribute(label, columns))
+    columns = list(zip(*rows, strict=True))
+    minima = [max(len(w.rstrip()) for c in column for w in _WORD.findall(c)) for column in columns]
+    minima = [min(width, _MAX_WORD) for width in minima]
+    tables = [[0]]
+    for i in range(1, len(columns)):
+        if len(tables[-1]) > 1 and _total([minima[k] for k in [*tables[-1], i]]) > WIDTH:
+            tables.append([0])
+        tables[-1].append(i)
+    return "\n\n".join(
+        _format_table([columns[i] for i in table], [minima[i] for i in table]) for table in tables
+    )
 
 
 def csv_text(rows: Iterable[Iterable[object]]) -> str:
@@ -103,42 +111,16 @@ def _wrap_line(line: str) -> str:
     )
 
 
-def _distribute(label: Column, columns: Sequence[Column]) -> list[list[Column]]:
-    """Return the columns of as few tables as can be made narrow enough, of similar widths."""
-    natural = [max(map(len, column)) for column in columns]
-    least, *minima = _min_widths([label, *columns])
-
-    def distribute(max_width: int) -> list[list[Column]]:
-        parts: list[list[Column]] = [[]]
-        widths, narrow = [0], [least]
-        for column, width, minimum in zip(columns, natural, minima, strict=True):
-            is_wide = _total([*widths, width]) > max_width or _total([*narrow, minimum]) > WIDTH
-            if parts[-1] and is_wide:
-                parts.append([])
-                widths, narrow = [0], [least]
-            parts[-1].append(column)
-            widths.append(width)
-            narrow.append(minimum)
-        return parts
-
-    unlimited = _total([0, *natural])
-    fewest = len(distribute(unlimited))
-    return next(p for w in range(unlimited + 1) if len(p := distribute(w)) == fewest)
-
-
-def _format_columns(columns: Sequence[Column]) -> str:
+def _format_table(columns: Sequence[Column], minima: Sequence[int]) -> str:
     """Return columns of text as lines; the widest columns are made narrower until they fit."""
-    minima = _min_widths(columns)
     widths = [max(map(len, column)) for column in columns]
     # Labels stay whole if the table fits with them.
     label = min(widths[0], _MAX_WORD)
     if _total([label, *minima[1:]]) <= WIDTH:
-        minima[0] = label
-    while _total(widths) > WIDTH and widths != minima:
-        wider = [
-            i for i, (width, least) in enumerate(zip(widths, minima, strict=True)) if width > least
-        ]
-        widths[max(wider, key=widths.__getitem__)] -= 1
+        minima = [label, *minima[1:]]
+    while _total(widths) > WIDTH:
+        reducible = [i for i, minimum in enumerate(minima) if widths[i] > minimum]
+        widths[max(reducible, key=widths.__getitem__)] -= 1
     broken = [[_break(cell, w) for cell in c] for c, w in zip(columns, widths, strict=True)]
     widths = [max((len(line) for cell in c for line in cell), default=0) for c in broken]
     lines = []
@@ -153,14 +135,6 @@ def _padded(part: str, width: int, cell: str) -> str:
     """Return a line of a cell with a width, marked if the cell tells a verdict."""
     shown = marked(part, cell.verdict) if part and isinstance(cell, Result) else part
     return shown + " " * (width - len(part))
-
-
-def _min_widths(columns: Sequence[Column]) -> list[int]:
-    """Return the width of the longest word of each column."""
-    words = (
-        [word.rstrip() for cell in column for word in _WORD.findall(cell)] for column in columns
-    )
-    return [min(max(map(len, pieces)), _MAX_WORD) for pieces in words]
 
 
 def _total(widths: Sequence[int]) -> int:
