@@ -22,9 +22,8 @@ from thud.level.estimate import Estimate
 from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config
 from thud.recordings.config_values import require_channels
-from thud.recordings.load_cells import add_signals
 from thud.recordings.recorded_levels import average_levels, measure_levels
-from thud.recordings.signal import Signal
+from thud.recordings.signal import Signal, add_signals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

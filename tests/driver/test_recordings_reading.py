@@ -39,8 +39,8 @@ from thud.recordings.config import Config, Instrument, Properties, ReportConfig,
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
 from thud.recordings.instruments import Plate, RecorderFilter
-from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.signal import Signal
+from thud.recordings.signs import check_peak, find_peaks
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -370,7 +370,7 @@ def test_times_without_decimals_and_commas_before_blanks_agree_with_the_header(
     (tmp_path / "t.csv").write_text("fs = 4000 Hz\ntime [us], force [N]\n" + rows)
     (signal,) = opened(tmp_path / "t.csv")
     assert signal.sample_rate == pytest.approx(4000)
-    np.testing.assert_array_equal(signal.samples(0, signal.n_sample), np.round(pulse, 3))
+    np.testing.assert_array_equal(signal.read(0, signal.n_sample), np.round(pulse, 3))
 
 
 def test_rounded_times_are_told(tmp_path: Path) -> None:
@@ -530,7 +530,7 @@ def test_matrices_of_other_numbers(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "plate.mat"
     scipy.io.savemat(path, {"Force": force, "Fs": 8000.0})
     (signal,) = opened(path, calibration=5.0, unit="V")
-    np.testing.assert_array_equal(signal.samples(0, signal.n_sample), 5.0 * force)
+    np.testing.assert_array_equal(signal.read(0, signal.n_sample), 5.0 * force)
 
 
 def test_universal_file_of_single_precision(tmp_path: Path) -> None:

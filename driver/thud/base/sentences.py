@@ -20,6 +20,10 @@ PROCESSING = {
     "factor_not_applied": "{factor} of the file was not applied; the calibration replaces it",
     "times_rounded": "the times, up to {value:.1g} {unit} off, were replaced by a grid of "
     "{rate:.7g} Hz",
+    # Records of a known force; the uncertainty is a standard uncertainty.
+    "droop_removed": "droop with a time constant of {value:.4g} {unit}, standard uncertainty "
+    "{uncertainty:.2%}, taken off",
+    "no_droop": "no droop: a time constant above {low:.2g} {unit}",
     # Background.
     "offset_removed": "an offset of {value:.3g} {unit} was removed",
     "drift_removed": "a drift of {value:.3g} {unit} was removed",

@@ -186,9 +186,10 @@ def run_calibrate(options: argparse.Namespace) -> int:
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
         print_results(f"# {result.origin}")
-        if result.time_constant:
-            print_results(f"# {result.time_constant}")
-    print_notes(result.notes)
+        for note in result.notes:
+            if not note.is_warning:
+                print_results(f"# {note}")
+    print_notes([note for note in result.notes if note.is_warning])
     return 0
 
 

@@ -12,15 +12,10 @@ from scipy.special import fdtrc
 
 from thud.base.checks import refuse, refuse_value, require_number
 from thud.base.note import Note
+from thud.base.units import find_unit
 from thud.recordings.channel import regular_file, shown_path, shown_text
 from thud.recordings.config import Config
-from thud.recordings.force_units import (
-    ALLOWED,
-    Calibration,
-    TimeConstant,
-    find_unit,
-    require_unit,
-)
+from thud.recordings.force_units import ALLOWED, Calibration, require_unit
 from thud.recordings.formats import read_channels
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import channel_choices, choose_channels
@@ -129,7 +124,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     signal, symbol, unapplied = open_source(record, channel, unit)
     if not symbol:
         refuse(f"{signal.name}: the values are without a unit", f"unit = one of {ALLOWED}")
-    steps, time_constant = _measure_steps(signal)
+    steps, notes = _measure_steps(signal)
     size, number = float(steps.sizes.mean()), len(steps.sizes)
     if steps.uncertainty > MAX_UNCERTAINTY * size:
         refuse(
@@ -137,7 +132,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"{steps.uncertainty:.2g} {symbol}",
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
-    notes, spread = [], 0.0
+    spread = 0.0
     if (steps.signs[1:] == steps.signs[:-1]).any():
         notes.append(Note("steps_in_one_direction", value=newtons, unit="N"))
     if unapplied:
@@ -155,7 +150,6 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
         f"{float(newtons / size)!r} N/{symbol}",
         math.hypot(steps.uncertainty / size, uncertainty, spread),
         f"{number} step{'s' * (number > 1)} of {load} in {signal.name}",
-        time_constant,
         tuple(notes),
     )
 
@@ -196,7 +190,7 @@ def open_source(
     rate = math.nan if source.sample_rate is None else source.sample_rate
     # Integers are read as fractions of full scale.
     full_scale = 1.0 if source.counts else None
-    signal = Signal(name, str(path), rate, source.n_sample, source.samples, full_scale)
+    signal = Signal(name, str(path), rate, source.n_sample, source.samples, full_scale=full_scale)
     return signal, symbol, shown_text(source.unapplied)
 
 
@@ -215,8 +209,10 @@ class _Steps(NamedTuple):
     misfit: float
 
 
-def _measure_steps(signal: Signal) -> tuple[_Steps, TimeConstant | None]:
-    """Return the steps of a record and the time constant of its amplifier, None without times.
+def _measure_steps(signal: Signal) -> tuple[_Steps, list[Note]]:
+    """Return the steps of a record and a note on the time constant of its amplifier.
+
+    Without times, there is no note.
 
     Raise InputError if there is no clear step, if a plateau is clipped, or if the level between the
     steps fits no exponential decay.
@@ -249,12 +245,15 @@ def _measure_steps(signal: Signal) -> tuple[_Steps, TimeConstant | None]:
             f"a time constant of {lag / MAX_DECAY / len(level):.2g} of the record or more",
         )
     if math.isnan(interval):
-        return steps, None
+        return steps, []
     minimum = interval / (steps.rate + BOUND * steps.rate_uncertainty)
     if steps.rate <= SIGNIFICANT * steps.rate_uncertainty:
-        return steps, TimeConstant(math.inf, 0.0, minimum)
+        return steps, [Note("no_droop", low=minimum, unit="s")]
     relative = steps.rate_uncertainty / steps.rate
-    return steps, TimeConstant(interval / steps.rate, relative, minimum)
+    others = {"uncertainty": relative}
+    return steps, [
+        Note("droop_removed", "", interval / steps.rate, minimum, unit="s", others=others)
+    ]
 
 
 def _means(signal: Signal, width: int) -> NDArray[np.float64]:

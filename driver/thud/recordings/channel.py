@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
+from thud.base.units import size_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -56,8 +57,6 @@ class Channel:
         Date of the measurement, or empty.
     notes : tuple of Note
         Processing when the file was read.
-    may_be_fractions : bool
-        Whether values without a unit may be fractions of full scale, as those of float audio.
     unapplied : str
         Factor or offset in the file, such as ``"gain = 10"``, of which it is not known whether the
         values were multiplied by it; empty if there is none.
@@ -72,8 +71,12 @@ class Channel:
     counts: float | None = None
     date: str = ""
     notes: tuple[Note, ...] = ()
-    may_be_fractions: bool = False
     unapplied: str = ""
+
+    @property
+    def is_force(self) -> bool:
+        """Whether its values are in a unit of force."""
+        return size_of(self.unit)[0] == "N"
 
     @property
     def title(self) -> str:

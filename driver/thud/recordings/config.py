@@ -31,8 +31,8 @@ from thud.recordings.config_values import (
 )
 from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.instruments import Plate, RecorderFilter, check_plate
-from thud.recordings.polarity import POLARITIES
 from thud.recordings.response import Chain
+from thud.recordings.signs import POLARITIES
 from thud.recordings.words import read_date
 
 if TYPE_CHECKING:

@@ -23,12 +23,12 @@ from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, choose, cut_section, find_drops, require_chosen
 from thud.recordings.instruments import with_assumptions
 from thud.recordings.measured_drop import Drop, measure_drop
-from thud.recordings.polarity import check_peak, find_peaks
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
 from thud.recordings.signal import Signal, common_uncertainty
 from thud.recordings.signal_files import open_signals
+from thud.recordings.signs import orient
 from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
@@ -172,8 +172,5 @@ def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
     for item in items:
         if not isinstance(item, Signal):
             yield from open_signals(item, config)
-        elif item.path:
-            yield item
         else:
-            notes = check_peak(*find_peaks(item), item.name)
-            yield replace(item, notes=(*item.notes, *notes))
+            yield item if item.path else orient(item, "positive")

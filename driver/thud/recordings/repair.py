@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 
 from thud.base.checks import refuse
 from thud.base.note import Note, of_part
-from thud.recordings.checks import CHECKS
+from thud.recordings.checks import CHECKS, cells
 from thud.recordings.differences import (
     FROM_CUBIC,
     MEDIAN,
@@ -19,7 +19,6 @@ from thud.recordings.differences import (
     largest_beside,
     runs,
 )
-from thud.recordings.load_cells import check_cells
 from thud.recordings.quantization import find_quantization
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ def repair(section: Section) -> Section:
         force, notes = _filled(replace(cell, quantization=section.quantization), peak)
         forces.append(force)
         said += of_part(cell.name, notes)
-    said += check_cells(section, forces)
+    said += cells.check(section, forces)
     return replace(section, force=np.sum(forces, axis=0), cells=(), notes=tuple(said))
 
 

@@ -1,4 +1,4 @@
-"""One recorded channel as a force."""
+"""One recorded channel as a force, or the sum of several."""
 
 from __future__ import annotations
 
@@ -12,16 +12,12 @@ import numpy as np
 
 from thud.base.checks import refuse, require_array, require_number
 from thud.base.immutable import Immutable
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
-
-    from thud.base.note import Note
-
-# Number of bytes of a file per read for the checksum.
-BLOCK = 2**20
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +34,11 @@ class Signal(Immutable):
         Samples per second, Hz.
     n_sample : int
         Number of samples.
+    samples : callable
+        Returns the recorded values, shape (stop - start,), of the samples from start to before
+        stop.
+    scale : float
+        Force per recorded value, N, positive if positive values are compression.
     full_scale : float or None
         Largest force that the sample format can hold, N; None if unknown.
     date : str
@@ -51,8 +52,6 @@ class Signal(Immutable):
         signal, or of one of its load cells.
     cells : tuple of Signal
         Load cells whose sum this is.
-    samples : callable
-        Returns the force, N, shape (stop - start,), of the samples from start to before stop.
     """
 
     name: str
@@ -60,6 +59,7 @@ class Signal(Immutable):
     sample_rate: float
     n_sample: int
     samples: Callable[[int, int], NDArray[np.float64]] = field(repr=False)
+    scale: float = 1.0
     full_scale: float | None = None
     date: str = ""
     calibration: str = ""
@@ -78,25 +78,16 @@ class Signal(Immutable):
             refuse(f"{name}: a value is not finite", "real numbers")
         return cls(name, "", float(sample_rate), len(values), partial(read_array, values.copy()))
 
-    def scaled(self, factor: float) -> Signal:
-        """Return the signal, and those of its load cells, times a factor."""
-        cells = tuple(cell.scaled(factor) for cell in self.cells)
-        return replace(self, samples=partial(read_scaled, self.samples, factor, 0.0), cells=cells)
-
     @cached_property
     def checksum(self) -> str:
         """SHA-256 of the file, or of the values of an array, in hexadecimal digits."""
-        digest = hashlib.sha256()
         if not self.path:
-            digest.update(self.read(0, self.n_sample).tobytes())
-            return digest.hexdigest()
+            return hashlib.sha256(self.read(0, self.n_sample).tobytes()).hexdigest()
         try:
             with Path(self.path).open("rb") as file:
-                while block := file.read(BLOCK):
-                    digest.update(block)
+                return hashlib.file_digest(file, "sha256").hexdigest()
         except OSError as error:
             refuse(f"{self.name}: cannot be read ({error.strerror})", "a readable file", error)
-        return digest.hexdigest()
 
     def read(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the force of the samples from start to before stop, N, positive in compression.
@@ -105,7 +96,7 @@ class Signal(Immutable):
         """
         if not 0 <= start <= stop <= self.n_sample:
             refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")
-        force = self.samples(start, stop)
+        force = self.samples(start, stop) * self.scale
         if force.shape != (stop - start,):
             refuse(
                 f"{self.name}: {force.size} samples from sample {start}, {stop - start} expected",
@@ -117,23 +108,44 @@ class Signal(Immutable):
         return force
 
 
+def add_signals(cells: Sequence[Signal], name: str) -> Signal:
+    """Return the sum of signals of equal rate and length."""
+    first = cells[0]
+    notes: list[Note] = []
+    for cell in cells:
+        if (cell.n_sample, cell.sample_rate) != (first.n_sample, first.sample_rate):
+            refuse(
+                f"{cell.name}: {cell.n_sample} samples at {cell.sample_rate:g} Hz, "
+                f"{first.n_sample} at {first.sample_rate:g} Hz in {first.name}",
+                "channels that were recorded together",
+            )
+        common = [replace(note, subject=name) for note in cell.notes]
+        notes += [note for note in common if note not in notes]
+    return Signal(
+        name,
+        first.path,
+        first.sample_rate,
+        first.n_sample,
+        partial(_read_sum, tuple(cells)),
+        date=first.date,
+        calibration="; ".join(dict.fromkeys(cell.calibration for cell in cells)),
+        # The reference of all calibrations is usually the same.
+        calibration_uncertainty=common_uncertainty([c.calibration_uncertainty for c in cells]),
+        notes=(*notes, Note("cells_added", name, len(cells))),
+        cells=tuple(cells),
+    )
+
+
 def common_uncertainty(values: Sequence[float | None]) -> float | None:
     """Return the largest of relative uncertainties of signals, None if one is not known."""
     known = [value for value in values if value is not None]
     return max(known) if len(known) == len(values) else None
 
 
-def read_scaled(
-    samples: Callable[[int, int], NDArray[np.float64]],
-    factor: float,
-    offset: float,
-    start: int,
-    stop: int,
-) -> NDArray[np.float64]:
-    """Return samples from start to before stop times a factor, plus an offset."""
-    return samples(start, stop) * factor + offset
-
-
 def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:
-    """Return a copy of the samples of an array from start to before stop."""
-    return values[start:stop].copy()
+    """Return the samples of an array from start to before stop."""
+    return values[start:stop]
+
+
+def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.float64]:
+    return np.asarray(np.sum([cell.read(start, stop) for cell in cells], axis=0))

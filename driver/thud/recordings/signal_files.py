@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, shown
 from thud.base.errors import InputError
 from thud.base.note import Note
-from thud.base.units import size_of
+from thud.base.units import find_unit
 from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_path, shown_text
 from thud.recordings.config import Config
 from thud.recordings.config_values import SUM
 from thud.recordings.force_units import (
     ALLOWED,
-    ASSUMED,
+    RECORDED,
     Calibration,
-    find_unit,
     newtons_per_unit,
     unit_of_chain,
 )
 from thud.recordings.formats import read_channels
-from thud.recordings.load_cells import HINT, add_signals, check_signs, refuse_directions
-from thud.recordings.polarity import MIN_PEAK_RATIO, POLARITIES, check_peak, find_peaks
-from thud.recordings.signal import Signal, read_scaled
+from thud.recordings.signal import Signal, add_signals
+from thud.recordings.signs import HINT, POLARITIES, find_peaks, orient
 
 if TYPE_CHECKING:
     import os
@@ -41,6 +39,8 @@ RATES = (2500.0, 1e8)
 # peaks deviates by less from the chosen peak, this is their sum.
 MIN_MISSING = 0.2
 MAX_SUM_DEVIATION = 0.1
+# A direction at the end of a name: Fx, Force_Y, z1.
+AXIS = re.compile(r"(?:^|[^a-z])f?(?P<axis>[xyz])\d*$")
 
 
 def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> list[Signal]:
@@ -86,16 +86,16 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
         if config.channels is not None:
             titles = " + ".join(channel.title for channel in chosen)
             signals = [add_signals(signals, f"{shown_path(file.name)}, {titles}")]
-        signals = [_oriented(signal, config.polarity) for signal in signals]
+        signals = [orient(signal, config.polarity) for signal in signals]
     except InputError as error:
         if len(chosen) == 1 or config.channels is not None:
             raise
         message = f"{error}; if several channels are forces: {HINT}"
         raise InputError(message, error.note) from error
     is_chosen = config.channel is not None or config.channels is not None
-    if any(calibrations) or not is_chosen or not all(map(_is_force, chosen)):
+    if any(calibrations) or not is_chosen or not all(channel.is_force for channel in chosen):
         return signals
-    others = [entry for entry in channels if entry not in chosen and _is_force(entry)]
+    others = [entry for entry in channels if entry not in chosen and entry.is_force]
     return [_with_missing(signals[0], file, others)]
 
 
@@ -104,8 +104,13 @@ def choose_channels(channels: list[Channel], config: Config, name: str) -> list[
 
     Raise InputError if it is unclear which, or a channel is not in the file.
     """
-    forces = [channel for channel in channels if _is_force(channel)]
-    if config.channels is None and config.channel is None:
+    forces = [channel for channel in channels if channel.is_force]
+    stated = config.channels
+    if stated is not None and config.channel is not None:
+        refuse(f"{name}: both channel and channels are stated", "one of them", subject="channel")
+    if config.channel is not None:
+        return [_find_channel(channels, config.channel, name)]
+    if stated is None:
         if not forces and len(channels) > 1:
             refuse(
                 f"{name}: has {len(channels)} channels, none of them in a unit of force",
@@ -113,15 +118,10 @@ def choose_channels(channels: list[Channel], config: Config, name: str) -> list[
                 "cells of one plate",
             )
         return forces or channels
-    if config.channels is None:
-        return [_find_channel(channels, config.channel, name)]
-    if config.channel is not None:
-        refuse(f"{name}: both channel and channels are stated", "one of them", subject="channel")
-    if isinstance(config.channels, tuple):
-        cells = [_find_channel(channels, channel, name) for channel in config.channels]
+    if isinstance(stated, tuple):
+        cells = [_find_channel(channels, channel, name) for channel in stated]
         if len({cell.number for cell in cells}) < len(cells):
-            text = f"channels = {shown(config.channels)} names one channel twice"
-            refuse(f"{name}: {text}", "each once")
+            refuse(f"{name}: channels = {shown(stated)} names one channel twice", "each once")
         return cells
     cells = forces or channels
     if len(cells) < 2 or (not forces and len({cell.unit for cell in cells}) > 1):  # noqa: PLR2004
@@ -129,12 +129,14 @@ def choose_channels(channels: list[Channel], config: Config, name: str) -> list[
             f'{name}: channels = "{SUM}" needs two or more channels of force, or all in one unit',
             f"names of channels, some of {channel_choices(channels)}",
         )
-    refuse_directions([cell.title for cell in cells], name)
+    matches = [AXIS.search(cell.title.rpartition("/")[2].strip().casefold()) for cell in cells]
+    if len({match["axis"] for match in matches if match}) > 1:
+        listed = ", ".join(cell.title for cell in cells)
+        refuse(
+            f'{name}: channels = "{SUM}" would add forces of different directions, {listed}',
+            "the names of the vertical forces, such as channels = 'z1+z2+z3+z4'",
+        )
     return cells
-
-
-def _is_force(channel: Channel) -> bool:
-    return size_of(channel.unit)[0] == "N"
 
 
 def channel_choices(channels: list[Channel]) -> str:
@@ -145,7 +147,7 @@ def channel_choices(channels: list[Channel]) -> str:
     )
 
 
-def _find_channel(channels: list[Channel], channel: int | str | None, name: str) -> Channel:
+def _find_channel(channels: list[Channel], channel: int | str, name: str) -> Channel:
     """Return the channel of a number or name; raise InputError if none or several match."""
     title = str(channel).strip().casefold()
     matching = [entry for entry in channels if channel in {entry.number, entry.name}]
@@ -177,9 +179,21 @@ def _in_newtons(
     name = shown_path(file.name) + (f", {channel.title}" if several else "")
     if channel.n_sample < MIN_SAMPLES:
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
-    rate, notes = _rate(channel, config.sample_rate, name)
+    notes = list(channel.notes)
+    rate = channel.sample_rate if config.sample_rate is None else config.sample_rate
+    if rate is None:
+        refuse(
+            f"{name}: the sample rate is not known",
+            "sample_rate in Hz, or a column of times in s",
+            subject="sample_rate",
+        )
+    if not RATES[0] <= rate <= RATES[1]:
+        refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    if channel.sample_rate not in {None, rate}:
+        of_file = {"of_file": channel.sample_rate or 0.0}
+        notes.append(Note("rate_replaced", value=rate, unit="Hz", others=of_file))
     unit, unit_notes = _unit(channel, config.unit, calibration, name)
-    notes = [replace(note, subject=name) for note in (*channel.notes, *notes, *unit_notes)]
+    notes += unit_notes
     if channel.unapplied:
         unapplied = shown_text(channel.unapplied)
         if calibration is None:
@@ -189,7 +203,7 @@ def _in_newtons(
                 "calibration = N per stored value, such as 1 if the values are in N",
                 subject="calibration",
             )
-        notes.append(Note("factor_not_applied", name, others={"factor": unapplied}))
+        notes.append(Note("factor_not_applied", others={"factor": unapplied}))
     scale, description, uncertainty = newtons_per_unit(unit, calibration, channel.counts, name)
     # Integers are read as fractions of full scale.
     if channel.counts and unit == "counts":
@@ -198,38 +212,20 @@ def _in_newtons(
         # It refers to the recorded values, before the calibration.
         scale = POLARITIES[config.polarity] * abs(scale)
         if scale < 0:
-            notes.append(Note("sign_stated", name, others={"polarity": config.polarity}))
+            notes.append(Note("sign_stated", others={"polarity": config.polarity}))
     return Signal(
         name=name,
         path=str(file),
         sample_rate=rate,
         n_sample=channel.n_sample,
-        samples=channel.samples
-        if scale == 1
-        else partial(read_scaled, channel.samples, scale, 0.0),
+        samples=channel.samples,
+        scale=scale,
         full_scale=abs(scale) if channel.counts else None,
         date=shown_text(channel.date),
         calibration=description,
         calibration_uncertainty=uncertainty,
-        notes=tuple(notes),
+        notes=tuple(replace(note, subject=name) for note in notes),
     )
-
-
-def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, list[Note]]:
-    """Return the sample rate, Hz, stated or of the file."""
-    rate = channel.sample_rate if stated is None else stated
-    if rate is None:
-        refuse(
-            f"{name}: the sample rate is not known",
-            "sample_rate in Hz, or a column of times in s",
-            subject="sample_rate",
-        )
-    if not RATES[0] <= rate <= RATES[1]:
-        refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    if channel.sample_rate in {None, rate}:
-        return rate, []
-    of_file = {"of_file": channel.sample_rate or 0.0}
-    return rate, [Note("rate_replaced", name, rate, unit="Hz", others=of_file)]
 
 
 def _unit(
@@ -243,45 +239,22 @@ def _unit(
                 f"{name}: the samples are integers, not values in {stated}",
                 "calibration per full scale, such as '10 V/FS, 4 mV/N' or '5000 N/FS'",
             )
-        replaced = Note("unit_replaced", name, unit=stated, others={"of_file": of_file})
+        replaced = Note("unit_replaced", unit=stated, others={"of_file": of_file})
         return stated, [] if of_file in {"", "FS", stated} else [replaced]
-    if of_file:
+    if of_file in RECORDED:
         return of_file, []
     if channel.unit:
         refuse(
             f"{name}: the values are in {shown_text(channel.unit)!r}", f"unit = one of {ALLOWED}"
         )
     if calibration is None:
-        return ASSUMED, [Note("unit_assumed", name, unit="N")]
+        return "N", [Note("unit_assumed", unit="N")]
     if not isinstance(calibration, str | Calibration):
         return "", []
     unit = unit_of_chain(calibration)
-    if not unit or (unit == "FS" and not channel.may_be_fractions):
+    if not unit:
         refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
-    return unit, [Note("unit_of_calibration", name, unit=unit)]
-
-
-def _oriented(signal: Signal, polarity: str | None) -> Signal:
-    """Return a signal with the sign of a compression, and notes on its peak.
-
-    A single load cell may be lifted, so that the sum decides on the sign.
-    """
-    notes: list[Note] = []
-    up, down = find_peaks(signal)
-    if not polarity and max(up, down) < MIN_PEAK_RATIO * min(up, down):
-        refuse(
-            f"{signal.name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
-            "polarity = 'positive' or 'negative', the sign of a compression",
-            subject="polarity",
-        )
-    if not polarity and down > up:
-        notes.append(Note("sign_changed", signal.name, -down, unit="N"))
-        signal, up, down = signal.scaled(-1.0), down, up
-    is_assumed = any(note.code == "unit_assumed" for note in signal.notes)
-    notes += check_peak(up, down, signal.name, assumed=is_assumed)
-    if signal.cells:
-        notes += check_signs(signal.cells, up)
-    return replace(signal, notes=(*signal.notes, *notes))
+    return unit, [Note("unit_of_calibration", unit=unit)]
 
 
 def _with_missing(signal: Signal, file: Path, others: list[Channel]) -> Signal:

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.base.units import factor_to
+from thud.base.units import factor_to, find_unit
 from thud.recordings.channel import MAX_COLUMNS, MAX_IN_MEMORY, MIN_SAMPLES, Channel
-from thud.recordings.force_units import find_unit
-from thud.recordings.signal import read_scaled
 from thud.recordings.times import rise_uniformly, uniform_grid
 from thud.recordings.words import (
     DATE,
@@ -86,6 +84,16 @@ def vectors_of(
     ]  # fmt: skip
 
 
+def _scaled(
+    read: Callable[[int, int], NDArray[np.float64]],
+    factor: float,
+    offset: float,
+    start: int,
+    stop: int,
+) -> NDArray[np.float64]:
+    return read(start, stop) * factor + offset
+
+
 def _section(
     read: Callable[[Any], Any],
     before: tuple[int, ...],
@@ -149,7 +157,7 @@ def _channel(
         name=vector.array + (f"[{vector.column}]" if vector.column else ""),
         number=number,
         n_sample=vector.n_sample,
-        samples=partial(read_scaled, vector.read, factor, offset),
+        samples=partial(_scaled, vector.read, factor, offset),
         unit=unit,
         sample_rate=rate or find_rate(entries),
         date=find_word(entries, DATE) or since,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.recordings import load_cells, polarity, quantization
-from thud.recordings.checks import aliasing, clipping, copies, gaps, jumps, outliers
+from thud.recordings import quantization, signs
+from thud.recordings.checks import aliasing, cells, clipping, copies, gaps, jumps, outliers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,9 +44,9 @@ CHECKS = {
     ),
     # Of what is more or less than a drop: where it is read or averaged.
     "other": (
-        Check(polarity.check_peak, "a wrong sign, unit or calibration",
+        Check(signs.check_peak, "a wrong sign, unit or calibration",
               "kN in place of N 60 dB"),
-        Check(load_cells.check_cells, "load cells that carry no force or count twice",
+        Check(cells.check, "load cells that carry no force or count twice",
               "one of four cells 2.5 dB"),
         Check(copies.check, "the same drop twice, and load cells that are averaged",
               "a scatter of zero, and for four cells 12 dB"),

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from thud.base.checks import refuse
-from thud.recordings.load_cells import HINT
+from thud.recordings.signs import HINT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -70,7 +70,6 @@ def read_channels(path: Path) -> list[Channel]:
             sample_rate=rate,
             counts=counts,
             date=date,
-            may_be_fractions=True,
         )
         for column in range(columns)
     ]
