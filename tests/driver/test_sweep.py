@@ -21,7 +21,7 @@ import thud
 from thud import cli
 from thud.base import tables, units
 from thud.base._schema import MODELS, SAMPLE_QUANTITIES
-from thud.base.units import MULTIPLES, scaled
+from thud.base.units import powers_of, scaled
 from thud.case.keys import known_keys, with_values
 from thud.studies import directory, fit, samples, sampling, sweep
 
@@ -132,7 +132,7 @@ def test_examples_are_true(module: ModuleType) -> None:
 def test_every_unit_of_a_key_has_multiples() -> None:
     for model in MODELS.values():
         for key in known_keys(thud.Case(model=model())).values():
-            assert MULTIPLES[key.unit][key.unit or "1"] == 0, key
+            assert powers_of(key.unit)[key.unit or "1"] == 0, key
             assert key.meaning
             assert (key.kind == "choice") == bool(key.choices)
 

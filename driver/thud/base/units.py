@@ -1,4 +1,4 @@
-"""SI units and their multiples by powers of ten."""
+"""Units of keys and of files: base unit and size of each."""
 
 from __future__ import annotations
 
@@ -8,51 +8,44 @@ from decimal import Decimal
 
 from thud.base.checks import refuse, require_kind, shown, suggestion
 
-# For the SI unit of a key, the allowed units and their powers of ten.
-MULTIPLES: dict[str, dict[str, int]] = {
-    "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
-    "s": {"s": 0, "ms": -3, "us": -6},
-    "Hz": {"Hz": 0, "kHz": 3},
-    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm2": 6, "N/m2": 0, "hPa": 2, "bar": 5},
-    "N": {"N": 0, "kN": 3},
-    "kg": {"kg": 0, "g": -3},
-    "kg/m3": {"kg/m3": 0, "g/cm3": 3},
-    "N/m": {"N/m": 0, "kN/m": 3, "N/mm": 3},
-    "N/m3": {"N/m3": 0, "kN/m3": 3, "MN/m3": 6},
-    "m3": {"m3": 0},
-    "m/s2": {"m/s2": 0},
-    "s/m": {"s/m": 0, "ms/m": -3},
-    "degC": {"degC": 0},
-    "K": {"K": 0},
-    "": {"1": 0, "%": -2},
-}
-# Factors of further units in files of instruments and spreadsheets, by SI unit or base unit.
-_FURTHER: dict[str, dict[str, float]] = {
-    "N": {"MN": 1e6, "mN": 1e-3, "uN": 1e-6, "daN": 10.0, "kgf": 9.80665, "kp": 9.80665,
-          "lbf": 4.4482216152605},
+# By base unit, that of a key of this dimension: sizes of units in it.
+SIZES: dict[str, dict[str, float]] = {
+    "N": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "uN": 1e-6, "daN": 10.0, "kgf": 9.80665,
+          "kp": 9.80665, "lbf": 4.4482216152605},
     "V": {"V": 1.0, "mV": 1e-3, "uV": 1e-6},
     "pC": {"pC": 1.0, "nC": 1e3},
     "counts": {"counts": 1.0},
     "FS": {"FS": 1.0},
-    "s": {"ns": 1e-9, "min": 60.0, "h": 3600.0},
-    "Hz": {"MHz": 1e6},
-    "m": {"nm": 1e-9},
+    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "Hz": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
+    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
     "m/s": {"m/s": 1.0, "mm/s": 1e-3},
-    "m/s2": {"mm/s2": 1e-3, "g": 9.80665},
+    "m/s2": {"m/s2": 1.0, "mm/s2": 1e-3, "g": 9.80665},
+    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "N/m2": 1.0, "hPa": 1e2,
+           "bar": 1e5},
+    "degC": {"degC": 1.0},
+    "K": {"K": 1.0},
     "dB": {"dB": 1.0, "dB(Z)": 1.0},
     "deg": {"deg": 1.0, "rad": 180 / math.pi},
     "m/(Ns)": {"m/(Ns)": 1.0, "mm/(Ns)": 1e-3},
     "m/N": {"m/N": 1.0, "mm/N": 1e-3},
     "m/(Ns2)": {"m/(Ns2)": 1.0, "1/kg": 1.0, "g/N": 9.80665},
+    # Of keys only: in the title of a column "1", "g" or "m3" is no such unit.
+    "": {"1": 1.0, "%": 1e-2},
+    "kg": {"kg": 1.0, "g": 1e-3},
+    "kg/m3": {"kg/m3": 1.0, "g/cm3": 1e3},
+    "N/m": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3},
+    "N/m3": {"N/m3": 1.0, "kN/m3": 1e3, "MN/m3": 1e6},
+    "m3": {"m3": 1.0},
+    "s/m": {"s/m": 1.0, "ms/m": 1e-3},
 }  # fmt: skip
-# By unit of a file: SI unit or base unit, and its factor.
-UNITS: dict[str, tuple[str, float]] = {
-    unit: (base, factor)
-    for base in ("N", "s", "Hz", "m", "m/s2", "Pa", "degC", "K", *_FURTHER)
-    for unit, factor in (
-        {unit: float(f"1e{power}") for unit, power in MULTIPLES.get(base, {}).items()}
-        | _FURTHER.get(base, {})
-    ).items()
+_OF_KEYS = {"", "kg", "kg/m3", "N/m", "N/m3", "m3", "s/m"}
+# By unit of a file: base unit, and size in it.
+UNITS = {
+    unit: (base, size)
+    for base, sizes in SIZES.items()
+    if base not in _OF_KEYS
+    for unit, size in sizes.items()
 }
 # Other spellings, in lower case and without blanks.
 SPELLINGS = {
@@ -119,17 +112,26 @@ def factor_to(unit: str, text: str, label: str, allowed: str = "") -> float:
     return size / UNITS[unit][1]
 
 
+def powers_of(key_unit: str) -> dict[str, int]:
+    """Return the units of a key, with the power of ten that converts each to that of the key.
+
+    >>> powers_of("s")
+    {'s': 0, 'ms': -3, 'us': -6, 'ns': -9}
+    """
+    powers = {unit: round(math.log10(size)) for unit, size in SIZES[key_unit].items()}
+    return {u: power for u, power in powers.items() if scaled(1.0, power) == SIZES[key_unit][u]}
+
+
 def power_of(unit: object, key_unit: str, label: str) -> int:
     """Return the power of ten that converts a unit to the unit of a key.
 
     Raise InputError if the unit does not fit; its message begins with `label`.
     """
-    # Other units have no multiples.
-    multiples = MULTIPLES.get(key_unit, {key_unit: 0})
-    if not isinstance(unit, str) or unit not in multiples:
-        hint = suggestion(unit, multiples)
-        refuse(f"{label}: unit {shown(unit)} does not fit{hint}", ", ".join(multiples))
-    return multiples[unit]
+    powers = powers_of(key_unit)
+    if not isinstance(unit, str) or unit not in powers:
+        hint = suggestion(unit, powers)
+        refuse(f"{label}: unit {shown(unit)} does not fit{hint}", ", ".join(powers))
+    return powers[unit]
 
 
 def quantity(text: str) -> float:
@@ -151,7 +153,7 @@ def quantity(text: str) -> float:
     0.032
     """
     require_kind("quantity", text, str)
-    units = {unit: power for multiples in MULTIPLES.values() for unit, power in multiples.items()}
+    units = {unit: power for base in SIZES for unit, power in powers_of(base).items()}
     match = NUMBER.match(text)
     if match is None or not math.isfinite(float(match[1])):
         refuse(f"quantity = {shown(text)} is not a number and its unit", "such as '32 mm'")
@@ -188,6 +190,5 @@ def frequency_text(frequency: float) -> str:
 
 def display_unit(unit: str, value: float) -> tuple[str, float]:
     """Return the largest unit in which a value is at least 1, and this unit in SI units."""
-    sizes = {name: scaled(1.0, MULTIPLES[unit][name]) for name in DISPLAY_UNITS.get(unit, ())}
-    usable = [(name, size) for name, size in sizes.items() if size <= abs(value)]
-    return usable[-1] if usable and value else (unit, 1.0)
+    names = [name for name in DISPLAY_UNITS.get(unit, ()) if SIZES[unit][name] <= abs(value)]
+    return (names[-1], SIZES[unit][names[-1]]) if names and value else (unit, 1.0)
