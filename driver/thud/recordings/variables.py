@@ -21,9 +21,6 @@ from thud.recordings.words import (
     find_unapplied,
     find_word,
     is_time,
-    neutral_value,
-    plain,
-    read_number,
     split_title,
     text_of,
 )
@@ -35,7 +32,7 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
 
-# Maximum number of times.
+# Maximum number of times that are read.
 MAX_TIMES = MAX_IN_MEMORY // 8
 
 Header = list[tuple[str, str]]
@@ -84,16 +81,6 @@ def vectors_of(
     ]  # fmt: skip
 
 
-def _scaled(
-    read: Callable[[int, int], NDArray[np.float64]],
-    factor: float,
-    offset: float,
-    start: int,
-    stop: int,
-) -> NDArray[np.float64]:
-    return read(start, stop) * factor + offset
-
-
 def _section(
     read: Callable[[Any], Any],
     before: tuple[int, ...],
@@ -105,13 +92,10 @@ def _section(
 
 
 def header_entry(key: str, value: object) -> tuple[str, str]:
-    """Return a name and its value as text; of several values those of units and of factors only."""
-    title = key.rpartition("/")[2]
-    if not isinstance(value, np.ndarray | list) or np.size(value) == 1:
-        return key, text_of(value)
-    if plain(title) not in UNIT and neutral_value(title) is None:
-        return key, ""
-    return key, ", ".join(map(str, np.ravel(np.asarray(value))[:MIN_SAMPLES])) or "nothing"
+    """Return a name and its value as text; of an array up to eight values."""
+    if isinstance(value, np.ndarray | list) and np.size(value) != 1:
+        return key, ", ".join(map(str, np.ravel(value)[:MIN_SAMPLES]))
+    return key, text_of(value)
 
 
 def channels_of_vectors(vectors: list[Vector], header: Header, name: str) -> list[Channel]:
@@ -137,7 +121,7 @@ def _channel(
 ) -> Channel:
     own, near, entries = _header_of(vector, header)
     notes: tuple[Note, ...] = ()
-    rate, since = find_rate(near), ""
+    rate = find_rate(near)
     fitting = [
         time
         for time in times
@@ -146,23 +130,22 @@ def _channel(
     group = max((time.group for time in fitting), key=len, default="")
     inner = [time for time in fitting if time.group == group]
     # Times override a rate in the header of an outer group; of several it is not known which apply.
-    if len(inner) == 1 and (rate is None or inner[0].column):
-        rate, since, notes = _rate(inner[0], header, name)
+    if len(inner) == 1 and rate is None:
+        rate, notes = _rate(inner[0], header, name)
     stated, titled = find_word(own, UNIT), split_title(vector.title)[1]
     unit = stated or titled or find_word(entries, UNIT)
     if find_unit(stated) and find_unit(titled) and find_unit(stated) != find_unit(titled):
         unit = f"{stated} by the attribute, {titled} by the name"
-    factor, offset, applied = _scaling(own)
     return Channel(
         name=vector.array + (f"[{vector.column}]" if vector.column else ""),
         number=number,
         n_sample=vector.n_sample,
-        samples=partial(_scaled, vector.read, factor, offset),
+        samples=vector.read,
         unit=unit,
         sample_rate=rate or find_rate(entries),
-        date=find_word(entries, DATE) or since,
+        date=find_word(entries, DATE),
         notes=notes,
-        unapplied=find_unapplied((e for e in entries if e not in applied), unit),
+        unapplied=find_unapplied(entries, unit),
     )
 
 
@@ -186,55 +169,32 @@ def _header_of(vector: Vector, header: Header) -> tuple[Header, Header, Header]:
     return own, near, [item for _, item in entries]
 
 
-def _scaling(own: Header) -> tuple[float, float, Header]:
-    """Return factor and offset by the attributes of NetCDF, and those that are applied.
-
-    Numbers that are not finite, and a factor of zero, are not applied.
-    """
-    factor, offset, applied = 1.0, 0.0, []
-    for entry in own:
-        number, unit = read_number(entry[1]) or (math.nan, "")
-        key = plain(entry[0]) if math.isfinite(number) and not unit else ""
-        if key == "scalefactor" and number:
-            factor = number
-        elif key == "addoffset":
-            offset = number
-        else:
-            continue
-        applied.append(entry)
-    return factor, offset, applied
-
-
 def _holds_times(vector: Vector) -> bool:
     """Whether a vector holds times by its name, or by the end of its name and its values.
 
     The first column of a matrix holds times if it rises.
     """
-    if vector.column:
-        may_be = vector.column == 1
-    elif is_time(*split_title(vector.title)):
+    if not vector.column and is_time(*split_title(vector.title)):
         return True
-    else:
-        may_be = vector.title.rpartition("_")[2].casefold() in TIME
+    may_be = vector.column == 1 or (
+        not vector.column and vector.title.rpartition("_")[2].casefold() in TIME
+    )
     return may_be and rise_uniformly(vector.read(0, min(MAX_TIMES, vector.n_sample)))
 
 
-def _rate(time: Vector, header: Header, name: str) -> tuple[float | None, str, tuple[Note, ...]]:
-    """Return sample rate, Hz, the date of time zero if it is stated, and notes, from times.
+def _rate(time: Vector, header: Header, name: str) -> tuple[float | None, tuple[Note, ...]]:
+    """Return the sample rate, Hz, and notes, from the first times of a vector.
 
     The rate is None if it is not known whether the times were multiplied by a factor.
     """
-    label = f"{name}: {time.array}"
-    if time.n_sample > MAX_TIMES:
-        refuse(f"{label}: {time.n_sample} times", f"up to {MAX_TIMES}, or a sample_rate")
-    own = _header_of(time, header)[0]
-    scale, since = 1.0, ""
-    factor, offset, applied = _scaling(own)
+    label, own = f"{name}: {time.array}", _header_of(time, header)[0]
+    scale = 1.0
     if not time.column:
-        if find_unapplied((entry for entry in own if entry not in applied), "s"):
-            return None, "", ()
-        unit, _, since = find_word(own, UNIT).partition(" since ")
-        scale = factor_to("s", unit or split_title(time.title)[1], label)
-    values = (time.read(0, time.n_sample) * factor + offset) * scale
+        if find_unapplied(own, "s"):
+            return None, ()
+        # NetCDF: "seconds since 2024-05-06".
+        unit = find_word(own, UNIT).partition(" since ")[0] or split_title(time.title)[1]
+        scale = factor_to("s", unit, label)
+    values = time.read(0, min(MAX_TIMES, time.n_sample)) * scale
     _, step, notes = uniform_grid(values, label)
-    return 1 / step, since, notes
+    return 1 / step, notes

@@ -19,6 +19,7 @@ from thud.recordings.variables import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -27,16 +28,21 @@ if TYPE_CHECKING:
 LOCKING = False
 # Maximum size of a header value, bytes.
 MAX_VALUE = 4096
+# Factor and offset of NetCDF, which are applied, and their defaults.
+SCALING = {"scale_factor": 1.0, "add_offset": 0.0}
 # Name under which MATLAB stores the contents of cells.
 CELLS = "#refs#"
 # MATLAB classes that are stored as numbers but are no recordings.
 MATLAB_OTHERS = {b"cell", b"struct", b"function_handle", b"canonical empty"}
 
 
-def _read(path: Path, key: str, index: tuple[int | slice, ...]) -> NDArray[np.generic]:
+def _read(
+    path: Path, key: str, scaling: dict[str, float], index: tuple[int | slice, ...]
+) -> NDArray[np.float64]:
     h5py = library("h5py", "HDF5")
     with guarded(path, "HDF5"), h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
-        return np.asarray(file[key][index])
+        values = np.asarray(file[key][index], dtype=np.float64)
+    return values * scaling["scale_factor"] + scaling["add_offset"]
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -53,14 +59,17 @@ def read_channels(path: Path) -> list[Channel]:
         if key.startswith(CELLS):
             return
         matlab_class = entry.attrs.get("MATLAB_class")
-        header.extend(_attributes(h5py, f"{key}/".lstrip("/"), entry))
-        if not isinstance(entry, h5py.Dataset) or entry.shape is None:
+        is_dataset = isinstance(entry, h5py.Dataset)
+        scaling = _scaling(entry) if is_dataset else {}
+        header.extend(_attributes(h5py, f"{key}/".lstrip("/"), entry, scaling))
+        if not is_dataset or entry.shape is None:
             return
+        read = partial(_read, path, key, SCALING | scaling)
         if matlab_class == b"char":
             header.append((key, "".join(map(chr, entry[()].ravel()[:MAX_VALUE]))))
         elif matlab_class in MATLAB_OTHERS:
             return
-        elif found := vectors_of(key, entry.dtype.kind, entry.shape, partial(_read, path, key)):
+        elif found := vectors_of(key, entry.dtype.kind, entry.shape, read):
             if entry.is_virtual or entry.external:
                 refuse(f"{name}: {shown_text(key)}: is stored in another file", "the other file")
             vectors.extend(found)
@@ -73,12 +82,25 @@ def read_channels(path: Path) -> list[Channel]:
         return channels_of_vectors(vectors, header, name)
 
 
-def _attributes(h5py: Any, owner: str, entry: Any) -> Header:  # noqa: ANN401 - a library
-    """Return the attributes of an object that are numbers or texts."""
+def _scaling(dataset: Any) -> dict[str, float]:  # noqa: ANN401 - of the library
+    """Return the factor and the offset of a dataset that are applied: finite, the factor not 0."""
+    values = {key: np.asarray(dataset.attrs[key]) for key in SCALING if key in dataset.attrs}
+    return {
+        key: value.item()
+        for key, value in values.items()
+        if value.size == 1 and value.dtype.kind in "iuf" and np.isfinite(value).all()
+        and (value.any() or key == "add_offset")
+    }  # fmt: skip
+
+
+def _attributes(
+    h5py: Any, owner: str, entry: Any, applied: Collection[str]  # noqa: ANN401 - of a library
+) -> Header:  # fmt: skip
+    """Return the attributes of an object that are numbers or texts and are not applied."""
     header = []
     for key in entry.attrs:
-        value = entry.attrs[key] if _is_header(h5py, entry.attrs.get_id(key)) else None
-        if value is not None:
+        if key not in applied and _is_header(h5py, entry.attrs.get_id(key)):
+            value = entry.attrs[key]
             is_empty = isinstance(value, h5py.Empty)
             header.append(header_entry(owner + key.replace("/", " "), [] if is_empty else value))
     return header
