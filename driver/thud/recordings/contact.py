@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,6 @@ from numpy.polynomial.legendre import leggauss
 from scipy.special import comb
 
 from thud.base.note import Note
-from thud.impact.contact_time import THRESHOLD
 from thud.level.levels import low_pass
 from thud.recordings.background import MAINS, N_HARMONIC, uniform_cells
 from thud.recordings.differences import robust_deviation
@@ -38,9 +37,6 @@ GATE_RATE = 10_000.0
 # Duration of the impulse response of a correction before and after the impulse, in periods of the
 # highest corrected frequency.
 CORRECTION_PERIODS = 4.0
-# Standard uncertainty of begin and end due to what a correction loses, in periods of the highest
-# corrected frequency: it spreads an edge over half of one, a quarter of that up to which it passes.
-CORRECTION_ERROR = 0.08
 # Number of positions of a background within a quantization step.
 N_PHASE = 16
 # Weights of neighboring samples that give values between the steps.
@@ -208,12 +204,6 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
     )
     length = int(MAX_BACKGROUND * rate)
     span = (max(0, gate[0] - length), min(len(force), gate[1] + length))
-    correction_error = CORRECTION_ERROR / chain.highest if chain else 0.0
-    step_errors = _step_errors(background, force, rate, begin.value, end.value)
-    begin, end = (
-        replace(edge, uncertainty=math.hypot(edge.uncertainty, correction_error, error))
-        for edge, error in zip((begin, end), step_errors, strict=True)
-    )
     return Contact(
         touch,
         release,
@@ -229,25 +219,6 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
         background,
         rate,
     )
-
-
-def _step_errors(
-    background: Background, force: NDArray[np.float64], rate: float, begin: float, end: float
-) -> tuple[float, float]:
-    """Return the standard deviations of begin and end of a contact by quantization, s.
-
-    Begin and end are in s from the first sample of the force, N. Where the background lies within a
-    step, offset and samples are uncertain by half a step and a step: the edges by the time that the
-    force needs for both.
-    """
-    step, offset = background.quantization.step, background.quantization.offset
-    if not offset:
-        return 0.0, 0.0
-    level = THRESHOLD * background.peak + 1.5 * step
-    above = np.flatnonzero(force > level) / rate
-    inside = above[(above > begin) & (above < end)]
-    first, last = (inside[0], inside[-1]) if inside.size else (end, begin)
-    return offset / step * float(first - begin), offset / step * float(end - last)
 
 
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:

@@ -45,6 +45,9 @@ SMOOTHING = np.array([0.25, 0.5, 0.25])
 # elements, whose last force is below 1 % of the peak; of begin and end.
 TOUCH_ERRORS = (40e-6, 140e-6)
 EDGE_ERROR = 7e-6
+# The same due to what a correction loses, in periods of the highest corrected frequency: it spreads
+# an edge over half of one, a quarter of that up to which it passes.
+CORRECTION_ERROR = 0.08
 # Number of candidate times in a search, and of searches. The next search covers the mean plus and
 # minus SEARCH_DEVIATIONS standard deviations of the result.
 N_TIME = 33
@@ -83,8 +86,7 @@ def find_edge(
     highest = np.maximum.accumulate(np.maximum(level, 0.0))
     unit = np.eye(len(level))
     noise += (MISFIT * np.minimum.outer(highest, highest)) ** 2 + SAMPLE_ERROR**2 * unit
-    factor = np.linalg.cholesky(noise)
-    whiten = solve_triangular(factor, unit, lower=True, check_finite=False)
+    whiten = solve_triangular(np.linalg.cholesky(noise), unit, lower=True, check_finite=False)
     shapes, averaged = _shapes(1e3 / rate)
     known = whiten @ level
     low, high = side * end, float(time[-1])
@@ -107,13 +109,21 @@ def find_edge(
         low, high = max(low, mean - reach), min(high, mean + reach)
     amplitude = np.maximum(score / information, 1e-9)
     pairs = zip(THRESHOLD / amplitude.T, averaged.T, strict=True)
-    delay = np.array([np.interp(level, rise, DELAYS) for level, rise in pairs])
+    delay = np.array([np.interp(part, shape, DELAYS) for part, shape in pairs])
     begin = touch[:, None] + 1e-3 * delay.T
     middle = float((weight * begin).sum())
     variance = float((weight * (begin - middle) ** 2).sum()) + spacing + EDGE_ERROR**2
+    correction = CORRECTION_ERROR / section.chain.highest if section.chain else 0.0
+    quantization, rise = background.quantization, 0.0
+    if quantization.offset:
+        # Where the background lies within a step, offset and samples are uncertain by half a step
+        # and a step: the edge by the time that the force needs for both.
+        limit = THRESHOLD * background.peak + 1.5 * quantization.step
+        later = side * np.flatnonzero(force > limit) / rate
+        rise = quantization.offset / quantization.step * (later[later > middle].min() - middle)
     return (
         Estimate(side * mean, math.hypot(deviation, TOUCH_ERRORS[side < 0])),
-        Estimate(side * middle, math.sqrt(variance)),
+        Estimate(side * middle, math.hypot(math.sqrt(variance), correction, rise)),
     )
 
 
