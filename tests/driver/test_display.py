@@ -83,6 +83,10 @@ def test_a_table_has_one_list_of_columns(flagship: thud.Impact) -> None:
         table = result.to_dataframe()
         assert len(table) == len(result.rows()) - 1
         assert table.columns[0].endswith("_Hz")
+        data = result.to_xarray()
+        (axis,) = data.dims
+        assert data[axis].attrs["units"] == "Hz"
+        assert len(data.data_vars) == len(table.columns) - 1
 
 
 def test_unknown_criteria_are_not_met(flagship: thud.Impact) -> None:

@@ -269,13 +269,12 @@ def test_point_may_be_an_array() -> None:
 def test_levels_of_both_forces_are_those_of_the_records(moved: thud.FloorImpact) -> None:
     contact, blocked = moved.floor_force, moved.blocked_force
     for bands in ("octave", "third"):
-        for method in ("exact", "fft"):
-            first, second = (
-                thud.force_exposure_levels(force, moved.sample_rate, bands, method)  # type: ignore[arg-type]
-                for force in (contact, blocked)
-            )
-            assert (moved.blocked_levels(bands, method) == second).all()  # type: ignore[arg-type]
-            assert moved.difference(bands, method) == pytest.approx(first - second)  # type: ignore[arg-type]
+        first, second = (
+            thud.force_exposure_levels(force, moved.sample_rate, bands)  # type: ignore[arg-type]
+            for force in (contact, blocked)
+        )
+        assert (moved.blocked_levels(bands) == second).all()  # type: ignore[arg-type]
+        assert moved.difference(bands) == pytest.approx(first - second)  # type: ignore[arg-type]
     energy = moved.injected_energy()
     rows = moved.rows()[1:]
     columns = (moved.blocked_levels(), moved.levels(force="floor"), moved.difference())

@@ -15,6 +15,7 @@ from thud.cli import main
 from thud.floors import mobility_fit
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 FREQUENCY = np.linspace(10, 1000, 300)
@@ -68,26 +69,21 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     assert exact.error < 1e-10
     assert not exact.notes
     assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
-    assert exact.values["damping_ratio(2)"] == exact.floor.damping_ratio[1]
     table = exact.to_dataframe()
     np.testing.assert_allclose(table["fitted"], table["measured"], rtol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["concrete 300", "joists, 1 board"])
-def test_plausible_floors_raise_no_warning_of_units(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("concrete 300", 1), ("joists, 1 board", 1), ("concrete 180", 1e3), ("concrete 180", 1e-3)],
+)
+def test_mobilities_that_no_floor_has_raise_a_warning(name: str, factor: float) -> None:
     frequency = np.linspace(20.0, 700.0, 200)
-    values = thud.mobility(thud.construction(name).floor, frequency)
-    found = thud.fit_mobility((frequency, values)).notes
-    assert "mobility_implausible" not in [note.code for note in found]
-
-
-@pytest.mark.parametrize("factor", [1e3, 1e-3])
-def test_implausible_unit_raises_a_warning(factor: float) -> None:
-    frequency = np.linspace(20.0, 700.0, 200)
-    values = factor * thud.mobility(thud.construction("concrete 180").floor, frequency)
-    warnings = thud.fit_mobility((frequency, values), order=8).notes
-    assert warnings[0].code == "mobility_implausible"
-    assert not warnings[0].low <= warnings[0].value <= warnings[0].high
+    values = factor * thud.mobility(thud.construction(name).floor, frequency)
+    notes = thud.fit_mobility((frequency, values), order=8).notes
+    found = [note for note in notes if note.code == "mobility_implausible"]
+    assert len(found) == (factor != 1)
+    assert all(not note.low <= note.value <= note.high for note in found)
 
 
 def test_impedance_is_named_where_its_fit_is_refused() -> None:
@@ -215,23 +211,34 @@ def test_other_universal_files_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("frequency", "values", "words"),
+    ("table", "options", "words"),
     [
-        (FREQUENCY, -MOBILITY, naming("mobility", "real")),
-        (FREQUENCY[::-1], MOBILITY, naming("point 2", "Hz")),
-        (FREQUENCY, np.where(S.imag > 900, np.nan, MOBILITY), naming("Hz", "finite")),
-        (FREQUENCY, np.where(S.imag > 900, 0, MOBILITY), naming("Hz", 0)),
-        (FREQUENCY[:1], MOBILITY[:1], naming(1, "0 Hz")),
-        (FREQUENCY, MOBILITY[:5], naming(300, 5)),
-        (-FREQUENCY[::-1], MOBILITY, naming(300, "octave", "500 Hz")),
-        (1e5 * FREQUENCY, MOBILITY, naming(300, "octave", "500 Hz")),
+        ((FREQUENCY, -MOBILITY), {"order": 4}, naming("mobility", "real")),
+        ((FREQUENCY[::-1], MOBILITY), {"order": 4}, naming("point 2", "Hz")),
+        ((FREQUENCY, np.where(S.imag > 900, 0, MOBILITY)), {}, naming("Hz", 0)),
+        ((FREQUENCY[:1], MOBILITY[:1]), {}, naming(1, "two or more")),
+        ((FREQUENCY, MOBILITY[:5]), {}, naming(300, 5)),
+        ((-FREQUENCY[::-1], MOBILITY), {}, naming(300, "octave", "500 Hz")),
+        ((1e5 * FREQUENCY, MOBILITY), {}, naming(300, "octave", "500 Hz")),
+        # Two frequencies 0.08 Hz apart gave a floor with an error of 0.085 %.
+        (([10.0, 10.08], [1e-5 + 1e-6j] * 2), {}, naming(2, "octave", "31.5")),
+        (([30.0, 60.0], [1e-5] * 2), {}, naming(2, "octave", "31.5")),
+        (([40.0, 50.0, 60.0], [1e-5] * 3), {}, naming(3, "octave", "31.5")),
+        (([], []), {}, naming("measurement", 0)),
+        ((["a"], ["b"]), {}, naming("frequency", "real")),
+        ((FREQUENCY, MOBILITY, MOBILITY), {}, naming("tuple", 3)),
+        (([10, 20, 30], [1, np.nan, 1]), {}, naming("measurement", "20 Hz", "finite")),
+        (None, {}, naming("table", None)),
+        (7, {}, naming("table", 7)),
+        *(
+            ((FREQUENCY, MOBILITY), {"order": order}, naming("order", repr(order), 1, 64))
+            for order in (0, 2.5, "a", True, 65, 300)
+        ),
     ],
 )
-def test_tables_of_no_floor_are_refused(
-    frequency: np.ndarray, values: np.ndarray, words: str
-) -> None:
+def test_bad_input_is_named(table: Any, options: dict[str, Any], words: str) -> None:  # noqa: ANN401
     with pytest.raises(thud.InputError, match=words):
-        thud.fit_mobility((frequency, values), order=4)
+        thud.fit_mobility(table, **options)
 
 
 def test_values_that_overflow_end_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
@@ -395,28 +402,6 @@ def test_quantity_in_the_titles_counts(tmp_path: Path, exact: thud.MobilityFit) 
         thud.fit_mobility(path, quantity="mobility")
 
 
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        (([], []), naming("measurement", 0)),
-        ((["a"], ["b"]), naming("frequency", "real")),
-        ((FREQUENCY, MOBILITY, MOBILITY), naming("tuple", 3)),
-        (([10, 20, 30], [1, np.nan, 1]), naming("measurement", "20 Hz", "finite")),
-        (None, naming("table", None)),
-        (7, naming("table", 7)),
-    ],
-)
-def test_tables_that_are_none_are_refused(table: Any, words: str) -> None:  # noqa: ANN401
-    with pytest.raises(thud.InputError, match=words):
-        thud.fit_mobility(table)
-
-
-@pytest.mark.parametrize("order", [0, 2.5, "a", True, 65, 300])
-def test_orders_that_are_none_are_refused(order: Any) -> None:  # noqa: ANN401
-    with pytest.raises(thud.InputError, match=naming("order", repr(order), 1, 64)):
-        thud.fit_mobility((FREQUENCY, MOBILITY), order=order)
-
-
 def scaled_fit(exact: thud.MobilityFit, factor: np.ndarray) -> thud.MobilityFit:
     """Return a fit whose measurement is the floor times a factor."""
     return replace(exact, measured=factor * exact.mobility(exact.frequency))
@@ -447,12 +432,6 @@ def test_octaves_that_are_not_covered_have_no_error(exact: thud.MobilityFit) -> 
         assert list(found.band_errors()) == expected
 
 
-def test_real_parts_that_are_not_positive_have_no_level(exact: thud.MobilityFit) -> None:
-    assert all(
-        np.isnan(level) for _, level in scaled_fit(exact, -np.ones(300)).band_errors().values()
-    )
-
-
 @pytest.mark.parametrize(
     ("factor", "free_error", "count"),
     [
@@ -472,62 +451,45 @@ def test_fits_that_miss_raise_a_warning(
     assert len(found.notes) == count
 
 
+def choose(
+    monkeypatch: pytest.MonkeyPatch, count: int, error: Callable[[int], float]
+) -> tuple[int, list[int]]:
+    """Return the number of poles of a fit to lines, and those that were tried."""
+    tried = []
+
+    def fit(*arguments: Any) -> Any:  # noqa: ANN401
+        tried.append(arguments[3])
+        return SimpleNamespace(order=arguments[3], error=error(arguments[3]))
+
+    monkeypatch.setattr(mobility_fit, "_fit", fit)
+    found: Any = mobility_fit._best_fit("a", np.arange(1.0, count + 1), np.ones(count, complex))  # noqa: SLF001
+    return found.order, tried
+
+
+@pytest.mark.parametrize("n_line", [20, 25, 40, 100, 400])
 def test_number_of_poles_has_the_least_information_criterion(
-    monkeypatch: pytest.MonkeyPatch,
+    n_line: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """That of n = 2 lines and k = 2 poles + 1 coefficients is n lg error**2 + k lg n."""
     errors = {2: 0.5, 4: 0.2, 6: 0.1, 8: 0.0995, 10: 0.099, 12: 0.08}
-    tried = []
-
-    def fit(name: str, f: np.ndarray, values: np.ndarray, order: int) -> Any:  # noqa: ANN401
-        del name, f, values
-        tried.append(order)
-        return SimpleNamespace(order=order, error=errors.get(order, 0.0799))
-
-    monkeypatch.setattr(mobility_fit, "_fit", fit)
-    for n_line in (20, 25, 40, 100, 400):
-        tried.clear()
-        found = mobility_fit._best_fit("a", np.arange(1.0, n_line + 1), np.ones(n_line, complex))  # noqa: SLF001
-        count = 2 * n_line
-        criteria = {
-            k: count * np.log(errors.get(k, 0.0799) ** 2) + (2 * k + 1) * np.log(count)
-            for k in tried
-        }
-        assert found.order == min(criteria, key=criteria.__getitem__)  # type: ignore[attr-defined]
-        # Three values for each coefficient; and five numbers in a row without a gain end it.
-        assert all(3 * (2 * k + 1) <= count for k in tried)
-        ended = len(tried) - 1 - tried.index(found.order) == 5  # type: ignore[attr-defined]
-        most = max(k for k in (*range(2, 17, 2), *range(20, 33, 4), 40, 48, 56, 64)
-                   if 3 * (2 * k + 1) <= count)  # fmt: skip
-        assert ended or tried[-1] == most
+    found, tried = choose(monkeypatch, n_line, lambda order: errors.get(order, 0.0799))
+    count = 2 * n_line
+    criteria = {
+        k: count * np.log(errors.get(k, 0.0799) ** 2) + (2 * k + 1) * np.log(count) for k in tried
+    }
+    assert found == min(criteria, key=criteria.__getitem__)
+    # Three values for each coefficient; and five numbers in a row without a gain end it.
+    orders = [k for k in (*range(2, 17, 2), *range(20, 33, 4), 40, 48, 56, 64)
+              if 3 * (2 * k + 1) <= count]  # fmt: skip
+    assert tried == orders[: len(tried)]
+    assert len(tried) - 1 - tried.index(found) == 5 or tried == orders
 
 
 def test_exact_fit_ends_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried = []
-
-    def fit(name: str, f: np.ndarray, values: np.ndarray, order: int) -> Any:  # noqa: ANN401
-        del name, f, values
-        tried.append(order)
-        return SimpleNamespace(order=order, error=1e-8 if order == 4 else 1.1e-8)
-
-    monkeypatch.setattr(mobility_fit, "_fit", fit)
-    found = mobility_fit._best_fit("a", np.arange(1.0, 401), np.ones(400, complex))  # noqa: SLF001
-    assert tried == [2, 4]
-    assert found.order == 4  # type: ignore[attr-defined]
+    error = {4: 1e-8}
+    assert choose(monkeypatch, 400, lambda order: error.get(order, 1.1e-8)) == (4, [2, 4])
     # Few lines have few poles, and one at least.
-    tried.clear()
-    assert mobility_fit._best_fit("a", np.arange(1.0, 3), np.ones(2, complex)).order == 1  # type: ignore[attr-defined]  # noqa: SLF001
-
-
-def test_tables_that_cover_no_octave_are_refused() -> None:
-    """Two frequencies 0.08 Hz apart gave a floor with an error of 0.085 %."""
-    frequency = np.array([10.0, 10.08])
-    values = [1e-5 + 1e-6j, 1e-5 + 1e-6j]
-    for table in (frequency, 100 * frequency / 10, [30.0, 60.0], [40.0, 50.0, 60.0]):
-        with pytest.raises(thud.InputError, match=naming(len(table), "octave", "31.5")):
-            thud.fit_mobility((table, np.resize(values, len(table))))
-    with pytest.raises(thud.InputError, match=naming(1, "two or more")):
-        thud.fit_mobility(([100.0], [1e-5]))
+    assert choose(monkeypatch, 2, lambda _: 1.0) == (1, [1])
 
 
 def test_number_of_poles_agrees_with_its_noun() -> None:

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.display import Displayed
-from thud.base.extras import data_frame
+from thud.base.extras import data_frame, require_extra
 from thud.base.tables import csv_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
+    import xarray as xr
 
     # Values of a column, shape (n_row,), and their format; by title with unit, such as "level, dB".
     Columns = Mapping[str, tuple[Any, str]]
@@ -37,6 +38,21 @@ class Tabulated(Displayed):
         Raise InputError if pandas is not installed.
         """
         return data_frame(self._named())
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the table as a dataset over its first column, with units.
+
+        Raise InputError if xarray is not installed.
+        """
+        with require_extra("studies"):
+            import xarray as xr
+
+        variables: dict[str, Any] = {}
+        for title, (values, _) in self.columns().items():
+            name, _, unit = title.replace(" ", "_").partition(",_")
+            axis = next(iter(variables), name)
+            variables[name] = (axis, np.asarray(values), {"units": unit.replace("_", " ") or "1"})
+        return xr.Dataset(variables)
 
     def to_csv(self) -> str:
         """Return the table of `to_dataframe` as text, with ten digits."""

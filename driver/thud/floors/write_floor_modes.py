@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, require_array
+from thud.base.checks import refuse
 from thud.base.files import replace_file
+from thud.level.levels import finite_array
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Container
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -55,10 +55,10 @@ def write_floor_modes(  # noqa: PLR0913 - a mode, and a grid
     OSError
         If the file cannot be written.
     """
-    frequencies = _finite("frequency", frequency, (1,))
+    frequencies = finite_array("frequency", frequency, (1,))
     n_mode = len(frequencies)
-    grid = _finite("x", x, (1,)), _finite("y", y, (1,))
-    values = _finite("shape", shape, range(4))
+    grid = finite_array("x", x, (1,)), finite_array("y", y, (1,))
+    values = finite_array("shape", shape, range(4))
     if values.shape != (n_mode, *map(len, grid)):
         refuse(f"shape is an array {values.shape}", f"{(n_mode, *map(len, grid))}: modes, x and y")
     rows = {
@@ -80,15 +80,7 @@ def _joined(row: Array) -> str:
 
 def _per_mode(name: str, values: ArrayLike, n_mode: int) -> Array:
     """Return one value for each mode."""
-    array = _finite(name, values, (0, 1))
+    array = finite_array(name, values, (0, 1))
     if array.size not in {1, n_mode}:
         refuse(f"{name} has {array.size} values", f"1, or {n_mode}, one for each mode")
     return np.broadcast_to(array, (n_mode,))
-
-
-def _finite(name: str, values: ArrayLike, dimensions: Container[int]) -> Array:
-    """Return an array of finite numbers; raise InputError if it is none."""
-    array = require_array(name, values, dimensions, "iuf")
-    if not np.isfinite(array).all():
-        refuse(f"{name} has entries that are not finite", "finite numbers")
-    return array

@@ -9,18 +9,18 @@ import numpy as np
 
 from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
-from thud.base.checks import refuse, require_array, require_choice, require_kind, require_pair
+from thud.base.checks import require_choice, require_kind, require_pair
 from thud.base.immutable import Immutable
 from thud.base.tabulated import column_rows
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact
-from thud.level.levels import BANDWIDTHS, force_exposure_levels
+from thud.level.levels import BANDWIDTHS, finite_array, force_exposure_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import BandSet, LevelsMethod
+    from thud.base._schema import BandSet
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,18 +82,13 @@ class FloorImpact(Impact):
         assert self.case.floor is not None  # noqa: S101 - for the type checker
         return self.case.floor
 
-    def blocked_levels(
-        self, bands: BandSet = "octave", method: LevelsMethod | None = None
-    ) -> NDArray[np.float64]:
+    def blocked_levels(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the levels of the force on a rigid floor, dB, shape (n_band,); see `levels`."""
-        method = method or self.case.levels.method
-        return force_exposure_levels(self.blocked_force, self.sample_rate, bands, method)
+        return force_exposure_levels(self.blocked_force, self.sample_rate, bands, self.level_method)
 
-    def difference(
-        self, bands: BandSet = "octave", method: LevelsMethod | None = None
-    ) -> NDArray[np.float64]:
+    def difference(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the level differences contact − blocked force, dB, shape (n_band,)."""
-        return self.levels(bands, method, "floor") - self.blocked_levels(bands, method)
+        return self.levels(bands, force="floor") - self.blocked_levels(bands)
 
     def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
         """Return the energy that the force transfers to the floor, in bands."""
@@ -183,9 +178,7 @@ def mobility(
     array([0.000625])
     """
     require_kind("floor", floor, FloorOptions)
-    frequencies = np.atleast_1d(require_array("frequency", frequency, (0, 1), "iuf"))
-    if not np.isfinite(frequencies).all():
-        refuse("frequency has a value that is not finite", "finite numbers, Hz")
+    frequencies = np.atleast_1d(finite_array("frequency", frequency, (0, 1)))
     points = {} if point is None else {"point": np.array(require_pair("point", point))}
     answer = ask("mobility", case=case_text(Case(floor=floor)), frequency=frequencies, **points)
     return np.asarray(answer["real"] + 1j * answer["imaginary"])

@@ -13,6 +13,8 @@ from thud.base.checks import refuse, refuse_value, require_array, require_choice
 from thud.base.tabulated import Tabulated
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.tabulated import Columns
@@ -145,9 +147,11 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     return int(ask("peak_count", force=record, sample_rate=sample_rate)["peak_count"])
 
 
-def finite_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return an array of one dimension; raise InputError if it is empty or not finite."""
-    array = require_array(name, values, (1,), "iuf")
+def finite_array(
+    name: str, values: ArrayLike, dimensions: Container[int] = (1,)
+) -> NDArray[np.float64]:
+    """Return an array of finite numbers; raise InputError if it is none, or empty."""
+    array = require_array(name, values, dimensions, "iuf")
     if not array.size or not np.isfinite(array).all():
         problem = "has a value that is not finite" if array.size else "is empty"
         refuse(f"{name} {problem}", "finite numbers")

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import CLASS_LIMITS, RATED_BANDS
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_number
+from thud.base.checks import refuse, refuse_value, require_choice, require_number
 from thud.base.display import Displayed
 from thud.level.levels import BANDWIDTHS, finite_array
 
@@ -248,7 +248,7 @@ def standardized_level(
         If a value is not finite, a time or the volume is not positive, or the lengths differ.
     """
     values, times = (
-        finite_array(name, np.atleast_1d(require_array(name, entries, (0, 1))))
+        np.atleast_1d(finite_array(name, entries, (0, 1)))
         for name, entries in (("level", level), ("reverberation_time", reverberation_time))
     )
     if len(times) == 1:

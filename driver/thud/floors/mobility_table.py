@@ -1,0 +1,148 @@
+"""Measured mobilities in tables and universal files."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import TYPE_CHECKING, Literal, cast
+
+import numpy as np
+
+from thud.base.checks import refuse, shown
+from thud.base.units import UNITS, find_unit
+from thud.recordings.channel import guarded
+from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
+from thud.recordings.table import read_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+Quantity = Literal["mobility", "accelerance", "receptance"]
+# Power of i omega by which a quantity is multiplied to convert it to a mobility.
+POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
+# Quantity by the data type of a response in universal files: displacement, velocity, acceleration.
+_RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
+_FREQUENCY_RESPONSE = 4
+# Unit of a response in a universal file, also per force; g is the standard acceleration of gravity.
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "g": 9.80665}
+_RESPONSE_UNIT = re.compile(
+    rf"(?P<length>{'|'.join(_LENGTHS)})(?P<time>/s2|/s/s|/s)?(?:/(?P<force>[A-Za-z]+))?"
+)
+_RESPONSE_UNITS = {0: "m, mm, in", 1: "m/s, mm/s, in/s", 2: "m/s2, mm/s2, in/s2, g"}
+_ALLOWED = (
+    "a table with the columns frequency, Hz, real and imaginary, or magnitude and phase, degrees; "
+    "or a universal file with one frequency response, data set 58"
+)
+_TITLES = {
+    "frequency": "frequency", "f": "frequency", "freq": "frequency",
+    "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
+    "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
+    "frequenz": "frequency", "realteil": "real", "imaginärteil": "imaginary", "betrag": "magnitude",
+    "주파수": "frequency", "실수부": "real", "실수": "real", "허수부": "imaginary",
+    "허수": "imaginary",
+    "크기": "magnitude", "진폭": "magnitude", "위상": "phase",
+    "周波数": "frequency", "実部": "real", "実数部": "real", "虚部": "imaginary",
+    "虚数部": "imaginary", "振幅": "magnitude", "絶対値": "magnitude", "位相": "phase",
+}  # fmt: skip
+# SI unit of the values by quantity, and of further columns by kind.
+_UNITS = {"mobility": "m/(Ns)", "accelerance": "m/(Ns2)", "receptance": "m/N"}
+_FURTHER_UNITS = {"frequency": "Hz", "phase": "deg"}
+
+
+def read_mobility(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
+    """Return frequencies, values and quantity, which is None if the file does not state it."""
+    if path.suffix.lower() in {".uff", ".unv", ".uf"}:
+        return _read_universal(path)
+    table = read_table(path, _ALLOWED)
+    words = [_words(column.name) for column in table.columns]
+    kinds = [_TITLES.get(first, "") for first, *_ in words]
+    if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
+        refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
+    used = {kind: c for kind, c in zip(kinds, table.columns, strict=True) if kind}
+    units = {find_unit(c.unit) for kind, c in used.items() if kind not in _FURTHER_UNITS}
+    quantities = {
+        name
+        for name, unit in _UNITS.items()
+        if any(name in title for title in words) or any(UNITS[u][0] == unit for u in units if u)
+    }
+    if len(quantities) > 1:
+        refuse(f"{path}: titles and units state {' and '.join(sorted(quantities))}", "one quantity")
+    quantity = cast("Quantity", min(quantities)) if quantities else None
+    unit = _UNITS[quantity or "mobility"]
+    columns = {kind: c.to(_FURTHER_UNITS.get(kind, unit), _ALLOWED) for kind, c in used.items()}
+    if {"frequency", "real", "imaginary"} <= columns.keys():
+        values = columns["real"] + 1j * columns["imaginary"]
+    elif {"frequency", "magnitude", "phase"} <= columns.keys():
+        values = columns["magnitude"] * np.exp(1j * np.radians(columns["phase"]))
+    else:
+        titles = ", ".join(column.name for column in table.columns)
+        refuse(
+            f"{path}: the columns are {shown(titles) if table.has_titles else 'without titles'}",
+            _ALLOWED,
+        )
+    return columns["frequency"], values, quantity
+
+
+def _words(title: str) -> list[str]:
+    """Return the words of a title in lower case."""
+    # NFKC replaces full-width brackets by those of ASCII.
+    return re.findall(r"[^\W\d_]+", unicodedata.normalize("NFKC", title).lower()) or [""]
+
+
+def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
+    """Return the frequency response of a universal file, in SI units."""
+    with guarded(path, "universal"):
+        responses = read_data_sets(path, _FREQUENCY_RESPONSE)
+    if len(responses) != 1:
+        refuse(f"{path}: holds {len(responses)} frequency responses", "one")
+    (data_set,) = responses
+    record = data_set.record
+    response = record["ordinate_spec_data_type"]
+    force = record["orddenom_spec_data_type"]
+    if response not in _RESPONSES or force not in FORCES:
+        refuse(
+            f"{path}: a response of data type {response} to an excitation of type {force}",
+            "displacement, velocity or acceleration (8, 11, 12) in response to a force (13)",
+        )
+    if data_set.label("abscissa_axis_units_lab").casefold() not in {"", "hz"}:
+        unit = data_set.label("abscissa_axis_units_lab")
+        refuse(f"{path}: the unit of the frequencies is {shown(unit)}", "Hz")
+    # Opposite directions of response and excitation change the sign.
+    sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
+    quantity: Quantity = _RESPONSES[response]  # type: ignore[assignment]
+    values = np.asarray(record["data"], dtype=complex)
+    values *= sign * _si_units(data_set, 1 - POWERS[quantity], path)
+    return np.asarray(record["x"], dtype=float), values, quantity
+
+
+def _si_units(data_set: DataSet, seconds: int, path: Path) -> float:
+    """Return the unit of a response per force in SI units, m s^-n/N, n = `seconds`.
+
+    The labels state it, or data set 164. Raise InputError if they do not agree, or a label is no
+    such unit.
+    """
+    above, below = (data_set.label(f"{field}_axis_units_lab") for field in ("ordinate", "orddenom"))
+    plain = re.sub(r"[\s^*().]", "", unicodedata.normalize("NFKC", above))
+    match = _RESPONSE_UNIT.fullmatch(plain)
+    power = {None: 2 if plain.startswith("g") else 0, "/s": 1, "/s2": 2, "/s/s": 2}
+    if above and (not match or power[match["time"]] != seconds):
+        refuse(f"{path}: the response has the unit {shown(above)}", _RESPONSE_UNITS[seconds])
+    length = _LENGTHS[match["length"]] if match else None
+    ratio = match["force"] if match else None
+    forces = {UNITS.get(find_unit(text), ("", 1.0)) for text in (below, ratio) if text}
+    if len(forces) > 1 or any(base != "N" for base, _ in forces):
+        refuse(f"{path}: the force has the unit {shown(below or ratio)}", "N, kN, lbf")
+    force = next((size for _, size in forces), None)
+    pairs = ((length if power[None] == 0 else None, data_set.length), (force, data_set.force))
+    for stated, system in pairs:
+        if stated and system and abs(stated / system - 1) > SAME_UNIT:
+            refuse(
+                f"{path}: a unit is {stated:.5g} in SI units by its label, {system:.5g} by data "
+                "set 164",
+                "one unit: remove the label, or data set 164",
+            )
+    return (length or data_set.length or 1.0) / (force or data_set.force or 1.0)
