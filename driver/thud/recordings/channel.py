@@ -57,6 +57,8 @@ class Channel:
         Date of the measurement, or empty.
     notes : tuple of Note
         Processing when the file was read.
+    may_be_fractions : bool
+        Whether values without a unit may be fractions of full scale, as those of float audio.
     unapplied : str
         Factor or offset in the file, such as ``"gain = 10"``, of which it is not known whether the
         values were multiplied by it; empty if there is none.
@@ -71,6 +73,7 @@ class Channel:
     counts: float | None = None
     date: str = ""
     notes: tuple[Note, ...] = ()
+    may_be_fractions: bool = False
     unapplied: str = ""
 
     @property

@@ -252,7 +252,8 @@ def _unit(
     if not isinstance(calibration, str | Calibration):
         return "", []
     unit = unit_of_chain(calibration)
-    if not unit:
+    # A chain for another file would change a table in N or kN without a trace.
+    if not unit or (unit == "FS" and not channel.may_be_fractions):
         refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
     return unit, [Note("unit_of_calibration", unit=unit)]
 

@@ -70,6 +70,7 @@ def read_channels(path: Path) -> list[Channel]:
             sample_rate=rate,
             counts=counts,
             date=date,
+            may_be_fractions=True,
         )
         for column in range(columns)
     ]
