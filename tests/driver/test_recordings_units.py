@@ -41,8 +41,8 @@ POUND = 4.4482216152605
 # Newtons per unit; None of units that are no force.
 UNITS = {"": 1.0, "N": 1.0, "kN": 1e3, "lbf": POUND, "kgf": 9.80665, "V": None, "furlong": None}
 APPLIED = {"scale_factor": "add_offset"}
-FACTORS = ["", *APPLIED, "Scale Factor", "conversion", "scale", "scaling_factor", "gain", "Gain [dB]",
-           "amplifier_gain", "multiplier", "slope", "channel_conversion"]  # fmt: skip
+FACTORS = ["", *APPLIED, "Scale Factor", "conversion", "scale", "scaling_factor", "gain",
+           "Gain [dB]", "amplifier_gain", "multiplier", "slope", "channel_conversion"]  # fmt: skip
 # Owners of an entry of a header: the array, its group, the file.
 Entry = tuple[str, str, Any]
 

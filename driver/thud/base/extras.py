@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
 
@@ -22,6 +23,12 @@ def require_extra(extra: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         refuse(f"{error.name} is not installed", f"pip install 'thud[{extra}]'", error)
+
+
+def library(name: str, extra: str) -> Any:  # noqa: ANN401 - a module
+    """Import a package of an extra; raise InputError, with the extra to install, without it."""
+    with require_extra(extra):
+        return importlib.import_module(name)
 
 
 def data_frame(

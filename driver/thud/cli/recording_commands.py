@@ -22,7 +22,6 @@ from thud.cli.command import (
     results_of,
 )
 from thud.cli.screen import print_notes, print_path, print_results, shows_progress
-from thud.recordings.channel import channel_of
 from thud.recordings.config import Config, read_config
 from thud.recordings.config_values import Choice, Number
 
@@ -111,8 +110,6 @@ def _option(name: str) -> Argument:
         settings["metavar"] = OF_THE_CONFIGURATION[name]
     if isinstance(check, Number):
         settings["type"] = number
-    if name == "channel":
-        settings["type"] = channel_of
     if name == "calibration":
         settings["action"] = "append"
     return argument(FLAGS.get(name, f"--{name.replace('_', '-')}"), **settings)
@@ -167,7 +164,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         for name in OF_A_FORCE:
             if getattr(options, name) is not None:
                 refuse(f"calibrate: --{name.replace('_', '-')} with --tap", "a known force or taps")
-        plate = calibrate_tap(options.record, channel=channel_of(options.channel))
+        plate = calibrate_tap(options.record, channel=options.channel)
         print(plate.lines())
         if not options.quiet:
             print_results(f"# {plate}")
@@ -178,7 +175,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         force=options.force,
         mass=options.mass,
         gravity=options.gravity,
-        channel=channel_of(options.channel),
+        channel=options.channel,
         unit=options.unit,
         uncertainty=options.uncertainty or 0.0,
     )

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse, shown
-from thud.recordings.channel import channel_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -66,8 +65,6 @@ class Field:
 
     def value(self, text: str) -> object:
         """Return the value of the key; raise InputError for a text that is not a number."""
-        if self.name == "channel":
-            return channel_of(text)
         if self.kind != "number":
             return text
         try:

@@ -16,12 +16,12 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
+from thud.base.extras import library
 from thud.base.files import content_of, refuse_foreign, replace_file
 from thud.base.note import Note
 from thud.export.wav import wav_file
 from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.level.levels import RECORDED_BAND
-from thud.recordings.channel import library
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -195,7 +195,7 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 
     The format has 12 digits for the force and 6 digits for the time step.
     """
-    pyuff = library("pyuff", "universal")
+    pyuff = library("pyuff", "recordings")
     kind = f"{KINDS[force.kind]}, N, positive into the floor"
     start = f"first sample at {force.start:.6g} s since first touch"
     times = f"Sample rate: {force.sample_rate:.10g} Hz, {start}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.recordings.channel import library
+from thud.base.extras import library
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,7 +28,7 @@ def wav_file(
     number is one count below 1. Raise InputError if soundfile is not installed.
     """
     content = io.BytesIO()
-    with library("soundfile", "WAV").SoundFile(
+    with library("soundfile", "recordings").SoundFile(
         content, "w", sample_rate, 1, "PCM_24" if whole else "FLOAT", format="WAV"
     ) as file:
         file.comment = comment.encode()[:_MAX_COMMENT].decode(errors="ignore")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 import stat
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
@@ -135,18 +134,6 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
     return file
 
 
-def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
-    """Import a library that one format needs; raise InputError if it is missing."""
-    try:
-        return importlib.import_module(name)
-    except (ImportError, OSError) as error:  # soundfile raises OSError without its library
-        refuse(
-            f"{kind} files need the package {name}, which is not installed",
-            "pip install 'thud[recordings]'",
-            error,
-        )
-
-
 def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
     """Raise InputError if a file that is read as a whole is too large."""
     size = path.stat().st_size
@@ -155,8 +142,3 @@ def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
             f"{shown_path(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
             f"up to {limit // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
         )
-
-
-def channel_of(text: str | None) -> int | str | None:
-    """Return the number or the name of a channel from a command line."""
-    return int(text) if text is not None and text.isdecimal() else text

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel, guarded, library, shown_path
+from thud.base.extras import library
+from thud.recordings.channel import Channel, guarded, shown_path
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,7 +35,7 @@ RF64_LENGTH = slice(28, 36)
 
 
 def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
-    soundfile = library("soundfile", "WAV and FLAC")
+    soundfile = library("soundfile", "recordings")
     with guarded(path, "an audio file"), soundfile.SoundFile(os.fsencode(path)) as file:
         file.seek(start)
         block: NDArray[np.float64] = file.read(stop - start, dtype="float64", always_2d=True)
@@ -44,7 +45,7 @@ def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]
 def read_channels(path: Path) -> list[Channel]:
     """Return the channels of an audio file; integers are fractions of full scale."""
     name = shown_path(path)
-    with library("soundfile", "WAV and FLAC").SoundFile(os.fsencode(path)) as file:
+    with library("soundfile", "recordings").SoundFile(os.fsencode(path)) as file:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate, is_flac = float(file.samplerate), file.format == "FLAC"
     if kind not in SUBTYPES:

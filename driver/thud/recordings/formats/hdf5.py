@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel, guarded, library, shown_path, shown_text
+from thud.base.extras import library
+from thud.recordings.channel import Channel, guarded, shown_path, shown_text
 from thud.recordings.variables import (
     Header,
     Vector,
@@ -39,7 +40,7 @@ MATLAB_OTHERS = {b"cell", b"struct", b"function_handle", b"canonical empty"}
 def _read(
     path: Path, key: str, scaling: dict[str, float], index: tuple[int | slice, ...]
 ) -> NDArray[np.float64]:
-    h5py = library("h5py", "HDF5")
+    h5py = library("h5py", "recordings")
     with guarded(path, "HDF5"), h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
         values = np.asarray(file[key][index], dtype=np.float64)
     return values * scaling["scale_factor"] + scaling["add_offset"]
@@ -50,7 +51,7 @@ def read_channels(path: Path) -> list[Channel]:
 
     Links to other files are not followed.
     """
-    h5py = library("h5py", "HDF5")
+    h5py = library("h5py", "recordings")
     name = shown_path(path)
     vectors: list[Vector] = []
     header: Header = []

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel, guarded, library, shown_path, shown_text
+from thud.base.extras import library
+from thud.recordings.channel import Channel, guarded, shown_path, shown_text
 from thud.recordings.words import (
     DATE,
     UNIT,
@@ -36,7 +37,7 @@ SCALES = {
 
 def _library() -> Any:  # noqa: ANN401 - a module
     """Return npTDMS, which logs damage that is refused, or read over, to the screen."""
-    module = library("nptdms", "TDMS")
+    module = library("nptdms", "recordings")
     module.log.log_manager.set_level(logging.CRITICAL)
     return module
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.extras import library
 from thud.base.note import Note
 from thud.base.units import factor_to, size_of
-from thud.recordings.channel import Channel, library, require_small, shown_path
+from thud.recordings.channel import Channel, require_small, shown_path
 from thud.recordings.signal import read_array
 from thud.recordings.times import uniform_grid
 
@@ -49,7 +50,7 @@ class DataSet(NamedTuple):
 def read_data_sets(path: Path, function_type: int) -> list[DataSet]:
     """Return the data sets 58 of a function type, such as 1 for time histories."""
     require_small(path, "a universal file", MAX_SIZE)
-    file = library("pyuff", "universal").UFF(os.fsencode(path))
+    file = library("pyuff", "recordings").UFF(os.fsencode(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     if len(kinds) > MAX_SETS:
         refuse(f"{shown_path(path)}: {len(kinds)} data sets", f"up to {MAX_SETS}")
