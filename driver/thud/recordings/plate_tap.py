@@ -8,13 +8,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.signal import peak_widths
-from scipy.special import chdtrc, stdtrit
+from scipy.special import chdtrc, fdtrc, stdtrit
 
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.calibration import open_source
-from thud.recordings.free_oscillation import MIN_LENGTH, SAME, Mode, fit_modes
+from thud.recordings.ringing import (
+    DECAYS,
+    HIGHEST,
+    MIN_FREQUENCY,
+    closest,
+    fit_oscillations,
+    matched_energy,
+    resonance,
+)
 
 if TYPE_CHECKING:
     import os
@@ -23,6 +31,24 @@ if TYPE_CHECKING:
 
     from thud.recordings.signal import Signal
 
+# Minimum quality factor of a resonance, minimum ratio of its energy to that of the noise, and
+# maximum number of resonances.
+MIN_QUALITY = 2.0
+MIN_ENERGY = 60.0
+MAX_MODES = 4
+# Resonances are the same if their frequencies differ by less, and the noise is taken from this
+# relative distance around them.
+SAME = 0.05
+AROUND = 0.3
+# Length of a fit in decay times, and its minimum in samples.
+DECAY_TIMES = 10.0
+MIN_LENGTH = 100
+# Probability of noise below which what remains of a fit is no noise. The uncertainties then include
+# its amplitude times MISFIT_WEIGHT.
+NOISE_PROBABILITY = 0.01
+MISFIT_WEIGHT = 2.0
+# Power of a record without noise.
+TINY = 1e-300
 # Maximum number of samples of a record, and minimum sample rate, Hz.
 MAX_SAMPLES = 2**24
 MIN_RATE = 2000.0
@@ -48,6 +74,21 @@ MIN_UNCERTAINTY = 1e-12
 MAX_UNCERTAINTY = 0.05
 # Probability below which the taps differ by more than their noise.
 SIGNIFICANT = 0.05
+
+
+class Mode(NamedTuple):
+    """A resonance: natural frequency, Hz, quality factor, and their relative uncertainties.
+
+    The amplitude is that at the begin of the level. The misfit is the amplitude of what remains and
+    is no noise, as a fraction of the oscillation.
+    """
+
+    frequency: float
+    quality: float
+    frequency_uncertainty: float
+    quality_uncertainty: float
+    amplitude: float
+    misfit: float
 
 
 @dataclass(frozen=True)
@@ -256,3 +297,85 @@ def _fit_from(start: float, tap: _Tap, rate: float) -> list[Mode] | None:
 
 def _misfit(modes: list[Mode]) -> float:
     return max(mode.misfit for mode in modes)
+
+
+def fit_modes(
+    level: NDArray[np.float64], rate: float, quiet: NDArray[np.float64]
+) -> list[Mode] | None:
+    """Fit decaying oscillations to a level sampled at a rate, Hz.
+
+    `quiet` is the level before they begin; what remains of the fit is compared with its noise.
+    Return None if no resonance stands out.
+    """
+    noise = quiet - closest(quiet, np.zeros((0, 2)), rate)[0] if quiet.size else quiet
+    modes, parameters, used = None, np.zeros((0, 2)), level
+    while len(parameters) < MAX_MODES and len(used) >= MIN_LENGTH:
+        trial = _strongest(used - closest(used, parameters, rate)[0], rate)
+        if trial is None or (np.abs(parameters[:, 0] / trial[0] - 1) < SAME).any():
+            break
+        parameters = np.vstack([parameters, trial])
+        length = round(DECAY_TIMES / math.exp(parameters[:, 1].min()) * rate)
+        used = level[: max(length, MIN_LENGTH)]
+        parameters, inverse = fit_oscillations(used, parameters, rate)
+        if any(resonance(f, math.exp(-decay))[1] < MIN_QUALITY for f, decay in parameters):
+            break
+        modes = _describe(used, parameters, inverse, rate, noise)
+    return modes
+
+
+def _strongest(level: NDArray[np.float64], rate: float) -> tuple[float, float] | None:
+    """Return the parameters of the strongest oscillation; None if it does not exceed the noise."""
+    frequency, energy = matched_energy(level, rate, DECAYS)
+    inside = (frequency >= MIN_FREQUENCY) & (frequency <= HIGHEST * rate)
+    frequency, energy = frequency[inside], energy[:, inside]
+    k, index = np.unravel_index(np.argmax(energy), energy.shape)
+    if not energy[k, index] > MIN_ENERGY * np.median(energy[k]):
+        return None
+    return float(frequency[index]), -math.log(DECAYS[k])
+
+
+def _describe(
+    level: NDArray[np.float64],
+    parameters: NDArray[np.float64],
+    inverse: NDArray[np.float64],
+    rate: float,
+    quiet: NDArray[np.float64],
+) -> list[Mode]:
+    """Return the modes of a fit; their uncertainties are those by the noise around each."""
+    fitted, amplitudes = closest(level, parameters, rate)
+    frequencies, power = _spectrum(level - fitted, rate)
+    quiet_frequencies, quiet_power = _spectrum(quiet, rate)
+    deviations = np.sqrt(np.diagonal(inverse)).reshape(-1, 2)
+    modes = []
+    for (frequency, log_decay), amplitude, deviation in zip(
+        parameters, amplitudes, deviations, strict=True
+    ):
+        decay = math.exp(log_decay)
+        natural, quality = resonance(frequency, 1 / decay)
+        near = power[np.abs(frequencies / natural - 1) < AROUND]
+        usual = quiet_power[np.abs(quiet_frequencies / natural - 1) < AROUND]
+        # An oscillation takes two values from the residual.
+        count = max(near.size - 2, 1)
+        noise, excess = math.sqrt(float(near.sum()) / count), 0.0
+        if usual.size:
+            ratio = float(near.sum() / count / max(usual.mean(), TINY))
+            # A frequency of a real signal has two values.
+            if fdtrc(2 * count, 2 * usual.size, ratio) < NOISE_PROBABILITY:
+                excess = math.sqrt(max(2 * float(near.sum() - near.size * usual.mean()), 0.0))
+        # Noise is distributed over all samples, a misfit is not.
+        u_frequency, u_decay = deviation * math.hypot(noise, MISFIT_WEIGHT * excess)
+        u_frequency /= natural
+        u_quality = math.hypot(u_frequency, u_decay)
+        # The sum of the squares of the oscillation is that of its amplitude times rate / (4 decay).
+        misfit = excess / float(amplitude) / math.sqrt(rate / (4 * decay))
+        modes.append(Mode(natural, quality, u_frequency, u_quality, float(amplitude), misfit))
+    return modes
+
+
+def _spectrum(
+    values: NDArray[np.float64], rate: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return frequencies, Hz, and power; that of white noise is its variance at each of them."""
+    power = np.abs(np.fft.rfft(values, max(len(values), 1))) ** 2 / max(len(values), 1)
+    frequency = np.fft.rfftfreq(max(len(values), 1), 1 / rate)
+    return np.asarray(frequency[1:], dtype=np.float64), np.asarray(power[1:])

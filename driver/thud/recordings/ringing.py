@@ -1,4 +1,4 @@
-"""Resonance of the force plate in a record: ringing, and whether a stated plate is in it."""
+"""Free oscillations a exp(-t/d) cos(2 pi f t + p) of a force plate: ringing after a contact."""
 
 from __future__ import annotations
 
@@ -7,23 +7,31 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.fft import next_fast_len
+from scipy.optimize import least_squares
 
 from thud.base.note import Note
-from thud.recordings.free_oscillation import (
-    MIN_FREQUENCY,
-    fit_oscillations,
-    matched_energy,
-    resonance,
-)
+from thud.recordings.background import MAINS
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
     from thud.recordings.instruments import Plate
     from thud.recordings.response import Chain
 
-# Trial decay times of a ringing to 1/e, s.
-DECAYS = np.array([0.002, 0.004, 0.008, 0.016, 0.032])
+# Minimum frequency of a resonance of a plate, Hz, maximum as a fraction of the sample rate, and
+# trial decay times to 1/e, s.
+MIN_FREQUENCY = 200.0
+HIGHEST = 0.4
+DECAYS = np.array([0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])
+# Degree of the drift that is fitted together with oscillations, and maximum number of evaluations
+# of a least-squares fit; one of a resonance takes about 10.
+DEGREE = 2
+MAX_EVALUATIONS = 20
+# Trial decay times of a ringing: shorter ones are those of soft releases.
+RINGING_DECAYS = DECAYS[1:-1]
 # Pause after the gate, in which soft releases end, and minimum length of the signal after it, s.
 PAUSE = 1e-3
 MIN_LENGTH = 4e-3
@@ -85,13 +93,13 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     after, before = contact.force[stop + pause :], contact.force[: max(first - pause, 0)][::-1]
     if len(after) < MIN_LENGTH * rate:
         return None
-    frequencies, energies = matched_energy(after, rate, DECAYS)
+    frequencies, energies = matched_energy(after, rate, RINGING_DECAYS)
     frequencies, energies = frequencies[1:], energies[:, 1:]
     noise = contact.background.density(frequencies) * rate / 2
     if chain is not None:
         noise *= np.maximum(np.abs(chain.response(frequencies)) ** -2, 1.0)
     k, index = np.unravel_index(np.argmax(energies / noise), energies.shape)
-    frequency, decay, energy = frequencies[index], DECAYS[k], energies[k, index]
+    frequency, decay, energy = frequencies[index], RINGING_DECAYS[k], energies[k, index]
     if not (
         MIN_FREQUENCY <= frequency <= MAX_FREQUENCY * rate
         and energy > MIN_ENERGY * noise[index]
@@ -99,7 +107,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     ):
         return None
     if len(before) >= MIN_LENGTH * rate:
-        earlier, tones = matched_energy(before, rate, DECAYS[k : k + 1])
+        earlier, tones = matched_energy(before, rate, RINGING_DECAYS[k : k + 1])
         if energy < MIN_INCREASE * np.interp(frequency, earlier, tones[0]):
             return None
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
@@ -107,7 +115,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
         return None
     start, ringing = np.array([[frequency, -math.log(decay)]]), after[: int(LENGTH * decay * rate)]
-    ((fitted, log_rate),), _ = fit_oscillations(ringing, start, rate, background=False)
+    ((fitted, log_rate),), _ = fit_oscillations(ringing, start, rate)
     if abs(fitted / frequency - 1) < MAX_SHIFT:  # else it is another oscillation
         frequency, decay = fitted, math.exp(-log_rate)
     return Ringing(*resonance(frequency, decay), amplitude, chain is not None)
@@ -144,3 +152,66 @@ def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | No
     excess = np.abs(np.log(near / np.sqrt(low * high)))
     difference = float(excess[0] - excess[1])
     return None if abs(difference) < CLEAR else difference > 0
+
+
+def resonance(frequency: float, decay_time: float) -> tuple[float, float]:
+    """Return the resonance, Hz, and the quality factor of a mode from its free oscillation.
+
+    A damped mode oscillates at a frequency, Hz, below its resonance; the amplitude falls to 1/e
+    within the decay time, s.
+    """
+    natural = math.hypot(frequency, 1 / (2 * math.pi * decay_time))
+    return natural, math.pi * natural * decay_time
+
+
+def matched_energy(
+    level: NDArray[np.float64], rate: float, decay_times: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return frequencies, Hz, and the energy of a matched filter, shape (n_decay, n_frequency).
+
+    The filter searches a free oscillation that begins with the level. Of white noise the energy is
+    its variance at every frequency and decay time, s.
+    """
+    windows = np.exp(-np.arange(len(level)) / rate / decay_times[:, None])
+    length = next_fast_len(2 * len(level), real=True)
+    energy = np.abs(np.fft.rfft(windows * level, length)) ** 2 / (windows**2).sum(axis=1)[:, None]
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(energy)
+
+
+def closest(
+    level: NDArray[np.float64], parameters: NDArray[np.float64], rate: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the oscillations, with drift and hum, that are closest to a level; their amplitudes.
+
+    The parameters of each are its frequency, Hz, and the logarithm of its decay rate, 1/s.
+    """
+    time = np.arange(len(level)) / rate
+    frequencies = np.append(parameters[:, 0], MAINS)
+    decays = np.append(np.exp(parameters[:, 1]), np.zeros(len(MAINS)))
+    waves = np.exp(np.outer(time, 2j * np.pi * frequencies - decays))
+    drift = np.vander(time * rate / len(level), DEGREE + 1)
+    columns = np.hstack([waves.real, -waves.imag, drift])
+    factors = np.linalg.lstsq(columns, level, rcond=None)[0]
+    amplitudes = np.hypot(*factors[: 2 * len(frequencies)].reshape(2, -1))
+    return columns @ factors, amplitudes[: len(parameters)]
+
+
+def fit_oscillations(
+    level: NDArray[np.float64], parameters: NDArray[np.float64], rate: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the parameters of least squares, and their covariance for noise of variance one.
+
+    They begin with `parameters`, shape (n, 2): frequencies, Hz, and logarithms of decay rates, 1/s.
+    Drift and hum are fitted, too.
+    """
+    low = np.tile([MIN_FREQUENCY, 0.0], len(parameters))
+    high = np.tile([HIGHEST * rate, math.log(rate)], len(parameters))
+    solution = least_squares(
+        lambda x: level - closest(level, x.reshape(-1, 2), rate)[0],
+        np.clip(parameters.ravel(), low, high),
+        bounds=(low, high),
+        x_scale=np.column_stack([np.exp(parameters[:, 1]), np.ones(len(parameters))]).ravel(),
+        max_nfev=MAX_EVALUATIONS,
+    )
+    return solution.x.reshape(-1, 2), np.linalg.pinv(solution.jac.T @ solution.jac)
