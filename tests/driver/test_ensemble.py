@@ -289,11 +289,12 @@ def test_a_streamed_run_keeps_its_memory() -> None:
 import resource, sys
 import numpy as np, thud
 heights = np.linspace(0.5, 1.5, 20_000)
+case = thud.Case(model=thud.HollowSphere(), sampling=thud.Sampling(duration=0.03))
 for _ in range(2):
-    thud.solve_many({"height": heights}, lasting(0.03))
+    thud.solve_many({"height": heights}, case)
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 for _ in range(10):
-    thud.solve_many({"height": heights}, lasting(0.03))
+    thud.solve_many({"height": heights}, case)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
     found = python("-c", code)
