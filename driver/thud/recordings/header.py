@@ -7,22 +7,25 @@ from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 from thud.base.checks import refuse
 from thud.base.units import UNITS, find_unit
-from thud.recordings.cells import DATE_TIME, is_number, split_line, split_row
 from thud.recordings.channel import shown_text
 from thud.recordings.words import (
     DATE,
+    DATE_TIME,
     RATE,
     STEP,
     TIME_UNIT,
     UNIT,
+    is_number,
     is_time,
     marked_units,
     plain,
+    split_line,
+    split_row,
     split_title,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable
 
     Pairs = list[tuple[str, str]]
 
@@ -67,12 +70,6 @@ class Row(NamedTuple):
     text: str
     titles: Pairs
 
-    @property
-    def rank(self) -> tuple[bool, bool, int]:
-        """Of several lines the titles are those with units, with times, or next to the numbers."""
-        has_units = any(find_unit(unit) for _, unit in self.titles)
-        return has_units, any(is_time(*title) for title in self.titles), self.line
-
 
 def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
     """Return names and values of the header, name and unit of each column, and if it has titles.
@@ -90,7 +87,12 @@ def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
             rows.append(Row(number, text, _read_titles(line, text, layout)))
     units = [row for row in rows if _are_units(row.titles)]
     titles = [row for row in rows if row.titles and row not in units]
-    chosen = [max(titles, key=lambda row: row.rank)] if titles else []
+    # Of several lines the titles are those with units, with times, or next to the numbers.
+    ranks = [
+        (any(find_unit(unit) for _, unit in row.titles), any(is_time(*t) for t in row.titles), i)
+        for i, row in enumerate(titles)
+    ]
+    chosen = [titles[max(ranks)[-1]]] if titles else []
     for row in rows:
         if row not in units and row not in chosen:
             _refuse_row(row, above, layout, is_open=not chosen)
@@ -102,7 +104,7 @@ def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
             units_of_column.append(unit or name)
     times = [i for i in layout.units if any(is_time(names[i][0], unit) for unit in stated[i])]
     for title, value in header:
-        for i, unit in _header_units(title, value, times, layout, width):
+        for i, unit in _units_of_entry(title, value, times, layout, width):
             stated[i].append(unit)
     columns = [
         (name, _one_unit(name, stated[i], f"{layout.name}: column {i + 1}"))
@@ -161,28 +163,23 @@ def _are_units(titles: Pairs) -> bool:
     return 2 * known > len(filled) and not any(name and unit for name, unit in filled)
 
 
-def _header_units(
+def _units_of_entry(
     title: str, value: str, times: list[int], layout: Layout, width: int
-) -> Iterator[tuple[int, str]]:
-    """Yield columns and units of an entry of the header: of times, or of the other columns."""
+) -> Iterable[tuple[int, str]]:
+    """Return columns and units of an entry of the header: of times, of the others, or of all."""
     word = plain(split_title(title)[0])
     if word not in UNIT | TIME_UNIT:
-        return
+        return ()
     units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
-    used = [*layout.units]
-    channels = [i for i in used if i not in times]
     if word in TIME_UNIT:
-        channels, units = times or used[:1], units[:1]
-    if len(units) == 1:
-        units *= len(channels)
-    lists = ([*range(width)], used, channels)
-    columns = channels if len(channels) == len(units) else next(
-        (some for some in lists if len(some) == len(units)), None
-    )  # fmt: skip
-    if columns is None:
+        return [(i, units[0]) for i in times or [*layout.units][:1]]
+    channels = [i for i in layout.units if i not in times]
+    columns = range(width) if len(units) == width else channels
+    units *= len(columns) if len(units) == 1 else 1
+    if len(units) != len(columns):
         count = f"{len(units)} units for {len(channels)} channels"
         refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
-    yield from zip(columns, units, strict=True)
+    return zip(columns, units, strict=True)
 
 
 def _one_unit(name: str, stated: list[str], label: str) -> str:

@@ -19,7 +19,9 @@ from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
 from thud.base.units import factor_to, size_of
 from thud.base.workbooks import read_workbook
-from thud.recordings.cells import (
+from thud.recordings.channel import MAX_COLUMNS, require_small, shown_path, shown_text
+from thud.recordings.header import Layout, read_header
+from thud.recordings.words import (
     COMMENT,
     DATE_TIME,
     GROUPING,
@@ -27,12 +29,10 @@ from thud.recordings.cells import (
     TRAILING,
     find_separator,
     is_number,
+    is_time,
     read_quantity,
     split_row,
 )
-from thud.recordings.channel import MAX_COLUMNS, require_small, shown_path, shown_text
-from thud.recordings.header import Layout, read_header
-from thud.recordings.words import is_time
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -224,11 +224,13 @@ def _find_numbers(
         cells = split_row(line, mark)
         filled = [i for i, cell in enumerate(cells) if cell]
         dates = [i for i in filled if DATE_TIME.fullmatch(cells[i])]
-        units = {i: unit for i in filled if (unit := _unit_of_number(cells[i])) is not None}
-        if not units or filled[0] not in {*units, *dates} or min(units) < max(dates, default=0):
-            above.append(line)
-            continue
-        if 2 * len(units) <= len(filled) - len(dates):
+        quantities = {
+            i: read_quantity(cells[i], ".") or read_quantity(cells[i], ",") for i in filled
+        }
+        units = {i: quantity[1] for i, quantity in quantities.items() if quantity}
+        is_first = bool(units) and filled[0] in {*units, *dates}
+        is_first = is_first and min(units) > max(dates, default=-1)
+        if not is_first or 2 * len(units) <= len(filled) - len(dates):
             above.append(line)
             continue
         if filled[-1] >= MAX_COLUMNS:
@@ -236,12 +238,6 @@ def _find_numbers(
         first, width = len(above) + 1, filled[-1] + 1
         return above, Layout(name, allowed, mark, first, width, len(cells), units)
     return refuse(f"{name}: cannot be read (no numbers)", allowed)
-
-
-def _unit_of_number(cell: str) -> str | None:
-    """Return the unit of a cell with a number, empty without a unit; None if it holds no number."""
-    quantities = [read_quantity(cell, mark) for mark in MARKS]
-    return next((unit for _, unit in filter(None, quantities)), None)
 
 
 # Numbers.
