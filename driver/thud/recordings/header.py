@@ -119,7 +119,7 @@ def _read_pair(text: str) -> tuple[str, str] | None:
     is_marked = PAIR.search(text)
     name, *values = PAIR.split(text, 1) if is_marked else text.rsplit(None, 1) or [""]
     value = "".join(values).strip(" :=\t;,")
-    word = plain(split_title(name)[0])
+    word = plain(split_title(name)[0] if is_marked else name)
     is_pair = word in UNIT | TIME_UNIT or (word in DATE and DATE_LIKE.search(value))
     is_pair = is_pair or (word in RATE | STEP and re.match(r"[-+.]?\d", value))
     return (name.strip(), value) if value and is_pair else None
@@ -147,8 +147,8 @@ def _split_titles(line: str, separator: str | None) -> list[str]:
     for mark in "\t;":
         if mark in line:
             return split_line(line, mark)
-    if WIDE_BLANK.search(line) and '"' not in line:
-        return WIDE_BLANK.split(line)
+    if WIDE_BLANK.search(line):
+        return WIDE_BLANK.split(line) if separator is None else [line]
     if "," in line:
         cells = split_line(line, ",")
         has_unit = any(find_unit(part) not in {"", "counts"} for part in UNIT_PART.findall(line))
@@ -199,17 +199,21 @@ def _refuse_row(row: Row, above: list[str], layout: Layout, *, is_open: bool) ->
     line, is_last = above[row.line - 1].strip(" "), row.line == len(above)
     is_comment = line[:1] in tuple(COMMENTS)
     cells = [] if is_comment else split_row(line, layout.separator)
-    if len(cells) == layout.width and any(map(is_number, cells)):
+    if len(cells) >= layout.width and any(map(is_number, cells)):
         # A word may stand in front of the numbers of the first row.
         is_row = is_last and all(is_number(cells[i]) for i in layout.units)
         wrong = next((cell for cell in cells if cell and not is_number(cell)), "")
         if wrong and (is_row or not any(map(str.isalpha, next(filter(None, cells))))):
             layout.refuse(row.line, f"{shown_text(wrong)!r} is not a number")
+    if VALUE.search(row.text):
+        return
     pieces = re.split(r"[\t;,]", row.text)
     states_unit = any(find_unit(unit) for piece in pieces for unit in marked_units(piece.strip()))
-    is_title = is_open and is_last and not is_comment and (layout.separator or "\n") in row.text
-    if not VALUE.search(row.text) and (states_unit or is_title or all(map(find_unit, pieces))):
-        count = len(row.titles or _split_titles(row.text, layout.separator))
+    titles = row.titles or [split_title(t) for t in _split_titles(row.text, layout.separator)]
+    count = len(titles)
+    is_title = count > 1 and any(is_time(*title) for title in titles)
+    is_title |= is_last and not is_comment and (layout.separator or "\n") in row.text
+    if states_unit or (is_title and is_open) or _are_units(titles):
         reason = f"{count} title{'s' * (count > 1)} for {layout.width} columns"
         reason = "is a second line of titles" if row.titles else reason
         allowed = "a title for each column, with its unit if it is known"

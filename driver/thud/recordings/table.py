@@ -19,7 +19,7 @@ from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
 from thud.base.units import factor_to, size_of
 from thud.base.workbooks import read_workbook
-from thud.recordings.channel import MAX_COLUMNS, require_small, shown_path, shown_text
+from thud.recordings.channel import require_small, shown_path, shown_text
 from thud.recordings.header import Layout, read_header
 from thud.recordings.words import (
     COMMENT,
@@ -39,10 +39,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Maximum length of a line, number of lines in a header, and of numbers in a table.
+# Maximum length of a line, and number of lines in a header.
 MAX_LINE = 2**16
 MAX_HEADER = 1000
-MAX_NUMBERS = 2**24
 # Number of lines per conversion.
 BLOCK = 2**14
 # By decimal mark: characters that np.loadtxt cannot read, so that lines are read one by one.
@@ -233,8 +232,6 @@ def _find_numbers(
         if not is_first or 2 * len(units) <= len(filled) - len(dates):
             above.append(line)
             continue
-        if filled[-1] >= MAX_COLUMNS:
-            refuse(f"{name}: {filled[-1] + 1} columns", f"up to {MAX_COLUMNS}")
         first, width = len(above) + 1, filled[-1] + 1
         return above, Layout(name, allowed, mark, first, width, len(cells), units)
     return refuse(f"{name}: cannot be read (no numbers)", allowed)
@@ -282,7 +279,7 @@ def _read_numbers(
     lines: Iterable[str], layout: Layout, decimal: str, shown: int
 ) -> NDArray[np.float64]:
     """Return the columns of numbers, shape (n_row, n_column)."""
-    count, n_read = len(layout.units), 0
+    count = len(layout.units)
     blocks: list[NDArray[np.float64]] = []
     rows = itertools.islice(enumerate(lines, 1), layout.first - 1, None)
     while block := list(itertools.islice(rows, BLOCK)):
@@ -294,12 +291,6 @@ def _read_numbers(
             read = [_read_row(line, row, layout, decimal, shown) for line, row in cells if row]
             values = np.array(read, dtype=np.float64).reshape(-1, count)
         blocks.append(values)
-        n_read += values.size
-        if n_read > MAX_NUMBERS:
-            refuse(
-                f"{layout.name}: more than {MAX_NUMBERS / 1e6:.1f} million numbers as text",
-                "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
-            )
     return np.concatenate(blocks)
 
 
