@@ -14,7 +14,7 @@ from synthetic import cut_drops, half_sine, make_drop
 
 from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
-from thud.recordings import drops, flanks, measured_drop
+from thud.recordings import contact as module, drops, measured_drop
 from thud.recordings.background import (
     cell_means,
     remove_background,
@@ -162,21 +162,21 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
 
 def test_shapes_are_those_of_the_theory() -> None:
     tau = np.array([-0.5, -0.02, 0.0, 0.3, 1.0, 2.7])
-    found = flanks._flanks(tau, 0.1)  # noqa: SLF001
+    found = module._flanks(tau, 0.1)  # noqa: SLF001
     # A jump as sampled, and spread over a sample.
     jump = (np.array([0, 0, 1, 1, 1, 1]) + np.array([0, 0.3, 0.5, 1, 1, 1])) / 2
-    for column, power, ratio in zip(found.T, flanks.POWERS, flanks.JUMPS, strict=True):
+    for column, power, ratio in zip(found.T, module.POWERS, module.JUMPS, strict=True):
         expected = (np.maximum(tau, 0) ** power + ratio * jump) / (1 + ratio)
         np.testing.assert_allclose(column, expected, atol=1e-12)
 
 
 def test_tables_of_shapes_are_smoothed_and_averaged() -> None:
-    line = int(np.flatnonzero((flanks.POWERS == 1) & (flanks.JUMPS == 0))[0])
-    table, averaged = flanks._shapes(1e3 / RATE)  # noqa: SLF001
+    line = int(np.flatnonzero((module.POWERS == 1) & (module.JUMPS == 0))[0])
+    table, averaged = module._shapes(1e3 / RATE)  # noqa: SLF001
     # Neither changes a line away from its kink.
-    tick = round((flanks.BEFORE + 7.9) / flanks.TICK)
+    tick = round((module.BEFORE + 7.9) / module.TICK)
     assert table[tick, line] == pytest.approx(7.9, abs=0.02)
-    np.testing.assert_allclose(averaged[100:, line], flanks.DELAYS[100:], atol=2e-3)
+    np.testing.assert_allclose(averaged[100:, line], module.DELAYS[100:], atol=2e-3)
     # The mean over the first half of 0.1 ms.
     assert averaged[0, line] == pytest.approx(0.025, abs=2e-3)
 

@@ -16,7 +16,7 @@ import pytest
 from conftest import REPOSITORY
 
 import thud
-from thud.recordings.flanks import _shapes
+from thud.recordings.contact import _shapes
 
 SOURCES = REPOSITORY / "src"
 

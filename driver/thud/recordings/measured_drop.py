@@ -19,9 +19,8 @@ from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
 from thud.recordings.checks import CHECKS
-from thud.recordings.contact import Contact, find_contact
+from thud.recordings.contact import SAMPLE_ERROR, Contact, find_contact
 from thud.recordings.differences import robust_deviation
-from thud.recordings.flanks import SAMPLE_ERROR
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import min_background
 from thud.recordings.restitution import (
