@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.signal import butter, resample, sosfilt, zpk2sos
+from scipy.signal import butter, resample, sosfilt
 
 from thud.base.checks import refuse, require_array, require_number
 from thud.level.levels import get_bands
@@ -23,9 +22,9 @@ ORDER = 3
 # Minimum ratio of sample rate and upper band edge. Below it the bilinear transform flattens the
 # lower skirt, which then misses the mask: by 0.8 dB at a ratio of 3.5, by 4 dB at 2.5.
 MIN_RATIO = 4.0
-# Maximum fraction of the energy of a filter's decay that the padding cuts off: 4e-7 dB if the band
-# holds as much energy as the decay.
-MAX_CUT = 1e-7
+# Length of a filter's decay in reciprocals of its bandwidth: its slowest poles then have lost all
+# but 1e-7 of their energy, 4e-7 dB if the band holds as much.
+DECAY = 7.3
 
 
 def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
@@ -39,7 +38,12 @@ def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
     accurate to 1e-6 dB.
     """
     _require_rate(sample_rate)
-    return _filters(bands, float(sample_rate))[0].copy()
+    edges = get_bands(bands)
+    sections = np.full((len(edges.nominal), ORDER, 6), np.nan)
+    for band in np.flatnonzero(MIN_RATIO * edges.upper <= sample_rate * (1 + 1e-12)):
+        edge = edges.lower[band], edges.upper[band]
+        sections[band] = butter(ORDER, edge, "bandpass", fs=sample_rate, output="sos")
+    return sections
 
 
 def filter_levels(
@@ -63,15 +67,15 @@ def filter_levels(
         return levels
     factor = max(1, math.ceil(MIN_RATIO * edges.upper[inside].max() / sample_rate))
     rate = float(sample_rate) * factor
-    sections, ringing = _filters(bands, rate)
+    sections = band_filters(bands, rate)
+    decays = np.ceil(DECAY * rate / (edges.upper - edges.lower)).astype(int)
     if factor > 1:
         # Fourier interpolation keeps the spectrum below half the rate. It rings beyond both ends of
         # the record, hence the padding.
-        record = np.pad(record, int(ringing.max()))
+        record = np.pad(record, decays.max())
         record = resample(record, factor * len(record))
     for band in np.flatnonzero(inside):
-        padded = np.append(record, np.zeros(ringing[band]))
-        filtered = sosfilt(sections[band], padded)
+        filtered = sosfilt(sections[band], np.pad(record, (0, decays[band])))
         levels[band] = 10 * np.log10(filtered @ filtered / rate)
     return levels
 
@@ -80,20 +84,3 @@ def _require_rate(sample_rate: float) -> None:
     require_number("sample_rate", sample_rate)
     if sample_rate <= 0:
         refuse(f"sample_rate = {sample_rate} is not allowed", "sample_rate > 0")
-
-
-@lru_cache(maxsize=8)
-def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the sections of each filter, and the number of samples in which it decays."""
-    edges = get_bands(bands)
-    sections = np.full((len(edges.nominal), ORDER, 6), np.nan)
-    ringing = np.zeros(len(edges.nominal), dtype=np.int64)
-    for band, (lower, upper) in enumerate(zip(edges.lower, edges.upper, strict=True)):
-        if MIN_RATIO * upper > sample_rate * (1 + 1e-12):
-            continue
-        zeros, poles, gain = butter(ORDER, (lower, upper), "bandpass", fs=sample_rate, output="zpk")
-        sections[band] = zpk2sos(zeros, poles, gain)
-        radius = np.abs(poles).max()
-        # After n samples the energy of the decay is at most radius**(2 n).
-        ringing[band] = math.ceil(math.log(MAX_CUT) / (2 * math.log(radius)))
-    return sections, ringing
