@@ -12,7 +12,7 @@ import thud
 from thud.base.key import Group
 from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, Instrument, Properties, ReportConfig
-from thud.recordings.instruments import Plate, RecorderFilter
+from thud.recordings.response import Plate, RecorderFilter
 
 if TYPE_CHECKING:
     from collections.abc import Callable

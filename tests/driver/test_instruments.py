@@ -14,13 +14,8 @@ from synthetic import make_drop
 
 import thud
 from thud.recordings.config import Config
-from thud.recordings.instruments import (
-    Plate,
-    RecorderFilter,
-    instrument_contributions,
-    mean_level_changes,
-)
-from thud.recordings.response import Chain
+from thud.recordings.instruments import instrument_contributions, mean_level_changes
+from thud.recordings.response import Chain, Plate, RecorderFilter
 from thud.recordings.signal import Signal
 
 RATE = 48_000.0

@@ -23,7 +23,8 @@ import thud
 from thud import cli
 from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config
-from thud.recordings.instruments import AMPLITUDE_DECIBEL, Plate
+from thud.recordings.instruments import AMPLITUDE_DECIBEL, check_plate
+from thud.recordings.response import Plate
 from thud.recordings.signal import Signal
 from thud.report.contents import report_data
 
@@ -431,7 +432,7 @@ def test_plate_is_that_of_the_configuration(tmp_path: Path) -> None:
         "f0_uncertainty = 1e-4\ntime_constant = 1\nfull_scale = 4e3\nlinearity = [[5, 5], [5e3, 5e3]] #",  # noqa: E501
     )
     found = example("drop_1.wav", tmp_path, plate)
-    assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
+    assert [one.met for one in check_plate(found.config.plate)] == [False, True, False, True]
     assert noted(found.notes, "plate_low").others["frequency"] == 0.2
     assert noted(found.notes, "plate_range").value == 4000
 

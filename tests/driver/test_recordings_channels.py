@@ -20,8 +20,7 @@ from thud import cli
 from thud.base.errors import InputError
 from thud.level.estimate import Estimate
 from thud.recordings.budgets import average_estimates
-from thud.recordings.config import Config, read_config
-from thud.recordings.config_values import require_channels
+from thud.recordings.config import Config, read_config, require_channels
 from thud.recordings.recorded_levels import average_levels, measure_levels
 from thud.recordings.signal import Signal, add_signals
 

@@ -9,8 +9,7 @@ import pytest
 from conftest import codes, naming, noted
 
 import thud
-from thud.recordings.config import Config
-from thud.recordings.config_values import parse_numbers
+from thud.recordings.config import Config, parse_numbers
 from thud.recordings.drops import Pulse, find_drops
 from thud.recordings.signal import Signal
 

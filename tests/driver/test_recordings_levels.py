@@ -24,7 +24,7 @@ from thud.recordings.budgets import average_estimates, find_deviant
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
-from thud.recordings.instruments import Plate, check_plate, instrument_contributions
+from thud.recordings.instruments import check_plate, instrument_contributions
 from thud.recordings.recorded_levels import (
     METHODS,
     AverageLevels,
@@ -33,7 +33,7 @@ from thud.recordings.recorded_levels import (
     compare_methods,
     measure_levels,
 )
-from thud.recordings.response import Chain, correct_force
+from thud.recordings.response import Chain, Plate, correct_force
 
 if TYPE_CHECKING:
     from collections.abc import Callable

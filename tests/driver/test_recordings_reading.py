@@ -38,7 +38,7 @@ from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, Instrument, Properties, ReportConfig, read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
-from thud.recordings.instruments import Plate, RecorderFilter
+from thud.recordings.response import Plate, RecorderFilter
 from thud.recordings.signal import Signal
 from thud.recordings.signs import check_peak, find_peaks
 
@@ -1050,7 +1050,8 @@ def test_configuration_is_read(tmp_path: Path) -> None:
     found = read_config(tmp_path / "lab.toml")
     assert found.calibration == "4.1 pC/N, 10 mV/pC"
     assert found.calibration_uncertainty == 0.005
-    assert found.instruments == ("force plate 9281", "charge amplifier 5015")
+    names = [entry.name for entry in found.instruments]
+    assert names == ["force plate 9281", "charge amplifier 5015"]
     assert found.plate == Plate(950.0, 30.0, 0.01, linearity=((100.0, 101.0), (1000.0, 990.0)))
     assert found.limits == {"octave_500": (10.0, 15.0)}
     assert (found.channel, found.unit, found.polarity) == (1, "V", "negative")

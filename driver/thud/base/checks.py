@@ -143,13 +143,21 @@ def require_whole(name: str, value: Any, low: int, high: int) -> int:  # noqa: A
     return int(value)
 
 
-def require_number(name: str, value: Any) -> float:  # noqa: ANN401 - of a user
-    """Return a number; raise InputError if a value is not a finite number."""
-    kinds = int | float | np.integer | np.floating
-    is_valid = isinstance(value, kinds) and not isinstance(value, bool)
-    number = value if isinstance(value, int) or not is_valid else float(value)
-    if not is_valid or not -MAX_NUMBER <= number <= MAX_NUMBER:
-        refuse_value(name, value, "finite numbers")
+def require_number(
+    name: str,
+    value: Any,  # noqa: ANN401 - of a user
+    low: float = -MAX_NUMBER,
+    high: float = MAX_NUMBER,
+    unit: str = "",
+) -> float:
+    """Return a number; raise InputError if a value is none from low to high, in a unit."""
+    number = value if isinstance(value, int | float | np.integer | np.floating) else math.nan
+    # NumPy does not compare all of its numbers with large integers of Python.
+    number = float(number) if isinstance(number, np.generic) else number
+    if isinstance(value, bool) or not low <= number <= high:
+        if high == MAX_NUMBER:
+            refuse_value(name, value, "finite numbers")
+        refuse_value(name, value, f"{low:g} to {high:g} {unit}".rstrip(), low=low, high=high)
     return float(value)
 
 

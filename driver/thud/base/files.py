@@ -7,7 +7,6 @@ import os
 import secrets
 import shutil
 import stat
-import tomllib
 from abc import ABC, abstractmethod
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -193,23 +192,6 @@ def content_of(path: Path) -> bytes | None:
     with suppress(OSError, ValueError):  # a zero byte
         return read_input(path)
     return None
-
-
-def read_toml(path: Path) -> tuple[dict[str, Any], str]:
-    """Return the tables and the text of a TOML file.
-
-    Raise InputError with the path if the file cannot be read or is not TOML.
-    """
-    try:
-        text = read_input(path).decode("utf-8-sig")
-    except OSError as error:
-        refuse(f"{path}: {error.strerror}", "a file that exists and can be read", error)
-    except UnicodeDecodeError as error:
-        refuse(f"{path}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
-    try:
-        return tomllib.loads(text), text
-    except (ValueError, RecursionError) as error:  # no TOML, or thousands of digits or brackets
-        refuse(f"{path}: {error}", "TOML", error)
 
 
 def inputs_folder() -> Path:

@@ -30,7 +30,8 @@ from thud.base.checks import (
 )
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.base.files import inputs_folder, read_toml
+from thud.base.files import inputs_folder
+from thud.base.toml_tables import read_toml
 from thud.case.case import Case, check_case
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
+from thud.base.toml_tables import Choice, Number
 from thud.cli.command import (
     NO_FIGURES,
     NOT_CONFORMING,
@@ -23,7 +24,6 @@ from thud.cli.command import (
 )
 from thud.cli.screen import print_notes, print_path, print_results, shows_progress
 from thud.recordings.config import Config, read_config
-from thud.recordings.config_values import Choice, Number
 
 if TYPE_CHECKING:
     import argparse

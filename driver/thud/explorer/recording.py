@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thud.base.checks import refuse
-from thud.base.files import read_toml
+from thud.base.toml_tables import read_toml
 from thud.explorer.answer import common_answer
 from thud.explorer.criteria import largest_contribution, recording_headline
 from thud.explorer.decisive import decisive_warnings

@@ -16,10 +16,6 @@ from .drops import (
     cut_section as cut_section,
     find_drops as find_drops,
 )
-from .instruments import (
-    Plate as Plate,
-    RecorderFilter as RecorderFilter,
-)
 from .measured_drop import (
     Drop as Drop,
     measure_drop as measure_drop,
@@ -35,6 +31,8 @@ from .recorded_levels import (
 from .repair import repair as repair
 from .response import (
     Chain as Chain,
+    Plate as Plate,
+    RecorderFilter as RecorderFilter,
     correct as correct,
 )
 from .signal import Signal as Signal

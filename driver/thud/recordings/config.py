@@ -3,48 +3,145 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
 from dataclasses import dataclass, replace
+from datetime import date
+from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse_unknown
+from thud.base.checks import refuse, refuse_unknown, refuse_value, require_number, require_whole
 from thud.base.errors import InputError
-from thud.base.files import read_toml
 from thud.base.note import Note
+from thud.base.toml_tables import (
+    Choice,
+    Number,
+    TomlTable,
+    key,
+    read_toml,
+    require_table,
+    to_line,
+    to_pair,
+)
+from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import regular_file, shown_path
-from thud.recordings.config_values import (
-    Choice,
-    Listed,
-    Number,
-    Table,
-    key,
-    require_channels,
-    to_calibrations,
-    to_channel,
-    to_date,
-    to_day,
-    to_limits,
-    to_line,
-    to_numbers,
-    to_reasons,
-)
-from thud.recordings.force_units import Calibration, require_unit
-from thud.recordings.instruments import Plate, RecorderFilter, check_plate
-from thud.recordings.response import Chain
+from thud.recordings.force_units import Calibration, plain_number, read_chain, require_unit
+from thud.recordings.response import Chain, Plate, RecorderFilter
 from thud.recordings.signs import POLARITIES
 from thud.recordings.words import read_date
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from thud.base._schema import LimitsSource
-    from thud.recordings.instruments import PlateCheck
+
+# A number of a drop, or the first and the last of several.
+NUMBERS = re.compile(r"\s*(\d{1,6})\s*(?:-\s*(\d{1,6})\s*)?")
+SUM = "sum"
+# Maximum number of channels that are added, and of a channel; maximum N per unit.
+MAX_CELLS = 64
+MAX_CHANNEL = 1_000_000
+MAX_FACTOR = 1e30
+EXAMPLES = '"sum", "F1+F2+F3+F4" or a list of names or numbers'
+
+
+def to_date(value: object, name: str) -> str:
+    """Return a date as text in ISO 8601; empty if not stated."""
+    text = value.isoformat() if isinstance(value, date) else to_line(value, name)
+    day = read_date(text) if text else None
+    if text and day is None:
+        refuse_value(name, value, 'a date, such as "2024-05-03"')
+    return day.date().isoformat() if day else ""
+
+
+def to_channel(value: object, name: str) -> int | str:
+    """Return the number or the name of a channel."""
+    is_number = isinstance(value, Integral)
+    return require_whole(name, value, 1, MAX_CHANNEL) if is_number else to_line(value, name)
+
+
+def require_channels(value: object, name: str = "channels") -> str | tuple[int | str, ...]:
+    """Return ``"sum"`` or names and numbers of channels; raise InputError if they are neither.
+
+    >>> require_channels("F1 + F2 + 3")
+    ('F1', 'F2', 3)
+    """
+    cells: Any = value if isinstance(value, list | tuple) else ()
+    if isinstance(value, str):
+        if value.strip().casefold() == SUM:
+            return SUM
+        parts = map(str.strip, value.split("+"))
+        cells = [int(part) if part.isdecimal() else part for part in parts]
+    are_cells = all(type(cell) in {int, str} and cell for cell in cells)
+    if not 1 < len(cells) <= MAX_CELLS or not are_cells or len(set(cells)) < len(cells):
+        refuse_value(name, value, f"{EXAMPLES}, 2 to {MAX_CELLS} different")
+    return tuple(cells)
+
+
+def to_calibrations(value: object, name: str) -> Any:  # noqa: ANN401 - one, or a tuple of them
+    """Return a calibration, also that of a list of one, or one for each channel.
+
+    Each is a number, a chain of factors or a `Calibration`.
+    """
+    if isinstance(value, list | tuple):
+        if len(value) == 1:
+            return to_calibrations(value[0], name)
+        return tuple(to_calibrations(v, f"{name}, entry {i}") for i, v in enumerate(value, 1))
+    value = plain_number(value)
+    if isinstance(value, Calibration):
+        return value
+    if not isinstance(value, str):
+        return require_number(name, value, -MAX_FACTOR, MAX_FACTOR)
+    try:
+        read_chain(to_line(value, name))
+    except InputError as error:
+        raise error.within(name) from error
+    return value
+
+
+def parse_numbers(text: str, name: str) -> list[range]:
+    """Return the ranges of numbers in a text such as ``"1-5, 8"``; raise InputError if none."""
+    matches = [NUMBERS.fullmatch(part) for part in text.split(",")]
+    ranges = [range(int(m[1]), int(m[2] or m[1]) + 1) if m else range(0) for m in matches]
+    if not all(ranges) or any(part.start < 1 for part in ranges):
+        refuse_value(name, text, 'numbers of drops from 1, such as "1-5, 8"')
+    return ranges
+
+
+def to_numbers(value: object, name: str) -> str:
+    """Return the text of numbers of drops."""
+    text = to_line(value, name)
+    parse_numbers(text, name)
+    return text
+
+
+def to_reasons(value: object, name: str) -> dict[str, str]:
+    """Return reasons by numbers of drops."""
+    table = require_table(value, name)
+    reasons = {to_numbers(str(drops), name): to_line(table[drops], name) for drops in table}
+    for drops, reason in reasons.items():
+        if not reason.strip():
+            refuse(f"{name}: {drops} has no reason", 'a reason, such as "touched"')
+    return reasons
+
+
+def to_limits(value: object, name: str) -> dict[str, tuple[float, float]]:
+    """Return minimum and maximum by criterion."""
+    table = require_table(value, name)
+    refuse_unknown(name, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
+    limits = {}
+    for criterion, span in table.items():
+        label = f"{name}: {criterion}"
+        low, high = to_pair(span, label, "[minimum, maximum]", Number(-1e6, 1e6))
+        if not low < high:
+            refuse_value(label, span, "minimum < maximum")
+        limits[criterion] = (low, high)
+    return limits
 
 
 @dataclass(frozen=True)
-class Instrument(Table):
+class Instrument(TomlTable):
     """An instrument of the measurement and its calibration certificate."""
 
     title = "instruments: "
@@ -55,19 +152,28 @@ class Instrument(Table):
     due: str = key(to_date, "date of the next calibration", "")
 
 
-def _instrument(value: object, key: str) -> str | Instrument:
-    is_table = isinstance(value, Mapping | Instrument)
-    return Instrument.read(value, key) if is_table else to_line(value, key)
+def to_instruments(value: object, name: str) -> tuple[Instrument, ...]:
+    """Return instruments from a list of names or tables, or from one of them."""
+    return tuple(
+        Instrument(entry) if isinstance(entry, str) else Instrument.read(entry, name)
+        for entry in (value if isinstance(value, list | tuple) else [value])
+    )
+
+
+def to_lines(value: object, name: str) -> tuple[str, ...]:
+    """Return the lines of a list, or a single line."""
+    lines = value if isinstance(value, list | tuple) else [value]
+    return tuple(to_line(line, name) for line in lines)
 
 
 @dataclass(frozen=True)
-class ReportConfig(Table):
+class ReportConfig(TomlTable):
     """What a report of a laboratory states besides its results (ISO/IEC 17025, 7.8)."""
 
     title = "report: "
     number: str = key(to_line, "number of the report, on each page", "")
-    address: tuple[str, ...] = key(Listed(to_line), "address of the laboratory, a line each", ())
-    client: tuple[str, ...] = key(Listed(to_line), "name and address of the client", ())
+    address: tuple[str, ...] = key(to_lines, "address of the laboratory, a line each", ())
+    client: tuple[str, ...] = key(to_lines, "name and address of the client", ())
     item: str = key(to_line, "description of the item", "")
     state: str = key(to_line, "state of the item at receipt", "")
     received: str = key(to_date, "date of receipt of the item", "")
@@ -85,7 +191,7 @@ class ReportConfig(Table):
 
 
 @dataclass(frozen=True)
-class Properties(Table):
+class Properties(TomlTable):
     """Properties of the ball that are stated, not assessed (ISO 10140-5, annex F)."""
 
     title = "properties: "
@@ -99,17 +205,17 @@ class Properties(Table):
 
 
 @dataclass(frozen=True)
-class Config(Table):
+class Config(TomlTable):
     """What a laboratory states about its ball, instruments and files; None if unknown."""
 
     laboratory: str = key(to_line, "name of the laboratory", "")
     ball: str = key(to_line, "name of the ball", "")
     serial: str = key(to_line, "serial number of the ball", "")
-    date: str = key(to_day, "date of the measurement; by default that of the files", "")
+    date: str = key(to_date, "date of the measurement; by default that of the files", "")
     source: LimitsSource = key(Choice(SOURCES), "source whose limits apply", SOURCES[0])
     temperature: float | None = key(Number(-273.15, 200.0, "degC"), "temperature of ball and air")
-    instruments: tuple[str | Instrument, ...] = key(
-        Listed(_instrument), "names of instruments, or tables with their certificates", ()
+    instruments: tuple[Instrument, ...] = key(
+        to_instruments, "names of instruments, or tables with their certificates", ()
     )
     channel: int | str | None = key(to_channel, "channel of the force, by number or name")
     channels: str | tuple[int | str, ...] | None = key(
@@ -191,7 +297,7 @@ class Config(Table):
 
         `file_dates` are those of the files, which count if no date is stated.
         """
-        due = [entry for entry in self.instruments if isinstance(entry, Instrument) and entry.due]
+        due = [entry for entry in self.instruments if entry.due]
         read = [read_date(text) for text in ([self.date] if self.date else file_dates)]
         last = max((day.date().isoformat() for day in read if day), default="")
         if due and not last:
@@ -201,11 +307,6 @@ class Config(Table):
             for entry in due
             if entry.due < last
         ]
-
-    @property
-    def plate_checks(self) -> tuple[PlateCheck, ...]:
-        """Checks of the plate by the standard; none without ``[plate]``."""
-        return check_plate(self.plate) if self.plate else ()
 
 
 def config_from(table: Mapping[str, object], file: str = "") -> Config:

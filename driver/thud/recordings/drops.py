@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.config_values import parse_numbers
+from thud.recordings.config import parse_numbers
 from thud.recordings.differences import robust_deviation
 from thud.recordings.quantization import Quantization
 from thud.recordings.stage import Stage

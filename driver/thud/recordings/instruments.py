@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.base.units import frequency_text
 from thud.level.estimate import NORMAL_FACTOR, RECTANGULAR, Contribution
 from thud.level.levels import get_bands, low_pass
-from thud.recordings.config_values import Choice, Number, Table, key, to_linearity
+from thud.recordings.response import Plate, RecorderFilter
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -36,14 +34,6 @@ if TYPE_CHECKING:
 FLAT = (0.2, 1000.0)
 RANGE = 5000.0
 TOLERANCE = 0.02
-# Minimum ratio 1/r of resonance and highest band edge: an error of 1 % of the resonance causes an
-# error of 2 r**2 / (1 - r**2) = 2 % of the force at this edge, the tolerance of the standard.
-MIN_RATIO = math.sqrt(2)
-# Filters, and response at the highest frequency at which they are corrected: there the correction
-# amplifies the noise by 3.
-KINDS = ("bessel", "butterworth")
-MAX_ORDER = 12
-LOWEST_RESPONSE = 1 / 3
 # If no filter is stated, it is assumed to be at worst a Bessel filter of this order whose cutoff is
 # this fraction of the sample rate.
 ASSUMED_ORDER = 4
@@ -70,130 +60,6 @@ MIN_SHARE = 0.5
 
 
 @dataclass(frozen=True)
-class Plate(Table):
-    """A force plate; the force on it excites its first mode of vibration, which is corrected."""
-
-    title = "plate: "
-    f0: float = key(Number(1.0, 1e6, "Hz"), "frequency of the first resonance", math.nan)
-    Q: float = key(Number(0.5, 1e6), "quality factor of the first resonance", math.nan)
-    f0_uncertainty: float | None = key(
-        Number(0.0, 0.5), "relative standard uncertainty of the resonance"
-    )
-    share: float | None = key(
-        Number(0.001, 1.0), "share of this mode in the static response, 1 for a mass on a spring"
-    )
-    flat_limit: float | None = key(
-        Number(100.0, 1e6, "Hz"),
-        "frequency up to which the response is flat within 2 %, if no resonance is stated",
-    )
-    time_constant: float | None = key(Number(1e-3, 1e9, "s"), "time constant of the amplifier")
-    full_scale: float | None = key(
-        Number(1.0, 1e9, "N"), "largest force that plate and recorder can measure"
-    )
-    linearity: tuple[tuple[float, float], ...] = key(
-        to_linearity, "pairs of a force applied and the force indicated, N", ()
-    )
-
-    def __post_init__(self) -> None:
-        """Raise InputError if a value is not allowed, or one is missing."""
-        super().__post_init__()
-        if {"f0", "Q", "f0_uncertainty", "share"} & set(self.stated):
-            self.require("f0", "Q")
-            if self.flat_limit is not None:
-                refuse("and flat_limit are both stated", "one of them", name="plate: f0")
-
-    def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the ratio of measured and applied force, at frequencies in Hz."""
-        ratio = frequency / self.f0
-        mode = 1 / (1 - ratio**2 + 1j * ratio / self.Q)
-        return np.asarray(1 + (self.share or 1.0) * (mode - 1))
-
-    @property
-    def highest(self) -> float:
-        """Highest corrected frequency, Hz: above the resonance the response falls to 1/3 there."""
-        share = self.share or 1.0
-        return self.f0 * math.sqrt(1 + share / (4 / 3 - share))
-
-    def note(self, sample_rate: float) -> Note:
-        """Return a note on the correction at a sample rate, Hz."""
-        highest = min(self.highest, sample_rate / 2)
-        gain = 1 / abs(self.response(np.array([highest]))[0])
-        return Note(
-            "plate_corrected", value=self.f0, high=highest, unit="Hz",
-            others={"quality": self.Q, "gain": gain},
-        )  # fmt: skip
-
-    def require_above(self, edge: float) -> None:
-        """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""
-        if self.f0 < MIN_RATIO * edge:
-            refuse(
-                f"plate: the resonance, {frequency_text(self.f0)}, is too close "
-                f"to the bands, which reach up to {frequency_text(edge)}, for a correction",
-                f"{frequency_text(MIN_RATIO * edge)} or more",
-            )
-
-
-@dataclass(frozen=True)
-class RecorderFilter(Table):
-    """The low-pass filter of the recorder or amplifier, which is corrected."""
-
-    title = "filter: "
-    kind: str = key(
-        Choice((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
-    )
-    order: int | None = key(Number(1, MAX_ORDER, whole=True), "order")
-    cutoff: float = key(Number(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
-    cutoff_uncertainty: float | None = key(
-        Number(0.0, 0.5), "relative standard uncertainty of the cutoff"
-    )
-
-    def __post_init__(self) -> None:
-        """Raise InputError if a value is not allowed, or one is missing."""
-        super().__post_init__()
-        self.require("kind")
-        if self.kind != "none":
-            self.require("order", "cutoff")
-        elif len(self.stated) > 1:
-            refuse("filter: kind = 'none' has an order or a cutoff", "kind alone, or another kind")
-
-    def response(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the ratio of output and input, at frequencies in Hz."""
-        # SciPy is slow to import, and a configuration is read by every command.
-        from scipy.signal import bessel, butter, freqs_zpk
-
-        if self.kind == "bessel":
-            zpk = bessel(self.order, self.cutoff, analog=True, output="zpk", norm="mag")
-        else:
-            zpk = butter(self.order, self.cutoff, analog=True, output="zpk")
-        return np.asarray(freqs_zpk(*zpk, worN=frequency)[1])
-
-    @property
-    def highest(self) -> float:
-        """Highest corrected frequency, Hz."""
-        frequency = self.cutoff * np.geomspace(1, 8, 400)
-        falling = np.abs(self.response(frequency))[::-1]
-        return float(np.interp(LOWEST_RESPONSE, falling, frequency[::-1]))
-
-    def note(self, sample_rate: float) -> Note:
-        """Return a note on the correction at a sample rate, Hz."""
-        highest = min(self.highest, sample_rate / 2)
-        return Note(
-            "filter_corrected", value=self.cutoff, high=highest, unit="Hz",
-            others={"kind": self.kind.capitalize(), "order": self.order or 0},
-        )  # fmt: skip
-
-    def require_above(self, edge: float) -> None:
-        """Raise InputError if the response is below 1/3 at the highest edge of bands, Hz."""
-        if self.highest < edge:
-            refuse(
-                f"filter: the cutoff, {frequency_text(self.cutoff)}, is too low for the bands, "
-                f"which reach up to {frequency_text(edge)}: the response falls to 1/3 at "
-                f"{frequency_text(self.highest)}",
-                f"{frequency_text(self.cutoff * edge / self.highest)} or more",
-            )
-
-
-@dataclass(frozen=True)
 class PlateCheck:
     """A requirement on the force plate, whether it is met (None if unknown), and a note on it.
 
@@ -205,11 +71,13 @@ class PlateCheck:
     note: Note
 
 
-def check_plate(plate: Plate) -> tuple[PlateCheck, ...]:
+def check_plate(plate: Plate | None) -> tuple[PlateCheck, ...]:
     """Check a plate by the standard: flat from 0.2 to 1000 Hz, 0 to 5000 N, linear within 2 %.
 
-    The resonance of the plate is corrected.
+    The resonance of the plate is corrected. Without a plate there are no checks.
     """
+    if plate is None:
+        return ()
     low, high = FLAT
     checks = (
         ("flat above", _check_low, f"response at {low:g} Hz", "time_constant"),

@@ -17,7 +17,11 @@ from thud.level.assessment import assess_levels
 from thud.level.drop_force import DropForce, ImpactOrRecording
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
-from thud.recordings.instruments import check_assumptions, instrument_contributions
+from thud.recordings.instruments import (
+    check_assumptions,
+    check_plate,
+    instrument_contributions,
+)
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import average_levels, mean_force, measure_levels
 from thud.recordings.restitution import GRAVITY
@@ -180,7 +184,7 @@ class Recording(ImpactOrRecording):
         notes += check_restitution(self.drops, config, self.calibration_uncertainty)
         if config.mass is None and math.isfinite(self.estimates["mass"].value):
             notes.append(Note("effective_mass"))
-        notes += (check.note for check in config.plate_checks if check.met is False)
+        notes += (check.note for check in check_plate(config.plate) if check.met is False)
         notes += config.check_dates(origin.date for origin in self.origins)
         notes += check_assumptions(self.drops, config, self.level_estimates())
         if self.not_stated:

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
-    from thud.recordings.instruments import Plate
-    from thud.recordings.response import Chain
+    from thud.recordings.response import Chain, Plate
 
 # Minimum frequency of a resonance of a plate, Hz, maximum as a fraction of the sample rate, and
 # trial decay times to 1/e, s.

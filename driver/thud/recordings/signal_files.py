@@ -11,8 +11,7 @@ from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.base.units import find_unit
 from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_path, shown_text
-from thud.recordings.config import Config
-from thud.recordings.config_values import SUM
+from thud.recordings.config import SUM, Config
 from thud.recordings.force_units import (
     ALLOWED,
     RECORDED,

@@ -12,7 +12,7 @@ from thud.base.bridge import version
 from thud.level.assessment import get_criteria
 from thud.level.estimate import CONFIDENCE, NOISE, REPEATABILITY
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.recordings.config import Instrument
+from thud.recordings.instruments import check_plate
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import compare_methods
 from thud.recordings.words import read_date
@@ -71,10 +71,7 @@ def report_data(recording: Recording) -> dict[str, Any]:
         "serial": config.serial,
         "date": _dates([config.date] if config.date else [o.date for o in recording.origins]),
         "temperature": config.temperature,
-        "instruments": [
-            vars(item if isinstance(item, Instrument) else Instrument(item))
-            for item in config.instruments
-        ],
+        "instruments": [vars(item) for item in config.instruments],
         "report": {
             **vars(config.report),
             "accreditation_mark": Path(config.report.accreditation_mark).name,
@@ -96,7 +93,7 @@ def report_data(recording: Recording) -> dict[str, Any]:
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [
             {"requirement": check.requirement, "met": check.met, "reason": str(check.note)}
-            for check in config.plate_checks
+            for check in check_plate(config.plate)
         ],
         "processing": sentences(recording, is_warning=False),
         "warnings": sentences(recording, is_warning=True),
@@ -196,7 +193,7 @@ def missing_fields(config: Config, origins: Iterable[Origin]) -> list[str]:
     stated = {**vars(config.report), **vars(config)}
     stated["date"] = config.date or any(origin.date for origin in origins)
     missing = [title for key, title in FIELDS.items() if stated[key] in ("", (), None, False)]
-    certified = [isinstance(item, Instrument) and item.certificate for item in config.instruments]
+    certified = [item.certificate for item in config.instruments]
     if not certified:
         missing.append("instruments")
     elif not all(certified):

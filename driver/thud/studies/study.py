@@ -17,7 +17,7 @@ from thud.base._schema import MODELS
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown
 from thud.base.errors import InputError
-from thud.base.files import read_toml
+from thud.base.toml_tables import read_toml
 from thud.case.case import (
     Case,
     check_case,
