@@ -14,7 +14,6 @@ from .case.case import (
 )
 from .case.constructions import (
     Construction as Construction,
-    Constructions as Constructions,
     construction as construction,
     constructions as constructions,
 )

@@ -289,7 +289,11 @@ def test_tapping_level_is_of_bare_plates(
 
 
 def test_tapping_level_is_not_of_constructions_with_a_ceiling() -> None:
-    found = [c for c in thud.constructions("ceiling") if c.room and isinstance(c.floor, thud.Plate)]
+    found = [
+        c
+        for c in thud.constructions("ceiling").values()
+        if c.room and isinstance(c.floor, thud.Plate)
+    ]
     assert len(found) > 1
     for construction in found:
         with pytest.raises(thud.InputError, match="a ceiling"):

@@ -143,7 +143,7 @@ def test_floors_that_once_were_mistaken_for_each_other() -> None:
 
 
 def test_constructions_have_dictionaries_of_their_own() -> None:
-    name = next(entry.name for entry in thud.constructions() if entry.room)
+    name = next(entry.name for entry in thud.constructions().values() if entry.room)
     thud.construction(name).room["ceiling_mass"] = 1.0
     assert thud.construction(name).room["ceiling_mass"] != 1.0
 

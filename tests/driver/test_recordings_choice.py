@@ -171,7 +171,7 @@ def test_impossible_restitution_is_a_warning() -> None:
         ({"drops": "1-"}, ("drops", "1-5, 8")),
         ({"drops": "0"}, ("drops", "from 1")),
         ({"drops": "5"}, ("drops", "no drop 5", "1 to 3")),
-        ({"leave_out": {"2": " "}}, ("leave_out", "2", "no reason")),
+        ({"leave_out": {"2": " "}}, ("leave_out", "reason", "2", "text")),
         ({"leave_out": {"4": "cut"}}, ("leave_out", "no drop 4")),
         ({"leave_out": {"1-3": "cut"}}, ("every drop is left out",)),
     ],

@@ -65,6 +65,13 @@ def to_line(value: object, name: str) -> str:
     return value
 
 
+def to_text(value: object, name: str) -> str:
+    """Return a line of text that is not blank; raise InputError if a value is none."""
+    if not to_line(value, name).strip():
+        refuse_value(name, value, "a text in one line")
+    return str(value)
+
+
 def to_pair(value: object, name: str, ends: str, number: Number) -> tuple[float, float]:
     """Return two numbers, which have these names; raise InputError if a value is none."""
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004

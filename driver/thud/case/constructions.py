@@ -4,70 +4,61 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from thud.base._schema import (
-    FLOORS,
-    KEYS,
-    FloorOptions,
-    JoistFloor,
-    RectangularFloor,
-    Room,
-)
+from thud.base._schema import FLOORS, KEYS, FloorOptions, JoistFloor, RectangularFloor, Room
 from thud.base.checks import (
     refuse,
     refuse_unknown,
     refuse_value,
-    require_choice,
     require_kind,
-    require_number,
     shown,
     suggestion,
 )
 from thud.base.display import Displayed
 from thud.base.errors import InputError
 from thud.base.files import inputs_folder
-from thud.base.toml_tables import read_toml
+from thud.base.toml_tables import (
+    Choice,
+    Number,
+    TomlTable,
+    key,
+    read_toml,
+    require_table,
+    to_line,
+    to_text,
+)
 from thud.case.case import Case, check_case
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Mapping
 
     from matplotlib.figure import Figure
 
 # Keys of the room that belong to a construction: its suspended ceiling.
-CEILING_KEYS = tuple(
-    key.name for key in KEYS if key.owner == "room" and key.name.startswith("ceiling_")
-)
-# Entries of a file, the texts first; the others are tables.
-_TEXTS = ("name", "kind", "floor", "note")
-_ENTRIES = (*_TEXTS, "layers", "keys", "room")
-_OPTIONAL = ("note", "room")
-_UNITS = {(key.owner, key.name): key.unit for key in KEYS}
+CEILING_KEYS = tuple(k.name for k in KEYS if k.owner == "room" and k.name.startswith("ceiling_"))
+Table = TypeVar("Table", bound=TomlTable)
+_UNITS = {(k.owner, k.name): k.unit for k in KEYS}
 
 
-class Layer(NamedTuple):
-    """A layer of a floor.
+@dataclass(frozen=True)
+class Layer(TomlTable):
+    """A layer of a floor, with width and spacing of members such as joists; 0: none."""
 
-    Attributes
-    ----------
-    material : str
-        Its name.
-    thickness, density : float
-        Thickness, m, and mean density, kg/m3.
-    width, spacing : float
-        Width of members such as joists, and the distance between their axes, m; 0: none.
-    """
+    material: str = key(to_text, "name of the material", "")
+    thickness: float = key(Number(1e-5, 10.0, "m"), "thickness", 0.0)
+    density: float = key(Number(0.1, 1e5, "kg/m3"), "mean density", 0.0)
+    width: float = key(Number(1e-3, 10.0, "m"), "width of members such as joists", 0.0)
+    spacing: float = key(Number(1e-2, 10.0, "m"), "distance between their axes", 0.0)
 
-    material: str
-    thickness: float
-    density: float
-    width: float = 0.0
-    spacing: float = 0.0
+    def __post_init__(self) -> None:
+        """Raise InputError if a value is not allowed or missing."""
+        super().__post_init__()
+        self.require("material", "thickness", "density")
 
     def __str__(self) -> str:
         """Return thickness and material."""
@@ -114,6 +105,11 @@ class Construction(Displayed):
         """Mass of all layers, kg/m2."""
         return sum(layer.thickness * layer.density for layer in self.layers)
 
+    @property
+    def section(self) -> str:
+        """Layers from top to bottom, in words."""
+        return ", ".join(map(str, self.layers))
+
     def case(self, source: Case | None = None) -> Case:
         """Return a case with this construction as floor and ceiling.
 
@@ -156,12 +152,12 @@ class Construction(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and a row of text for each stated key."""
         rows: list[tuple[str, ...]] = [("key", "value", "unit", "source")]
-        for key, source in self.sources.items():
-            owner = "room" if key in self.room else self.floor.name
-            value = self.room[key] if key in self.room else getattr(self.floor, key)
+        for name, source in self.sources.items():
+            owner = "room" if name in self.room else self.floor.name
+            value = self.room[name] if name in self.room else getattr(self.floor, name)
             values = value if isinstance(value, tuple) else (value,)
             text = ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in values)
-            rows.append((key, text, _UNITS[owner, key], source))
+            rows.append((name, text, _UNITS[owner, name], source))
         return rows
 
     def plot(self) -> Figure:
@@ -172,61 +168,11 @@ class Construction(Displayed):
 
     def __repr__(self) -> str:
         """Return name and layers."""
-        return f"<Construction {self.name}: {', '.join(map(str, self.layers))}>"
+        return f"<Construction {self.name}: {self.section}>"
 
 
-@dataclass(frozen=True, repr=False)
-class Constructions(Displayed):
-    """Floor constructions: a sequence, with access by name.
-
-    Attributes
-    ----------
-    entries : tuple of Construction
-        The constructions, sorted by kind and name.
-    """
-
-    entries: tuple[Construction, ...]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the constructions."""
-        return tuple(entry.name for entry in self.entries)
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and a row of text for each construction."""
-        header = ("construction", "layers from top to bottom", "mass, kg/m2")
-        layers = (", ".join(map(str, entry.layers)) for entry in self.entries)
-        masses = (f"{entry.mass_per_area:.0f}" for entry in self.entries)
-        return [header, *zip(self.names, layers, masses, strict=True)]
-
-    def __getitem__(self, name: str) -> Construction:
-        """Return a construction by its name, in which case and commas do not matter.
-
-        Raise InputError if the name is not known.
-        """
-        names = [_words(known) for known in self.names]
-        if _words(name) not in names:
-            refuse(
-                f"construction = {shown(name)} is not known{suggestion(name, self.names)}",
-                "names that thud-driver floor --list shows, or the path of a TOML file",
-            )
-        return self.entries[names.index(_words(name))]
-
-    def __iter__(self) -> Iterator[Construction]:
-        """Iterate over the constructions."""
-        return iter(self.entries)
-
-    def __len__(self) -> int:
-        """Return the number of constructions."""
-        return len(self.entries)
-
-    def __repr__(self) -> str:
-        """Return the names."""
-        return f"<Constructions, {len(self)}: {'; '.join(self.names)}>"
-
-
-def constructions(text: str = "") -> Constructions:
-    """Return the floor constructions of the library.
+def constructions(text: str = "") -> dict[str, Construction]:
+    """Return the floor constructions of the library by name, sorted by kind and name.
 
     Parameters
     ----------
@@ -242,16 +188,19 @@ def constructions(text: str = "") -> Constructions:
     Examples
     --------
     >>> import thud
-    >>> thud.constructions("screed 200 15").names
-    ('concrete 200, screed on 15 MN/m3', 'hollow core 200, screed on 15 MN/m3')
+    >>> list(thud.constructions("screed 200 15"))
+    ['concrete 200, screed on 15 MN/m3', 'hollow core 200, screed on 15 MN/m3']
     """
     require_kind("text", text, str)
-    words = _words(text)
-    chosen = tuple(entry for entry in _library() if all(word in _searched(entry) for word in words))
+    chosen = {}
+    for entry in _library():
+        searched = _plain(" ".join((entry.name, entry.kind, *(e.material for e in entry.layers))))
+        if all(word in searched for word in _plain(text).split()):
+            chosen[entry.name] = deepcopy(entry)
     if not chosen:
         kinds = ", ".join(dict.fromkeys(entry.kind for entry in _library()))
         refuse(f"no construction contains {shown(text)}", f"words such as those of {kinds}")
-    return Constructions(chosen)
+    return chosen
 
 
 def construction(name: str | os.PathLike[str]) -> Construction:
@@ -260,7 +209,8 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     Parameters
     ----------
     name
-        Name in the library, or the path of a TOML file, which ends with ``.toml``.
+        Name in the library, in which case and commas do not matter, or the path of a TOML file,
+        which ends with ``.toml``.
 
     Raises
     ------
@@ -274,9 +224,22 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     0.18
     """
     require_kind("construction", name, str | os.PathLike)
-    if isinstance(name, str) and not name.endswith(".toml"):
-        return Constructions(_library())[name]
-    return read_construction(Path(name))
+    if not isinstance(name, str) or name.endswith(".toml"):
+        return read_construction(Path(name))
+    by_name = {_plain(entry.name): entry for entry in _library()}
+    if _plain(name) not in by_name:
+        names = [entry.name for entry in by_name.values()]
+        refuse(
+            f"construction = {shown(name)} is not known{suggestion(name, names)}",
+            "names that thud-driver floor --list shows, or the path of a TOML file",
+        )
+    return deepcopy(by_name[_plain(name)])
+
+
+def construction_rows(entries: Iterable[Construction]) -> list[tuple[str, ...]]:
+    """Return header and a row of text for each construction."""
+    header = ("construction", "layers from top to bottom", "mass, kg/m2")
+    return [header, *((e.name, e.section, f"{e.mass_per_area:.0f}") for e in entries)]
 
 
 def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> Case:
@@ -286,32 +249,21 @@ def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> C
     return floor.case(case) if isinstance(floor, Construction) else replace(case, floor=floor)
 
 
-def _library() -> tuple[Construction, ...]:
-    """Return all constructions, whose dictionaries are the caller's."""
-    return tuple(replace(c, room={**c.room}, sources={**c.sources}) for c in _read_library())
-
-
 @cache
-def _read_library() -> tuple[Construction, ...]:
-    files = (inputs_folder() / "constructions").glob("*.toml")
-    entries = map(read_construction, files)
+def _library() -> tuple[Construction, ...]:
+    """Return all constructions, sorted by kind, and by the words and numbers of their names."""
+    entries = map(read_construction, (inputs_folder() / "constructions").glob("*.toml"))
     return tuple(sorted(entries, key=lambda entry: (entry.kind, _order(entry.name))))
 
 
-def _order(name: str) -> list[tuple[int, str]]:
-    """Return what sorts names by their words, and by the values of numbers in them."""
-    words = re.findall(r"\d+|[^\d\s,]+", name)
-    return [(int(word) if word.isdigit() else 0, word) for word in words]
+def _order(name: str) -> str:
+    """Return a name whose numbers, of four digits, are sorted by their value after words."""
+    return re.sub(r"\d+", lambda match: f"~{match[0]:0>4}", _plain(name))
 
 
-def _searched(entry: Construction) -> str:
-    materials = " ".join(layer.material for layer in entry.layers)
-    return " ".join(_words(f"{entry.name} {entry.kind} {materials}"))
-
-
-def _words(text: str) -> list[str]:
-    """Return the words of a text in lower case, without commas."""
-    return text.lower().replace(",", " ").split()
+def _plain(text: str) -> str:
+    """Return a text in lower case, without commas, with single blanks."""
+    return " ".join(text.lower().replace(",", " ").split())
 
 
 def _sides(case: Case) -> tuple[float, float] | None:
@@ -325,6 +277,60 @@ def _sides(case: Case) -> tuple[float, float] | None:
     return None
 
 
+@dataclass(frozen=True)
+class _Sourced(TomlTable):
+    value: Any = key(lambda value, _: value, "value of a key")
+    source: str = key(to_text, "its source", "")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require("value", "source")
+
+
+def _read_each(kind: type[Table], tables: Mapping[str, object]) -> list[Table]:
+    """Return tables of a kind; their labels are in messages."""
+    result = []
+    for label, table in tables.items():
+        try:
+            result.append(kind.read(table, "the table"))
+        except InputError as error:
+            raise error.within(label) from error
+    return result
+
+
+def _to_sourced(value: object, name: str) -> dict[str, _Sourced]:
+    """Return value and source of each key in a table."""
+    table = require_table(value, name)
+    entries = _read_each(_Sourced, {f"[{name}] {word}": table[word] for word in table})
+    return dict(zip(table, entries, strict=True))
+
+
+def _to_layers(value: object, name: str) -> tuple[Layer, ...]:
+    """Return the layers in a list of tables."""
+    if not isinstance(value, list) or not value:
+        refuse_value(name, value, "a list of tables with material, thickness and density")
+    return tuple(_read_each(Layer, {f"layer {i}": table for i, table in enumerate(value, 1)}))
+
+
+@dataclass(frozen=True)
+class _File(TomlTable):
+    """Tables of a file."""
+
+    name: str = key(to_text, "name of the construction", "")
+    kind: str = key(to_text, "kind, such as timber joists", "")
+    floor: str = key(Choice(FLOORS), "name of the floor", "")
+    layers: tuple[Layer, ...] = key(_to_layers, "layers from top to bottom", ())
+    keys: dict[str, _Sourced] = key(_to_sourced, "keys of the floor", {})
+    room: dict[str, _Sourced] = key(_to_sourced, "keys of the suspended ceiling", {})
+    note: str = key(to_line, "what the floor neglects", "")
+
+    def __post_init__(self) -> None:
+        """Raise InputError if a value is not allowed or missing."""
+        super().__post_init__()
+        self.require("name", "kind", "floor", "layers")
+        refuse_unknown("[room]", self.room, CEILING_KEYS)
+
+
 def read_construction(path: Path) -> Construction:
     """Read a construction from a TOML file.
 
@@ -332,73 +338,14 @@ def read_construction(path: Path) -> Construction:
     """
     content, _ = read_toml(path)
     try:
-        return _new_construction(content)
+        file = _File.read(content, "the construction")
+        room = {name: entry.value for name, entry in file.room.items()}
+        floor = {name: entry.value for name, entry in file.keys.items()}
+        case = Case.from_namelist({"floor": {"name": file.floor}, file.floor: floor, "room": room})
+        check_case(case if room else replace(case, room=None))
     except InputError as error:
         raise error.within(path) from error
-
-
-def _new_construction(content: Mapping[str, Any]) -> Construction:
-    """Return the construction in the tables of a file."""
-    refuse_unknown("the construction", content, _ENTRIES)
-    for key in _ENTRIES:
-        if key not in content and key not in _OPTIONAL:
-            refuse(f"{key} is missing", ", ".join(_ENTRIES))
-    for key in _TEXTS:
-        _require_text(key, content.get(key, "none"))
-    require_choice("floor", content["floor"], FLOORS)
-    keys, room = (_read_keys(name, content.get(name, {})) for name in ("keys", "room"))
-    refuse_unknown("[room]", room, CEILING_KEYS)
-    groups: dict[str, Any] = {
-        "floor": {"name": content["floor"]},
-        content["floor"]: {key: value for key, (value, _) in keys.items()},
-        "room": {key: value for key, (value, _) in room.items()},
-    }
-    case = Case.from_namelist(groups if room else {**groups, "room": {}})
-    check_case(case if room else replace(case, room=None))
     assert case.floor is not None  # noqa: S101 - the tables have a floor
-    return Construction(
-        name=content["name"],
-        kind=content["kind"],
-        floor=case.floor,
-        room={key: float(value) for key, (value, _) in room.items()},
-        layers=_read_layers(content["layers"]),
-        sources={key: source for key, (_, source) in (keys | room).items()},
-        note=content.get("note", ""),
-    )
-
-
-def _read_keys(table: str, keys: object) -> dict[str, tuple[Any, str]]:
-    """Return value and source of each key in a table."""
-    if not isinstance(keys, Mapping):
-        refuse(f"[{table}] is not a table", "keys with value and source")
-    for key, entry in keys.items():
-        if not isinstance(entry, Mapping) or set(entry) != {"value", "source"}:
-            refuse_value(f"[{table}] {key}", entry, "{ value = ..., source = '...' }")
-        _require_text(f"[{table}] {key}: source", entry["source"])
-    return {key: (entry["value"], entry["source"]) for key, entry in keys.items()}
-
-
-def _read_layers(layers: object) -> tuple[Layer, ...]:
-    """Return the layers in a list of tables."""
-    if not isinstance(layers, list) or not layers:
-        refuse_value("layers", layers, "a list of tables with material, thickness and density")
-    result = []
-    for number, table in enumerate(layers, 1):
-        try:
-            layer = Layer(**table)
-        except TypeError as error:
-            allowed = "a table of material, thickness and density, for members width and spacing"
-            refuse(f"layer {number} = {shown(table)} is not allowed", allowed, error)
-        _require_text(f"layer {number}: material", layer.material)
-        for key in table.keys() - {"material"}:
-            require_number(f"layer {number}: {key}", table[key])
-            if table[key] <= 0:
-                refuse_value(f"layer {number}: {key}", table[key], "positive numbers")
-        result.append(layer)
-    return tuple(result)
-
-
-def _require_text(name: str, value: object) -> None:
-    """Raise InputError if a value is not a text, or is empty."""
-    if not isinstance(value, str) or not value.strip() or not value.isprintable():
-        refuse_value(name, value, "a text in one line")
+    sources = {name: entry.source for name, entry in (file.keys | file.room).items()}
+    room = {name: float(value) for name, value in room.items()}
+    return Construction(file.name, file.kind, case.floor, room, file.layers, sources, file.note)

@@ -43,10 +43,10 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
 
     With ``--list`` print the constructions of the library instead.
     """
-    from thud.case.constructions import constructions
+    from thud.case.constructions import construction_rows, constructions
 
     if options.list is not None:
-        print_results(format_rows(constructions(options.list).rows()))
+        print_results(format_rows(construction_rows(constructions(options.list).values())))
         return 0
     files = [name for name in options.construction if name.endswith(".toml")]
     results = results_of(options, "floors", [*options.cases, *files])

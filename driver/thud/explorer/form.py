@@ -82,7 +82,7 @@ def construction_form() -> list[dict[str, Any]]:
         {
             "name": entry.name,
             "kind": _capitalize(entry.kind),
-            "text": f"{', '.join(map(str, entry.layers))}. {entry.note}".rstrip(),
+            "text": f"{entry.section}. {entry.note}".rstrip(),
             "floor": entry.floor.name,
             "keys": {
                 key: list(value) if isinstance(value, tuple) else value
@@ -92,7 +92,7 @@ def construction_form() -> list[dict[str, Any]]:
             "room": entry.room,
             "sources": entry.sources,
         }
-        for entry in constructions()
+        for entry in constructions().values()
     ]
 
 

@@ -223,7 +223,7 @@ def _constructions_that_meet(
     keys = STRUCTURES.get(case.floor.name, ())
     entries = [
         entry
-        for entry in constructions()
+        for entry in constructions().values()
         if keys
         and entry.floor.name == case.floor.name
         and all(getattr(entry.floor, key) == getattr(case.floor, key) for key in keys)

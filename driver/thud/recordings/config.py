@@ -9,7 +9,7 @@ from datetime import date
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, refuse_unknown, refuse_value, require_number, require_whole
+from thud.base.checks import refuse_unknown, refuse_value, require_number, require_whole
 from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.base.toml_tables import (
@@ -21,6 +21,7 @@ from thud.base.toml_tables import (
     require_table,
     to_line,
     to_pair,
+    to_text,
 )
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
@@ -119,11 +120,10 @@ def to_numbers(value: object, name: str) -> str:
 def to_reasons(value: object, name: str) -> dict[str, str]:
     """Return reasons by numbers of drops."""
     table = require_table(value, name)
-    reasons = {to_numbers(str(drops), name): to_line(table[drops], name) for drops in table}
-    for drops, reason in reasons.items():
-        if not reason.strip():
-            refuse(f"{name}: {drops} has no reason", 'a reason, such as "touched"')
-    return reasons
+    return {
+        to_numbers(str(drops), name): to_text(reason, f"{name}: reason of {drops}")
+        for drops, reason in table.items()
+    }
 
 
 def to_limits(value: object, name: str) -> dict[str, tuple[float, float]]:
