@@ -132,12 +132,15 @@ class Case(Displayed):
     def __post_init__(self) -> None:
         """Raise InputError if a group is of a wrong type."""
         super().__post_init__()
-        for group, kind in GROUPS.items():
-            require_kind(group, getattr(self, group), kind)
-        require_kind("model", self.model, ModelOptions | None)
-        require_kind("floor", self.floor, FloorOptions | None)
-        for group, optional in OPTIONAL_GROUPS.items():
-            require_kind(group, getattr(self, group), optional | None)
+        kinds: dict[str, Any] = {
+            **GROUPS,
+            "model": ModelOptions,
+            "floor": FloorOptions,
+            **OPTIONAL_GROUPS,
+        }
+        for group, kind in kinds.items():
+            if group in GROUPS or getattr(self, group) is not None:
+                require_kind(group, getattr(self, group), kind)
 
     def __repr__(self) -> str:
         """Return what is computed."""
@@ -164,13 +167,17 @@ class Case(Displayed):
 
     def resolved(self) -> Self:
         """Return the case with the values of the standard ball by its model where keys are None."""
-        model = self.model.name if self.model else ""
         values: dict[str, dict[str, object]] = {}
         for key, value in self.entries():
-            if value is None and key.owner in {"", model} and (model, key.name) in STANDARD_BALL:
-                values.setdefault(attribute_of(key), {})[key.name] = STANDARD_BALL[model, key.name]
+            if value is None and (standard := self._standard_value(key)) is not None:
+                values.setdefault(attribute_of(key), {})[key.name] = standard
         changed = {name: replace(getattr(self, name), **new) for name, new in values.items()}
         return replace(self, **changed)
+
+    def _standard_value(self, key: Key) -> float | None:
+        """Return the value of a key of the standard ball by the model; None if there is none."""
+        model = self.model.name if self.model else ""
+        return STANDARD_BALL.get((model, key.name)) if key.owner in {"", model} else None
 
     def to_namelist(self) -> Namelist:
         """Return the case as a namelist, which prints as the text of a file.
@@ -181,23 +188,16 @@ class Case(Displayed):
         numbers.
         """
         groups: dict[str, dict[str, object]] = {}
-        model = self.model.name if self.model else ""
         for key, value in ((KEYS[0], self.name), *self.entries()):
-            if value is None and key.owner in {"", model} and (model, key.name) in STANDARD_BALL:
+            if value is None and self._standard_value(key) is not None:
                 continue
+            is_list = isinstance(value, tuple)
             entries = list(value) if isinstance(value, tuple) else [value]
-            # What f90nml can write.
-            is_plain = all(
-                isinstance(entry, float)
-                or (isinstance(entry, int) and abs(entry) <= MAX_NUMBER)
-                or (isinstance(entry, str) and entry.isprintable())
-                for entry in entries
-            )
-            if not is_plain or isinstance(value, tuple) is not (key.kind in {"list", "texts"}):
+            if not all(map(_is_plain, entries)) or is_list is not (key.kind in {"list", "texts"}):
                 refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
             group = groups.setdefault(key.group, {})
             if entries:
-                group[key.name] = entries if isinstance(value, tuple) else value
+                group[key.name] = entries if is_list else value
         namelist = f90nml.Namelist()  # a dictionary of groups would be sorted
         namelist.update(groups)
         result: Namelist = namelist
@@ -221,25 +221,27 @@ class Case(Displayed):
             if not isinstance(keys, Mapping):
                 refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")
             refuse_unknown(f"&{group}", keys, _NAMES[group])
-        kinds: dict[str, type[Group]] = {**GROUPS}
-        kinds |= {group: kind for group, kind in OPTIONAL_GROUPS.items() if group in content}
+        optional = {group: kind for group, kind in OPTIONAL_GROUPS.items() if group in content}
+        kinds: dict[str, type[Group]] = {**GROUPS, **optional}
         for group, choices in (("model", MODELS), ("floor", FLOORS)):
             if group in content or (group == "model" and "modes" not in content):
                 name = content.get(group, {}).get("name", next(iter(choices)))
                 require_choice(f"&{group}: name", name, choices)
                 kinds[group] = choices[name]
-        groups: dict[str, Any] = {}
+        attributes: dict[str, Any] = {"model": None, **content.get("case", {})}
         for attribute, kind in kinds.items():
             own = getattr(kind, "name", attribute)
-            groups[attribute] = kind(
-                **{
-                    option.name: content[group][option.name]
-                    for option in fields(kind)  # type: ignore[arg-type]
-                    if option.name in content.get(group := option.metadata.get("group", own), {})
-                }
-            )
-        name = content.get("case", {}).get("name", cls.name)
-        return cls(name=name, **{"model": None, **groups})
+            keys = {e.name: e.metadata.get("group", own) for e in fields(kind)}  # type: ignore[arg-type]
+            stated = {k: content[g][k] for k, g in keys.items() if k in content.get(g, {})}
+            attributes[attribute] = kind(**stated)
+        return cls(**attributes)
+
+
+def _is_plain(value: object) -> bool:
+    """Whether f90nml can write a value."""
+    if isinstance(value, str):
+        return value.isprintable()
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) <= MAX_NUMBER)
 
 
 def case_text(case: Case) -> bytes:
