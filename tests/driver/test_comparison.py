@@ -285,7 +285,7 @@ def test_impact_and_recording_answer_the_same_questions(shell: thud.Impact) -> N
         assert one.peak("floor") == one.peak_force == pytest.approx(1574, rel=0.02)
         assert one.quantity("impulse") == pytest.approx(shell.impulse, rel=0.01)
         assert one.limits_source in (None, "rubber_ball")
-        drop = one.drop_force()
+        drop = thud.blocked_force(one)
         assert drop.force.max() == pytest.approx(one.peak_force, rel=0.01)
         assert drop.time[0] <= one.touch_time <= drop.time[-1]
         assert one.to_dataframe().index.to_numpy() == pytest.approx(one.time)

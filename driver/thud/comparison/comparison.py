@@ -23,7 +23,7 @@ from thud.base.files import Page
 from thud.base.tables import Result
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
-from thud.level.drop_force import ImpactOrRecording
+from thud.level.assessment import ImpactOrRecording
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
 from thud.plot.pages import comparison_figure, comparison_html

@@ -6,7 +6,7 @@ import hashlib
 import io
 import math
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,19 +15,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.base.checks import refuse, refuse_value, require_choice, require_kind, require_number
+from thud.base.checks import (
+    refuse,
+    refuse_value,
+    require_choice,
+    require_kind,
+    require_number,
+    require_whole,
+)
 from thud.base.extras import library
 from thud.base.files import content_of, refuse_foreign, replace_file
+from thud.base.immutable import Immutable
 from thud.base.note import Note
+from thud.case.case import case_text
 from thud.export.wav import wav_file
-from thud.level.drop_force import DropForce, ImpactOrRecording
+from thud.level.assessment import ImpactOrRecording
 from thud.level.levels import RECORDED_BAND
+from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
+    from thud.impact.impact import Impact
     from thud.recordings.recording import ImpactResult
 
 KINDS = {"floor": "force on the floor", "elastic": "elastic force"}
@@ -48,8 +59,46 @@ UFF_LINE = 80
 UFF_NAME = 10
 
 
-class BlockedForce(DropForce):
-    """Force of a source on a rigid floor, for other programs."""
+@dataclass(frozen=True, eq=False)
+class BlockedForce(Immutable):
+    """Force of one drop on a rigid floor with its origin, for other programs.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop, also of its files.
+    force : ndarray, shape (n_sample,)
+        Force, N, positive in compression.
+    sample_rate : float
+        Samples per second, Hz.
+    start : float
+        Time of the first sample, s; first touch is at 0.
+    kind : str
+        ``"floor"`` or ``"elastic"``.
+    origin : str
+        Case or file of the force.
+    checksum : str
+        SHA-256 of the case as `thud.write_case` writes it, or of the file.
+    date : str
+        Date of the measurement; empty if unknown.
+    notes : tuple of Note
+        Processing of the force.
+    """
+
+    name: str
+    force: NDArray[np.float64]
+    sample_rate: float
+    start: float
+    kind: str
+    origin: str
+    checksum: str
+    date: str = ""
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n_sample,)."""
+        return self.start + np.arange(len(self.force)) / self.sample_rate
 
     def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         """Return frequencies, Hz, and the transform ∫ F exp(-i 2π f t) dt, N s, of the force.
@@ -113,7 +162,7 @@ class BlockedForce(DropForce):
 def blocked_force(
     source: ImpactResult, *, drop: int = 1, rate: float | None = None
 ) -> BlockedForce:
-    """Return the assessed force of a drop.
+    """Return the assessed force of a drop; that of a recording is zero before and after contact.
 
     Parameters
     ----------
@@ -130,8 +179,49 @@ def blocked_force(
         If the drop does not exist, or the rate is not possible.
     """
     require_kind("source", source, ImpactOrRecording)
-    force = BlockedForce(**vars(source.drop_force(drop)))
+    if isinstance(source, Recording):
+        force = _of_recording(source, drop)
+    else:
+        require_whole("drop", drop, 1, 1)
+        force = _of_impact(source)
     return force if rate is None else _resampled(force, rate)
+
+
+def _of_impact(impact: Impact) -> BlockedForce:
+    """Return the assessed force of a model."""
+    case = impact.case
+    model = case.model.name if case.model else ""
+    return BlockedForce(
+        name=case.name,
+        force=impact.force(),
+        sample_rate=impact.sample_rate,
+        start=float(impact.time[0] - impact.touch_time),
+        kind=impact.assessed_force(),
+        origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
+        checksum=hashlib.sha256(case_text(case)).hexdigest(),
+    )
+
+
+def _of_recording(recording: Recording, number: int) -> BlockedForce:
+    """Return the force of a measured drop within its gate."""
+    require_whole("drop", number, 1, len(recording.drops))
+    origin = [entry for entry in recording.origins for _ in range(entry.drops)][number - 1]
+    drop = recording.drops[number - 1]
+    first, stop = drop.gate
+    return BlockedForce(
+        name=recording.name + f"_drop_{number}" * (len(recording.drops) > 1),
+        force=drop.force[first:stop],
+        sample_rate=drop.sample_rate,
+        start=float(drop.time[first]),
+        kind=recording.assessed_force(),
+        origin=f"recording {drop.name}, {origin.calibration or 'calibration not known'}",
+        checksum=origin.checksum,
+        date=origin.date,
+        notes=(
+            *(note for note in drop.notes if not note.is_warning),
+            Note("noise_remains", value=drop.noise, unit="N"),
+        ),
+    )
 
 
 def _resampled(original: BlockedForce, rate: float) -> BlockedForce:

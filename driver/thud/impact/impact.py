@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -10,12 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base._schema import QUANTITIES, ImpactQuantities
-from thud.base.checks import require_choice, require_whole
+from thud.base.checks import require_choice
 from thud.base.extras import data_frame
-from thud.case.case import case_text
 from thud.impact.contact_time import contact_span
-from thud.level.assessment import assess_levels
-from thud.level.drop_force import DropForce, ImpactOrRecording
+from thud.level.assessment import ImpactOrRecording, assess_levels
 from thud.level.estimate import Estimate
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
@@ -208,21 +205,6 @@ class Impact(ImpactQuantities, ImpactOrRecording):
             self.case.ball.mass,
             self.case.drop.height,
             source or self.case.limits.source,
-        )
-
-    def drop_force(self, drop: int = 1) -> DropForce:
-        """Return the assessed force; `drop` must be 1: only recordings have several drops."""
-        require_whole("drop", drop, 1, 1)
-        case = self.case
-        model = case.model.name if case.model else ""
-        return DropForce(
-            name=case.name,
-            force=self.force(),
-            sample_rate=self.sample_rate,
-            start=float(self.time[0] - self.touch_time),
-            kind=self.assessed_force(),
-            origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
-            checksum=hashlib.sha256(case_text(case)).hexdigest(),
         )
 
     def plot(self) -> Figure:

@@ -299,6 +299,17 @@ class Verdict(Outcome, Displayed):
         return csv_text([columns, *rows, ("all", *("",) * 6, *ends, "", self.conforms)])
 
 
+class ImpactOrRecording(Displayed):
+    """Base of `Impact` and `Recording`, which have force, levels and verdict by the same names.
+
+    Arguments are checked for it, as the packages that recordings import take 0.3 s to load.
+    """
+
+    def quantity(self, name: str) -> float:
+        """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
+        return float(getattr(self, name, math.nan))
+
+
 def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     levels: Iterable[Estimate | float],
     contact_time: Estimate | float = math.nan,

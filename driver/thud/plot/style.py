@@ -15,7 +15,7 @@ from matplotlib.ticker import NullLocator
 
 from thud.base.checks import require_kind, require_mapping
 from thud.base.errors import InputError
-from thud.level.drop_force import ImpactOrRecording
+from thud.level.assessment import ImpactOrRecording
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:

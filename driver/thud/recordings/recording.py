@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
-from thud.base.checks import require_whole
 from thud.base.extras import data_frame
 from thud.base.note import Note
 from thud.case.case import Case
-from thud.level.assessment import assess_levels
-from thud.level.drop_force import DropForce, ImpactOrRecording
+from thud.level.assessment import ImpactOrRecording, assess_levels
 from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
 from thud.recordings.config import Config
 from thud.recordings.instruments import (
@@ -307,27 +305,6 @@ class Recording(ImpactOrRecording):
         forces = np.concatenate([drop.force for drop in self.drops])
         times = np.concatenate([drop.time for drop in self.drops])
         return data_frame({"drop": np.concatenate(numbers), "floor_force_N": forces}, times)
-
-    def drop_force(self, drop: int = 1) -> DropForce:
-        """Return the force of one contact, zero before and after; `drop` is its number from 1."""
-        require_whole("drop", drop, 1, len(self.drops))
-        origin = [origin for origin in self.origins for _ in range(origin.drops)][drop - 1]
-        measured = self.drops[drop - 1]
-        first, stop = measured.gate
-        return DropForce(
-            name=self.name if len(self.drops) == 1 else f"{self.name}_drop_{drop}",
-            force=measured.force[first:stop],
-            sample_rate=measured.sample_rate,
-            start=float(measured.time[first]),
-            kind=self.assessed_force(),
-            origin=f"recording {measured.name}, {origin.calibration or 'calibration not known'}",
-            checksum=origin.checksum,
-            date=origin.date,
-            notes=(
-                *(note for note in measured.notes if not note.is_warning),
-                Note("noise_remains", value=measured.noise, unit="N"),
-            ),
-        )
 
 
 # A drop of a model or of a recording: both have force, levels and verdict under the same names.
