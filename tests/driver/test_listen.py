@@ -170,7 +170,7 @@ def test_floors_follow_each_other_at_one_scale(
 
 def test_file_states_scale_contents_and_limits(found: thud.RoomSound, tmp_path: Path) -> None:
     path = tmp_path / "sound.wav"
-    found.write(path)
+    found.save(path)
     with soundfile.SoundFile(path) as file:
         assert (file.subtype, file.channels, file.samplerate) == ("PCM_24", 1, RATE)
         samples = file.read()

@@ -92,7 +92,7 @@ deck: thud.Construction = thud.construction(library.names[0])
 built: thud.Case = deck.case(thud.Case(room=room))
 several: thud.FloorComparison = thud.compare_floors({"thin": below, deck.name: built})
 sound: thud.RoomSound = thud.listen({"thin": below, "same": below}, pause=0.5)
-sound.write(folder / "sound.wav")
+sound.save(folder / "sound.wav")
 heard: tuple[thud.FloorSound, ...] = sound.sounds
 heard_levels: thud.SoundLevels = heard[0].level
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")

@@ -97,7 +97,7 @@ class RoomSound(Displayed):
         samples = self.pressure / self.full_scale
         return wav_file(samples, self.sample_rate, self.comment, whole=True)
 
-    def write(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write the WAV file, replacing an existing one; raise OSError if that is not possible."""
         replace_file(path, self.wav())
 

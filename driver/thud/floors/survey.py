@@ -62,13 +62,16 @@ ALLOWED = (
     "a header row with the titles frequency (Hz), P1, P2 and so on for levels of positions (dB, "
     "not weighted) or mean for their mean, and, if known, background (dB), reverberation_time (s)"
 )
-LEVELS = {"position", "mean"}
-# Units of the other kinds of columns; that of levels is dB.
-UNITS = {"frequency": "Hz", "time": "s"}
+# Name in messages, unit, and plausible values of each kind of column.
+RANGES = {
+    "frequency": ("frequency", "Hz", 0.0, math.inf),
+    "position": ("level", "dB", -50.0, 200.0),
+    "mean": ("level", "dB", -50.0, 200.0),
+    "background": ("background", "dB", -50.0, 200.0),
+    "time": ("reverberation_time", "s", 0.01, 100.0),
+}
 # Maximum plausible difference between levels of two positions, dB, mean over the bands.
 MAX_DIFFERENCE = 15.0
-# Plausible levels, dB, and times, s.
-LEVEL_RANGE, TIME_RANGE = (-50.0, 200.0), (0.01, 100.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,41 +240,41 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     InputError
         If a column or band is missing, duplicate or not plausible; the message names it.
     """
-    read = read_table(path, ALLOWED)
-    if not read.has_titles:
-        refuse(f"{path}: {len(read.columns)} columns without titles", ALLOWED)
-    kinds = [_kind(column.name) for column in read.columns]
-    has_mean = kinds.count("mean") == 1 and "position" not in kinds
-    for column, kind in zip(read.columns, kinds, strict=True):
-        if not kind or (kind == "mean" and not has_mean):
+    table = read_table(path, ALLOWED)
+    if not table.has_titles:
+        refuse(f"{path}: {len(table.columns)} columns without titles", ALLOWED)
+    kinds = [_kind(column.name) for column in table.columns]
+    for column, kind in zip(table.columns, kinds, strict=True):
+        if not kind or (kind == "mean" and "position" in kinds):
             refuse(f"{path}: {column} is not a level of a position", ALLOWED)
-    if double := [kind for kind in WORDS if kind != "position" and kinds.count(kind) > 1]:
-        refuse(f"{path}: more than one column of {double[0]}", ALLOWED)
-    positions = [c for c, kind in zip(read.columns, kinds, strict=True) if kind in LEVELS]
-    if "frequency" not in kinds or not positions:
-        missing = "levels" if "frequency" in kinds else "frequency"
-        refuse(f"{path}: there is no column of {missing}", ALLOWED)
-    table = np.column_stack(
-        [c.to(UNITS.get(kind, "dB")) for c, kind in zip(read.columns, kinds, strict=True)]
-    )
-    frequency = np.array([_nominal(f, path) for f in table[:, kinds.index("frequency")]])
-    table, frequency = table[np.argsort(frequency)], np.sort(frequency)
-    bands = _bands_of(frequency, path)
-    columns = {kind: table[:, i] for i, kind in enumerate(kinds)}
-    background, time = columns.get("background"), columns.get("time")
-    levels = table[:, [kind in LEVELS for kind in kinds]].T
-    for quantity, values, (low, high), unit in (
-        ("level", levels, LEVEL_RANGE, "dB"),
-        ("background", background, LEVEL_RANGE, "dB"),
-        ("reverberation_time", time, TIME_RANGE, "s"),
-    ):
-        if values is not None and (wrong := values[~((values >= low) & (values <= high))]).size:
+        if kind != "position" and kinds.count(kind) > 1:
+            refuse(f"{path}: more than one column of {kind}", ALLOWED)
+    columns = {
+        kind: np.array([c.to(unit) for c, k in zip(table.columns, kinds, strict=True) if k == kind])
+        for kind, (_, unit, *_) in RANGES.items()
+        if kind in kinds
+    }
+    levels = "position" if "position" in kinds else "mean"
+    for kind, name in (("frequency", "frequency"), (levels, "levels")):
+        if kind not in kinds:
+            refuse(f"{path}: there is no column of {name}", ALLOWED)
+    frequency = np.array([_nominal(f, path) for f in columns.pop("frequency")[0]])
+    order = np.argsort(frequency)
+    bands = _bands_of(frequency[order], path)
+    for kind, values in columns.items():
+        name, unit, low, high = RANGES[kind]
+        if (wrong := values[~((values >= low) & (values <= high))]).size:
             refuse(
-                f"{path}: {quantity} = {wrong[0]:g} {unit} is not allowed",
+                f"{path}: {name} = {wrong[0]:g} {unit} is not allowed",
                 f"{low:g} to {high:g} {unit}",
             )
+        columns[kind] = values[:, order]
+    background, time = (
+        columns[kind][0] if kind in columns else None for kind in ("background", "time")
+    )
     volume = None if volume is None else require_volume(volume)
-    return RoomLevels(Path(path).stem, bands, frequency, levels, background, time, volume)
+    name = Path(path).stem
+    return RoomLevels(name, bands, frequency[order], columns[levels], background, time, volume)
 
 
 def rating_table(result: RoomLevels) -> list[tuple[str, ...]]:
