@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import thud
 from thud.level.assessment import octave_limits
-from thud.plot.impact_figures import SMALLEST, draw_forces, draw_tolerance
+from thud.plot.impact_figures import draw_forces
 from thud.plot.style import (
+    SMALLEST,
+    add_levels,
     legend_above,
-    line_style,
-    marker_style,
     new_figure,
-    octave_axis,
     own_style,
+    tolerance_boxes,
 )
 
 if TYPE_CHECKING:
@@ -43,12 +43,10 @@ def flagship() -> Figure:
     history.locator_params(axis="y", nbins=4)
     lower, upper = octave_limits("rubber_ball")
     nominal = (lower + upper) / 2
-    draw_tolerance(octaves, lower - nominal, upper - nominal, "rubber ball")
-    for i, (name, impact) in enumerate(impacts.items()):
-        octaves.plot(
-            impact.levels() - nominal, label=name, **line_style(i), **marker_style(i, SMALLEST)
-        )
-    octave_axis(octaves)
+    title = "Tolerance, rubber ball"
+    tolerance_boxes(octaves, lower - nominal, upper - nominal, title)
+    levels = {name: impact.levels() - nominal for name, impact in impacts.items()}
+    add_levels(octaves, levels, marker_size=SMALLEST)
     octaves.tick_params(axis="x", labelrotation=90)
     octaves.set_xlabel("Octave, Hz")
     octaves.set_ylabel("Level − nominal, dB")

@@ -98,7 +98,7 @@ def test_limit_of_a_class_that_no_sample_passes_is_not_in_the_legend() -> None:
     x, y = np.arange(3.0), np.arange(4.0)
     rating = np.ma.masked_invalid(np.linspace(44.99, 52, 12).reshape(4, 3))
     _, axes = empty_axes(2)
-    _draw_limits(axes, (x, y), rating, [("class 3, 45 dB", 45.0), ("class 4, 49 dB", 49.0)])
+    _draw_limits(axes, (x, y), rating, [("class 3, 45 dB", 45.0), ("class 4, 49 dB", 49.0)], "k")
     assert axes.get_legend_handles_labels()[1] == ["class 4, 49 dB"]
 
 

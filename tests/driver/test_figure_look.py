@@ -26,7 +26,7 @@ from PIL import Image
 
 import thud
 from thud import cli, plot, report
-from thud.plot.style import COLORS, WIDTH, line_style, marker_style
+from thud.plot.style import COLORS, WIDTH, curve_style
 from thud.recordings.signal import Signal
 
 sys.path.append(str(REPOSITORY / "docs/pictures"))
@@ -114,7 +114,7 @@ def test_levels_are_drawn_at_their_bands() -> None:
 
 def test_no_two_of_many_curves_look_the_same() -> None:
     looks = {
-        (line_style(i)["color"], str(line_style(i)["linestyle"]), marker_style(i)["marker"])
+        tuple(str(curve_style(i, 4)[key]) for key in ("color", "linestyle", "marker"))
         for i in range(4 * len(COLORS))
     }
     assert len(looks) == 4 * len(COLORS)

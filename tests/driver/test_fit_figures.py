@@ -65,7 +65,7 @@ def test_level_target_has_no_ellipse_of_one_parameter() -> None:
     assert figures["fit"].axes[1].get_xlabel() == "Octave band, Hz"
     spans = [
         (one.get_paths()[0].vertices[:, 1].min(), one.get_paths()[0].vertices[:, 1].max())
-        for one in figures["fit"].axes[0].collections
+        for one in figures["fit"].axes[0].collections[:5]
     ]
     assert np.allclose(spans, [(level - 0.5, level + 0.5) for level in levels])
 

@@ -162,9 +162,9 @@ class Construction(Displayed):
 
     def plot(self) -> Figure:
         """Draw the section of the floor with its layers."""
-        from thud.plot.floor_figures import draw_construction
+        from thud.plot.floor_figures import draw_section
 
-        return draw_construction(self)
+        return draw_section(self.layers, self.name)
 
     def __repr__(self) -> str:
         """Return name and layers."""

@@ -62,7 +62,6 @@ from thud.plot.study_figures import (
     draw_design as draw_design,
     draw_sensitivity as draw_sensitivity,
     draw_surrogate as draw_surrogate,
-    draw_sweep as draw_sweep,
     draw_uncertainty as draw_uncertainty,
 )
 from thud.plot.style import (
@@ -71,12 +70,14 @@ from thud.plot.style import (
     MARKERS as MARKERS,
     WIDTH as WIDTH,
     add_curves as add_curves,
+    add_levels as add_levels,
+    band_axis as band_axis,
     empty_axes as empty_axes,
     legend_above as legend_above,
     named,
-    octave_axis as octave_axis,
     own_style as own_style,
 )
+from thud.plot.sweep_figures import draw_sweep as draw_sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable

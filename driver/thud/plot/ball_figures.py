@@ -18,11 +18,20 @@ from thud.base.files import replace_file
 from thud.impact.compression import CompressionCurve
 from thud.impact.free_modes import FreeModes, loss_factors
 from thud.impact.impact import Impact
-from thud.plot.style import WIDTH, add_curves, empty_axes, legend_above, new_figure, own_style
+from thud.plot.style import (
+    WIDTH,
+    add_colorbar,
+    add_curves,
+    empty_axes,
+    frequency_axis,
+    legend_above,
+    own_style,
+    panel_grid,
+)
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -55,13 +64,6 @@ def _draw_section(
     axes.plot(*edge.T, color="0.1", linewidth=0.6)
 
 
-def _add_colorbar(figure: Figure, panels: Iterable[Axes], scale: Normalize, label: str) -> None:
-    figure.colorbar(
-        ScalarMappable(scale), ax=[*panels], location="bottom", shrink=0.7, aspect=30, pad=0.02,
-        label=label,
-    )  # fmt: skip
-
-
 @own_style()
 def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     """Draw instants of the impact: displacement by color, velocity by arrows (paper, figure 5).
@@ -88,16 +90,12 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     times = impact.touch_time + np.linspace(0, impact.contact_time, instants)
     # There are fewer panels if there are fewer snapshots than instants.
     chosen = sorted({int(np.argmin(np.abs(snapshots.time - time))) for time in times})
-    rows = -(-len(chosen) // 3)
-    figure = new_figure(0.6 + 1.6 * rows)
-    panels = figure.subplots(rows, 3, squeeze=False).ravel()
+    figure, panels = panel_grid(len(chosen), 3, 1.6)
     scale = _scale(snapshots, chosen)
     depth = snapshots.floor_displacement[chosen].max()
-    for axes, i in zip(panels, chosen, strict=False):
+    for axes, i in zip(panels, chosen, strict=True):
         arrows = _draw_instant(axes, impact, i, scale, depth)
-    for axes in panels:
-        axes.set_axis_off()
-    _add_colorbar(figure, panels, scale, DISPLACEMENT)
+    add_colorbar(figure, panels, ScalarMappable(scale), DISPLACEMENT)
     _add_key(panels[0], arrows, impact)
     return figure
 
@@ -127,13 +125,12 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     figure, axes = empty_axes(WIDTH)
     count = len(snapshots.time)
     scale = _scale(snapshots, range(count))
-    _add_colorbar(figure, [axes], scale, DISPLACEMENT)
+    add_colorbar(figure, [axes], ScalarMappable(scale), DISPLACEMENT)
 
     def draw(i: int) -> list[Any]:
         axes.clear()
         depth = snapshots.floor_displacement.max()
         _add_key(axes, _draw_instant(axes, impact, i, scale, depth), impact)
-        axes.set_axis_off()
         return []
 
     animation = FuncAnimation(figure, draw, frames=count, blit=False)
@@ -199,6 +196,7 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
     axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
     axes.set_aspect("equal")
+    axes.set_axis_off()
     return arrows
 
 
@@ -233,14 +231,13 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
     """
     require_kind("modes", modes, FreeModes)
     require_whole("columns", columns, 1, MAX_PANELS)
-    rows = -(-len(modes.frequency) // columns)
     # More than three shapes side by side are wider than a column.
-    figure = new_figure(0.45 + 1.75 * rows, WIDTH * max(1, columns / 3))
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    width = WIDTH * max(1, columns / 3)
+    figure, panels = panel_grid(len(modes.frequency), columns, 1.75, width=width)
     radius = modes.ball.outer_radius
     scale = Normalize(0, 1)
     for axes, frequency, harmonic, shape in zip(
-        panels, modes.frequency, modes.harmonic, modes.shape, strict=False
+        panels, modes.frequency, modes.harmonic, modes.shape, strict=True
     ):
         _draw_section(axes, modes.start + AMPLITUDE * radius * shape, np.hypot(*shape.T).T, scale)
         for surface in (0, -1):
@@ -248,10 +245,9 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
         axes.set_title(f"{frequency:.1f} Hz, n = {harmonic}")
         axes.set_xlim(-0.05 * radius, 1.35 * radius)
         axes.set_ylim(-1.35 * radius, 1.35 * radius)
-    for axes in panels:
         axes.set_axis_off()
         axes.set_aspect("equal")
-    _add_colorbar(figure, panels, scale, "Displacement relative to its maximum")
+    add_colorbar(figure, panels, ScalarMappable(scale), "Displacement relative to its maximum")
     return figure
 
 
@@ -278,11 +274,9 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     figure, axes = empty_axes(2.5)
     frequency = np.geomspace(10, 1000, 200)
     add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
-    axes.set_xscale("log")
+    frequency_axis(axes)
     axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
-    axes.set_xlabel("Frequency, Hz")
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylabel("Loss factor")
     legend_above(axes)
     return figure
@@ -328,6 +322,5 @@ def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
     axes.set_ylim(bottom=0)
     axes.set_xlabel("Approach of the plates, mm")
     axes.set_ylabel("Force, N")
-    if any(curves):
-        legend_above(axes)
+    legend_above(axes)
     return figure

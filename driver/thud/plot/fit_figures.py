@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter
 
 from thud.case.keys import humanize
 from thud.plot.style import (
@@ -13,11 +13,14 @@ from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
     GRAY,
-    LEVEL,
     WIDTH,
+    curve_style,
+    empty_axes,
     legend_above,
+    level_label,
     new_figure,
     own_style,
+    tolerance_boxes,
 )
 from thud.studies.fitting.misfit import SHIFT
 
@@ -64,7 +67,6 @@ def target_and_fit(fit: Fit, number: int = 1) -> Figure:
         _draw_force(target, deviation, above, below)
     else:
         _draw_levels(target, deviation, above, below)
-    above.tick_params(axis="x", labelbottom=False)
     figure.align_ylabels()
     return figure
 
@@ -105,27 +107,18 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     column = misfit.columns(fitted.impact, fitted.own)
     residuals = misfit.residual(fitted.impact, fitted.own) / scale
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
-    values = {
-        name: np.array(column[name], dtype=np.float64)
-        for name in ("target", "uncertainty", "model")
-    }
     x = np.arange(len(names))
     count = sum(str(name).endswith(" Hz") for name in column["quantity"])
-    for i in range(count):
-        edge = values["target"][i] + scale * np.array([-1, 1]) * values["uncertainty"][i]
-        name = "Target" if i == 0 else None
-        band = "Standard deviation of the target" if i == 0 else None
-        above.fill_between([i - 0.35, i + 0.35], *edge, color="0.75", linewidth=0, label=band)
-        above.plot(
-            [i - 0.35, i + 0.35], 2 * [values["target"][i]], color=COLORS[0],
-            label=name,
-        )  # fmt: skip
-    above.plot(
-        x[:count], values["model"][:count], color=COLORS[1], linestyle="--", linewidth=1,
-        marker="o", markersize=4, label="Fit",
-    )  # fmt: skip
+    target, uncertainty, model = (
+        np.array(column[name][:count], dtype=np.float64)
+        for name in ("target", "uncertainty", "model")
+    )
+    half = scale * uncertainty
+    label = "Standard deviation of the target"
+    tolerance_boxes(above, target - half, target + half, label, "Target")
+    above.plot(x[:count], model, label="Fit", **curve_style(1, 4))
     below.axhspan(-1, 1, color=GRAY, linewidth=0)
-    below.plot(x, residuals, color=COLORS[1], marker="o", markersize=4, linestyle="none")
+    below.plot(x, residuals, **curve_style(1, 4) | {"linestyle": "none"})
     limit = 1.2 * max(1.2, np.abs(residuals).max())
     below.set_ylim(-limit, limit)
     below.set_xticks(x, [WRAPPED_NAMES.get(name, name) for name in names], fontsize="small")
@@ -134,7 +127,7 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
     below.set_xlabel(f"{BAND_NAMES[misfit.bands]}, Hz")
-    above.set_ylabel(f"{LEVEL}\n({FORCE_NAMES[fitted.impact.assessed_force(misfit.kind)]})")
+    above.set_ylabel(level_label(FORCE_NAMES[fitted.impact.assessed_force(misfit.kind)]))
     below.set_ylabel("(Fit − target)\n/ uncertainty")
     legend_above(above)
 
@@ -192,20 +185,19 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     x, y = (
         np.array(intervals[fit.names[i]]) / scale for i, scale in zip(pair, factor, strict=True)
     )
-    style: dict[str, Any] = {"color": GRAY, "linewidth": 0, "zorder": 0}
-    axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **style)
-    axes.axhspan(*y, **style)
+    interval = f"{100 * fit.confidence:g} % interval of each"
+    axes.axvspan(*x, color=GRAY, linewidth=0, zorder=0, label=interval)
+    axes.axhspan(*y, color=GRAY, linewidth=0, zorder=0)
     half = 1.25 * np.sqrt(square * np.diag(block))
     axes.set_xlim(center[0] - half[0], center[0] + half[0])
     axes.set_ylim(center[1] - half[1], center[1] + half[1])
     ticks = 4 if len(fit.names) == len(pair) else 2
     axes.xaxis.set_major_locator(MaxNLocator(ticks))
     axes.yaxis.set_major_locator(MaxNLocator(ticks + 1))
-    names: tuple[Literal["x", "y"], ...] = ("x", "y")
-    for name, middle, length in zip(names, center, half, strict=True):
+    for axis, middle, length in zip((axes.xaxis, axes.yaxis), center, half, strict=True):
         # Numbers of many digits would leave no room for the panels.
-        is_narrow = bool(length < MIN_RATIO * abs(middle))
-        axes.ticklabel_format(axis=name, useOffset=is_narrow)
+        formatter = ScalarFormatter(useOffset=bool(length < MIN_RATIO * abs(middle)))
+        axis.set_major_formatter(formatter)
     correlation = fit.correlation[pair]
     digits = 2 if abs(correlation) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
     axes.set_title(f"Correlation {correlation:z.{digits}f}".replace("-", "−"))
@@ -240,8 +232,7 @@ def _add_ellipse(
 
 
 def _draw_correlation(fit: Fit) -> Figure:
-    figure = new_figure(WIDTH)
-    axes = figure.add_subplot()
+    figure, axes = empty_axes(WIDTH)
     shown = np.ma.masked_invalid(fit.correlation)
     axes.set_facecolor(GRAY)
     axes.imshow(shown, cmap="RdBu_r", vmin=-1, vmax=1)

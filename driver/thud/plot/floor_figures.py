@@ -8,28 +8,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.colors import to_rgba
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FixedLocator, NullLocator
 
 from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_kind, require_whole
+from thud.base.checks import refuse, require_kind, require_mapping, require_whole
 from thud.case.case import Case, case_text
 from thud.impact.floor_impact import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, low_pass
 from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (
     COLORS,
-    LINES,
     WIDTH,
+    add_colorbar,
+    add_curves,
     band_axis,
+    curve_style,
     empty_axes,
     escape_label,
+    frequency_axis,
     legend_above,
-    line_style,
-    marker_style,
     new_figure,
     own_style,
-    styled,
+    panel_grid,
 )
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.case.constructions import Construction, Layer
+    from thud.case.constructions import Layer
     from thud.floors.impedance import BallImpedance
     from thud.floors.mobility_fit import MobilityFit
     from thud.impact.floor_impact import FloorImpact
@@ -58,12 +58,6 @@ _MAX_AIR = 2.0
 MAX_SHAPES, POINTS = 30, 60
 # Frequencies per octave in plots of a mobility: peaks of lightly damped floors are narrow.
 _DENSITY = 400
-
-
-@own_style()
-def draw_construction(construction: Construction) -> Figure:
-    """Draw the section of a floor to scale, with its layers."""
-    return draw_section(construction.layers, construction.name)
 
 
 @own_style()
@@ -129,22 +123,24 @@ def _members(layer: Layer) -> list[tuple[float, float]]:
 def draw_floor(impact: FloorImpact) -> Figure:
     """Draw force and floor velocity, the change of the levels, the energy, and the mobility."""
     figure = new_figure(6.4)
-    history, motion, change, energy, mobility = figure.subplots(5, 1)
+    history, motion, change, energy, mobilities = figure.subplots(5, 1)
     _draw_histories(history, motion, impact)
-    x = np.arange(len(get_bands(THIRDS).nominal))
-    change.bar(x, impact.difference(THIRDS), color=COLORS[0], width=0.7)
+    change.bar(
+        np.arange(len(get_bands(THIRDS).nominal)), impact.difference(THIRDS), color=COLORS[0],
+        width=0.7,
+    )  # fmt: skip
     change.axhline(0, color="black", linewidth=0.6)
     change.set_ylabel("Contact −\nblocked, dB")
     injected = impact.injected_energy(THIRDS)
     energy.set_yscale("log")
-    energy.plot(x, 1e3 * injected.energy, **line_style(0))
+    energy.plot(1e3 * injected.energy, **curve_style(0))
     energy.set_ylabel("Energy into\nthe floor, mJ")
     energy.sharex(change)
     change.tick_params(labelbottom=False)
-    band_axis(energy, injected.frequency, THIRDS)
-    _draw_mobility(mobility, impact)
+    band_axis(energy, THIRDS)
+    _draw_mobility(mobilities, impact.floor)
     figure.align_ylabels()
-    legend_above(history, motion, mobility, title="Forces are low-passed at 1.25 kHz")
+    legend_above(history, motion, mobilities, title="Forces are low-passed at 1.25 kHz")
     return figure
 
 
@@ -152,9 +148,11 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     time = 1e3 * (impact.time - impact.touch_time)
     shown = (time >= 0) & (time <= 1e3 * _SHOWN * impact.contact_time)
     forces = {"blocked force": impact.blocked_force, "contact force": impact.floor_force}
-    for i, (name, force) in enumerate(forces.items()):
-        recorded = 1e-3 * low_pass(force, impact.sample_rate)
-        history.plot(time[shown], recorded[shown], label=name, **line_style(i))
+    recorded = {
+        name: (time[shown], 1e-3 * low_pass(force, impact.sample_rate)[shown])
+        for name, force in forces.items()
+    }
+    add_curves(history, recorded)
     history.set_ylabel("Force on the\nfloor, kN")
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)
     motion.set_ylabel("Velocity of\nthe floor, mm/s")
@@ -164,22 +162,19 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     history.margins(x=0)
 
 
-def _draw_mobility(axes: Axes, impact: FloorImpact) -> None:
+def _draw_mobility(axes: Axes, floor: FloorOptions) -> None:
     bands = get_bands(THIRDS)
     low, high = bands.lower[0], bands.upper[-1]
     frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
-    values = mobility(impact.floor, frequency)
+    values = mobility(floor, frequency)
     # A thin line on a thick one: the mobility of an infinite plate is real.
     axes.loglog(frequency, abs(values), label="$|Y|$", color="0.7", linewidth=2.4)
     axes.loglog(
         frequency, values.real, label=r"$\mathrm{Re}\,Y$", color="black", linewidth=0.8,
     )  # fmt: skip
     axes.set_ylabel("Mobility $Y$,\nm/(N s)")
-    axes.set_xlabel("Frequency, Hz")
     axes.set_xlim(low, high)
-    octaves = get_bands(BANDWIDTHS[0]).nominal
-    axes.set_xticks(octaves, [f"{octave:g}" for octave in octaves])
-    axes.xaxis.set_minor_locator(NullLocator())
+    frequency_axis(axes)
 
 
 @own_style()
@@ -204,48 +199,39 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
     frequency = modes["frequency"]
     if not len(frequency):
         refuse(f"floor: no mode lies below {modes['limit']:.0f} Hz", "a floor with modes")
-    count = len(frequency)
-    sides = modes["length"] * grid[0], modes["width"] * grid[1]
-    columns = min(columns, count)
-    rows = -(-count // columns)
-    side = WIDTH / columns
-    ratio = modes["width"] / modes["length"]
-    figure = new_figure(0.5 + rows * (side * ratio + 0.25), WIDTH)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes in panels:
-        axes.set_axis_off()
-    for axes, natural, values in zip(panels, frequency, modes["shape"], strict=False):
+    length, width = modes["length"], modes["width"]
+    columns = min(columns, len(frequency))
+    height = WIDTH / columns * width / length + 0.25
+    figure, panels = panel_grid(len(frequency), columns, height)
+    for axes, natural, values in zip(panels, frequency, modes["shape"], strict=True):
         shape = values.reshape(POINTS, POINTS) / values[np.argmax(abs(values))]
-        drawn = axes.pcolormesh(*sides, shape, cmap="RdBu_r", vmin=-1, vmax=1, rasterized=True)
+        drawn = axes.pcolormesh(
+            length * grid[0], width * grid[1], shape, cmap="RdBu_r", vmin=-1, vmax=1,
+            rasterized=True,
+        )  # fmt: skip
+        axes.set_axis_off()
         axes.set_aspect("equal")
         axes.set_title(f"{natural:.1f} Hz")
-    figure.colorbar(
-        drawn, ax=panels.tolist(), location="bottom", shrink=0.7, aspect=30,
-        label="Displacement relative to its maximum",
-    )  # fmt: skip
+    add_colorbar(figure, panels, drawn, "Displacement relative to its maximum")
     return figure
 
 
 @own_style()
 def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
     """Draw the magnitudes of the mobilities of floors, by name, against frequency."""
-    if not floors:
-        refuse_value("floors", floors, "a mapping of names to floors")
+    require_mapping("floors", floors, "floors")
     for name, floor in floors.items():
         require_kind(name, floor, FloorOptions)
     figure, axes = empty_axes(2.8)
     frequency = np.geomspace(11.0, 1400.0, 1500)
     for i, (name, floor) in enumerate(floors.items()):
         # Resonances are as narrow as dashes: markers distinguish the curves instead.
+        style = curve_style(i, 4.5) | {"linestyle": "-", "linewidth": 0.8}
         axes.loglog(
             frequency, np.abs(mobility(floor, frequency)), label=escape_label(name),
-            color=COLORS[i % len(COLORS)], linewidth=0.8, markevery=(30 * i, 225),
-            **marker_style(i, 4.5),
+            markevery=(30 * i, 225), **style,
         )  # fmt: skip
-    marks = [16, 31.5, 63, 125, 250, 500, 1000]
-    axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
-    axes.minorticks_off()
-    axes.set_xlabel("Frequency, Hz")
+    frequency_axis(axes)
     axes.set_ylabel("Mobility, m/(N s)")
     legend_above(axes)
     return figure
@@ -257,22 +243,18 @@ def mobility_fit(fit: MobilityFit) -> Figure:
     figure = new_figure(3.6)
     upper, lower = figure.subplots(2, sharex=True)
     frequency = np.geomspace(fit.frequency[0], fit.frequency[-1], 2000)
-    fitted = fit.mobility(frequency)
-    upper.loglog(
-        fit.frequency, abs(fit.measured), ".", color="0.55", markersize=2.5, label="measured"
-    )
-    upper.loglog(
-        frequency, abs(fitted), color=COLORS[0],
-        label=f"fitted: relative error {100 * fit.error:.2g} %",
-    )  # fmt: skip
-    lower.semilogx(
-        fit.frequency, np.degrees(np.angle(fit.measured)), ".", color="0.55", markersize=2.5
-    )
-    lower.semilogx(frequency, np.degrees(np.angle(fitted)), color=COLORS[0])
+    label = f"fitted: relative error {100 * fit.error:.2g} %"
+    for x, values, style in (
+        (fit.frequency, fit.measured, {"linestyle": "none", "marker": ".", "color": "0.55",
+                                       "markersize": 2.5, "label": "measured"}),
+        (frequency, fit.mobility(frequency), {"color": COLORS[0], "label": label}),
+    ):  # fmt: skip
+        upper.loglog(x, abs(values), **style)
+        lower.plot(x, np.degrees(np.angle(values)), **style)
     upper.set_ylabel("Mobility, m/(N s)")
     lower.set_ylabel("Phase, degrees")
     lower.set_yticks([-90, 0, 90])
-    lower.set_xlabel("Frequency, Hz")
+    frequency_axis(lower)
     legend_above(upper)
     return figure
 
@@ -290,24 +272,20 @@ def ball_impedances(
     Floors below the open markers change the level of the force by more than 1 dB.
     """
     figure, axes = empty_axes(2.8)
-    for i, (name, floor) in enumerate(floors.items()):
-        axes.loglog(
-            _FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES)), label=escape_label(name),
-            linewidth=0.8, color=COLORS[i % len(COLORS)], linestyle=styled(i, LINES),
-        )  # fmt: skip
-    frequency = np.array([])
+    impedances = {
+        name: (_FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES)))
+        for name, floor in floors.items()
+    }
+    add_curves(axes, impedances, linewidth=0.8)
     for i, (name, source) in enumerate(sources.items()):
-        frequency = source.frequency
         # Markers side by side: equal impedances stay visible.
-        x = frequency * 1.08 ** (i - (len(sources) - 1) / 2)
-        style = {"color": "black", "linestyle": "none", **marker_style(i)}
-        axes.loglog(x, np.abs(source.impedance), label=escape_label(name) or "source", **style)
+        x = source.frequency * 1.08 ** (i - (len(sources) - 1) / 2)
+        style = {**curve_style(i, 4), "color": "black", "linestyle": "none"}
+        axes.plot(x, np.abs(source.impedance), label=escape_label(name) or "source", **style)
         label = "open: limit of 1 dB" if i == len(sources) - 1 else None
-        axes.loglog(x, source.limit(), fillstyle="none", label=label, **style)
-    axes.xaxis.set_major_locator(FixedLocator(frequency.tolist()))
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xticklabels([f"{f:g}" for f in frequency])
-    axes.set_xlabel("Frequency, Hz")
+        axes.plot(x, source.limit(), fillstyle="none", label=label, **style)
+    axes.set_yscale("log")
+    frequency_axis(axes)
     axes.set_ylabel("Impedance, N s/m")
     legend_above(axes)
     return figure

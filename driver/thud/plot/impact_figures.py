@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from thud.base._schema import (
     BandSet,
     LevelsForce,
@@ -18,23 +16,21 @@ from thud.impact.contact_time import THRESHOLD
 from thud.level.assessment import octave_limits
 from thud.level.levels import low_pass
 from thud.plot.style import (
+    add_curves,
+    add_levels,
+    assessed_curves,
     empty_axes,
-    escape_label,
-    force_name,
-    iterate_curves,
     legend_above,
     level_label,
-    line_style,
-    marker_style,
     new_figure,
-    octave_axis,
-    octave_boxes,
     own_style,
+    tolerance_boxes,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    import numpy as np
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -45,8 +41,6 @@ if TYPE_CHECKING:
 # Drawn time before and after the contact, as a fraction of the contact time.
 MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
-# Sizes of the markers of the first and of the last of several curves.
-LARGEST, SMALLEST = 6.0, 2.5
 
 
 @own_style()
@@ -73,13 +67,13 @@ def force_history(impacts: Mapping[str, Impact], force: LevelsForce | None = Non
 
 def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | None) -> None:
     """Draw forces against time."""
-    for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        axes.plot(*contact_force(impact, kind), label=escape_label(name), **line_style(i))
+    curves, name = assessed_curves(impacts, force)
+    add_curves(axes, {label: contact_force(*curve) for label, curve in curves.items()})
     axes.margins(x=0)
     # A number of ticks that depends on the layout would change the layout in turn.
     axes.locator_params(axis="y", nbins=8)
     axes.set_xlabel(TIME_LABEL)
-    axes.set_ylabel(force_label(impacts, force))
+    axes.set_ylabel(f"{name.capitalize()},\nlow-passed at 1.25 kHz, kN")
 
 
 def contact_force(
@@ -94,11 +88,6 @@ def contact_force(
     end = time[recorded > THRESHOLD * recorded.max()][-1]
     shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
     return 1e3 * time[shown], 1e-3 * recorded[shown]
-
-
-def force_label(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
-    """Return the label of an axis of forces."""
-    return f"{force_name(impacts, force).capitalize()},\nlow-passed at 1.25 kHz, kN"
 
 
 @own_style()
@@ -128,14 +117,12 @@ def levels(
     Figure
         Bands in Hz, force exposure level in dB re 1 N.
     """
-    curves = list(iterate_curves(impacts, force))
-    requested = {impact.case.levels.bands for _, impact, _ in curves}
+    curves, _ = assessed_curves(impacts, force)
+    requested = {impact.case.levels.bands for impact, _ in curves.values()}
     bands: list[BandSet] = ["octave"] if requested == {"octave"} else ["octave", "third"]
     figure = new_figure(0.4 + 2.5 * len(bands))
     panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
     draw_levels(panels, impacts, force, common_source(impacts, source), method)
-    for axes in panels.values():
-        axes.set_ylabel(level_label(impacts, force))
     legend_above(panels["octave"])
     return figure
 
@@ -148,15 +135,13 @@ def draw_levels(
     method: LevelsMethod | None = None,
 ) -> None:
     """Draw levels in the axes of their bands; octaves also show the tolerances."""
-    draw_tolerance(panels["octave"], *octave_limits(source), source.replace("_", " "))
+    curves, name = assessed_curves(impacts, force)
+    title = f"Tolerance, {source.replace('_', ' ')}"
+    tolerance_boxes(panels["octave"], *octave_limits(source), title)
     for bands, axes in panels.items():
-        for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
-            values = impact.levels(bands, method, kind)
-            # Smaller markers on larger ones: equal levels stay distinguishable.
-            markers = marker_style(i, LARGEST - (LARGEST - SMALLEST) * i / max(3, len(impacts) - 1))
-            x = np.arange(len(values))
-            axes.plot(x, values, label=escape_label(name), **line_style(i), **markers)
-        octave_axis(axes, bands)
+        levels = {key: i.levels(bands, method, kind) for key, (i, kind) in curves.items()}
+        add_levels(axes, levels, bands)
+        axes.set_ylabel(level_label(name))
 
 
 def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
@@ -176,15 +161,6 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     return sources.pop() if sources else Limits.source
 
 
-def draw_tolerance(
-    axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], name: str
-) -> None:
-    """Draw the tolerance of each octave as a gray box with its nominal value."""
-    octave_boxes(axes, lower, upper, f"Tolerance, {name}")
-    i = np.arange(len(lower))
-    axes.hlines((lower + upper) / 2, i - 0.4, i + 0.4, color="0.45", linewidth=0.8, label="Nominal")
-
-
 @own_style()
 def level_changes(reference: Impact, impacts: Mapping[str, Impact]) -> Figure:
     """Draw the change of octave levels of the assessed force relative to a reference, dB.
@@ -193,12 +169,13 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact]) -> Figure:
     """
     figure, axes = empty_axes(2.8)
     axes.axhline(0, color="0.45", linewidth=0.8)
-    for i, (name, impact, kind) in enumerate(iterate_curves(impacts, None)):
-        change = impact.levels(force=kind) - reference.levels(force=kind)
-        x = np.arange(len(change))
-        axes.plot(x, change, label=escape_label(name), **line_style(i), **marker_style(i))
-    octave_axis(axes)
-    axes.set_ylabel(level_label(impacts, None, "Change of the level, dB"))
+    curves, name = assessed_curves(impacts, None)
+    changes = {
+        label: impact.levels(force=kind) - reference.levels(force=kind)
+        for label, (impact, kind) in curves.items()
+    }
+    add_levels(axes, changes)
+    axes.set_ylabel(level_label(name, "Change of the level, dB"))
     legend_above(axes)
     return figure
 
@@ -207,11 +184,9 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact]) -> Figure:
 def overview(impact: Impact) -> Figure:
     """Draw the assessed force and its octave levels."""
     name = impact.case.model.name.replace("_", " ") if impact.case.model else ""
-    named = {name: impact}
     figure = new_figure(5)
     history, octaves = figure.subplots(2, 1)
-    draw_forces(history, named, None)
-    draw_levels({"octave": octaves}, named, None, impact.limits_source)
-    octaves.set_ylabel(level_label(named, None))
+    draw_forces(history, {name: impact}, None)
+    draw_levels({"octave": octaves}, {name: impact}, None, impact.limits_source)
     legend_above(octaves)
     return figure

@@ -21,16 +21,15 @@ from thud.plot.impact_figures import (
 )
 from thud.plot.style import (
     BAND_NAMES,
+    ERROR_BARS,
     LEVEL,
     RATING_SYMBOL,
+    add_levels,
+    assessed_curves,
     band_axis,
     escape_label,
-    force_name,
-    iterate_curves,
     legend_above,
     level_label,
-    line_style,
-    marker_style,
     new_figure,
     own_style,
 )
@@ -105,9 +104,11 @@ def comparison_figure(
     figure = new_figure(6.3)
     history, octaves, third_octaves = figure.subplots(3, 1, height_ratios=[1.4, 1, 1])
     draw_forces(history, impacts, force)
-    draw_levels({"octave": octaves, "third": third_octaves}, impacts, force, source)
-    for axes in (octaves, third_octaves):
-        axes.set_ylabel(level_label(impacts, force, LEVEL.replace(" level", "\nlevel")))
+    panels: dict[BandSet, Axes] = {"octave": octaves, "third": third_octaves}
+    draw_levels(panels, impacts, force, source)
+    _, name = assessed_curves(impacts, force)
+    for axes in panels.values():
+        axes.set_ylabel(level_label(name, LEVEL.replace(" level", "\nlevel")))
     figure.align_ylabels()
     legend_above(octaves)
     return figure
@@ -123,15 +124,14 @@ def comparison_html(
 
     The table is rows of text, header row first.
     """
-    name = force_name(impacts, force)
+    curves, name = assessed_curves(impacts, force)
     level_title = "Force exposure level" + f" ({name})" * (name != "force")
-    curves = list(enumerate(iterate_curves(impacts, force)))
     forces = {
         "x": {"title": "Time since first touch", "unit": "ms"},
         "y": {"title": f"{name.capitalize()}, low-passed at 1.25 kHz", "unit": "kN"},
         "curves": [
-            _curve(i, label, *contact_force(impact, kind), marks=False)
-            for i, (label, impact, kind) in curves
+            _curve(i, label, *contact_force(*curve), marks=False)
+            for i, (label, curve) in enumerate(curves.items())
         ],
     }
     bands: tuple[BandSet, ...] = ("octave", "third")
@@ -141,7 +141,7 @@ def comparison_html(
             "y": {"title": level_title, "unit": "dB", "reference": " re 1 N"},
             "curves": [
                 _curve(i, label, range(len(level)), level, marks=True)
-                for i, (label, impact, kind) in curves
+                for i, (label, (impact, kind)) in enumerate(curves.items())
                 for level in [impact.levels(band_set, force=kind)]
             ],
         }
@@ -160,13 +160,13 @@ def comparison_html(
 
 # Titles, units and references of the steps from force to room.
 _STEPS = (
-    ("Force exposure level", "dB", " re 1 N"),
-    ("Energy into the floor", "dB", " re 1 J"),
-    ("Radiated share of the losses", "%", ""),
+    ("Force exposure\nlevel", "dB", " re 1 N"),
+    ("Energy input", "dB", " re 1 J"),
+    ("Radiated share\nof the losses", "%", ""),
     ("Maximum Fast level", "dB", " re 20 µPa"),
 )
-# Maximum number of characters of the name of a floor and of the title of a step in one line.
-_NAME, _TITLE = 18, 17
+# Maximum number of characters of the name of a floor in one line.
+_NAME = 18
 # Difference below which forces are drawn as one, dB.
 _SAME = 0.05
 
@@ -181,16 +181,17 @@ def draw_floors(comparison: FloorComparison) -> Figure:
     steps = zip(*map(_step_values, predictions), strict=True)
     nominal = next(iter(predictions)).frequency
     for axes, (title, unit, reference), curves in zip(panels[::-1], _STEPS, steps, strict=True):
-        band_axis(axes, nominal, "third")
-        axes.set_ylabel(fill(f"{title}, {unit}{reference}", _TITLE))
+        band_axis(axes, "third", nominal)
+        blank = " " if "\n" in title else "\n"
+        axes.set_ylabel(f"{title},{blank}{unit}{reference}")
         if axes is panels[-1] and len(curves) > 1 and np.ptp(curves, axis=0).max() < _SAME:
             axes.plot(curves[0], color="black", marker=".", linewidth=1)
             axes.text(
                 0.97, 0.9, "equal for all floors", transform=axes.transAxes, ha="right", va="top"
             )
             continue
-        for i, (name, values) in enumerate(zip(comparison.predictions, curves, strict=True)):
-            axes.plot(values, label=escape_label(name), **line_style(i), **marker_style(i, 3.5))
+        levels = dict(zip(comparison.predictions, curves, strict=True))
+        add_levels(axes, levels, "third", nominal, 3.5)
     for axes in panels[:-1]:
         axes.tick_params(axis="x", labelbottom=False)
         axes.set_xlabel("")
@@ -207,7 +208,7 @@ def floors_html(comparison: FloorComparison) -> str:
     plots = [
         {
             "x": _band_axis(next(iter(predictions.values())).frequency, "third"),
-            "y": {"title": title, "unit": unit, "reference": reference},
+            "y": {"title": title.replace("\n", " "), "unit": unit, "reference": reference},
             "curves": [
                 _curve(i, name, range(len(y)), y, marks=True)
                 for i, (name, y) in enumerate(zip(predictions, values, strict=True))
@@ -235,7 +236,7 @@ def _draw_ratings(axes: Axes, comparison: FloorComparison) -> None:
     ratings = [prediction.rating for prediction in predictions]
     axes.errorbar(
         [rating.level for rating in ratings], y, xerr=[rating.uncertainty for rating in ratings],
-        fmt="o", color="black", capsize=3, markersize=4, label="with standard uncertainty",
+        label="with standard uncertainty", **ERROR_BARS | {"color": "black"},
     )  # fmt: skip
     axes.set_yticks(y, [escape_label(fill(name, _NAME)) for name in comparison.predictions])
     axes.set_ylim(len(y) - 0.4, -0.6)

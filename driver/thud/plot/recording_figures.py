@@ -8,8 +8,17 @@ import numpy as np
 
 from thud.base.checks import require_choice
 from thud.level.levels import BANDWIDTHS, low_pass
-from thud.plot.impact_figures import MARGIN, TIME_LABEL, draw_tolerance
-from thud.plot.style import COLORS, GRAY, empty_axes, legend_above, octave_axis, own_style
+from thud.plot.impact_figures import MARGIN, TIME_LABEL
+from thud.plot.style import (
+    COLORS,
+    ERROR_BARS,
+    GRAY,
+    band_axis,
+    empty_axes,
+    legend_above,
+    own_style,
+    tolerance_boxes,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,10 +43,13 @@ MAX_DISTANCE = 20.0
 THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
 OTHERS: dict[str, Any] = {"color": COLORS[2], "linewidth": 1.0, "linestyle": (0, (1, 1))}
 DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
-AVERAGE: dict[str, Any] = {"color": COLORS[0], "linewidth": 1.4}
-BARS: dict[str, Any] = {
-    "color": COLORS[0], "linestyle": "none", "capsize": 2.5, "elinewidth": 0.9, "capthick": 0.9,
-}  # fmt: skip
+
+
+@own_style()
+def recording_figure(recording: Recording, quantity: str = "levels") -> Figure:
+    """Draw the ``"levels"`` or the ``"force"`` of a recording."""
+    require_choice("quantity", quantity, ("levels", "force"))
+    return recording_levels(recording) if quantity == "levels" else recording_forces(recording)
 
 
 @own_style()
@@ -54,17 +66,15 @@ def recording_forces(recording: Recording) -> Figure:
     forces = 1e-3 * np.array([_recorded(drop, time) for drop in recording.drops])
     allowed = f"permitted, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
     axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GRAY, linewidth=0, label=allowed)
-    _draw_drops(axes, 1e3 * time, forces, recording)
+    marked = _draw_drops(axes, 1e3 * time, forces, recording)
     if len(forces) > 1:
-        axes.plot(1e3 * time, forces.mean(axis=0), label="average", **AVERAGE)
-    marked = _outliers(recording)
+        mean = forces.mean(axis=0)
+        axes.plot(1e3 * time, mean, label="average", color=COLORS[0], linewidth=1.4)
     if marked.any() and not marked.all():
         mean = forces[~marked].mean(axis=0)
         axes.plot(1e3 * time, mean, label="without outliers", **OTHERS)
-    axes.errorbar(
-        1e3 * limits.value, 0, xerr=_bar(limits.estimate.expanded, 1e3), label="contact time",
-        marker="o", markersize=2.5, **BARS,
-    )  # fmt: skip
+    half = np.nan_to_num(1e3 * limits.estimate.expanded)
+    axes.errorbar(1e3 * limits.value, 0, xerr=half, label="contact time", **ERROR_BARS)
     axes.set_xlim(1e3 * time[0], 1e3 * time[-1])
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel("Force on the floor,\nbelow 1.25 kHz, kN")
@@ -78,13 +88,6 @@ def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
     indices = ((edges - drop.begin) * drop.sample_rate).astype(int)
     part = slice(*np.clip(indices, 0, len(drop.force)))
     return np.interp(time, drop.time[part], low_pass(drop.force[part], drop.sample_rate))
-
-
-@own_style()
-def recording_figure(recording: Recording, quantity: str = "levels") -> Figure:
-    """Draw the ``"levels"`` or the ``"force"`` of a recording."""
-    require_choice("quantity", quantity, ("levels", "force"))
-    return recording_levels(recording) if quantity == "levels" else recording_forces(recording)
 
 
 @own_style()
@@ -106,71 +109,58 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
         verdict = recording.assess()
         octaves = verdict.criteria[: len(average.level)]
         own = any(criterion.name in recording.config.limits for criterion in octaves)
-        draw_tolerance(
-            axes,
-            np.array([criterion.lower for criterion in octaves]),
-            np.array([criterion.upper for criterion in octaves]),
-            verdict.source.replace("_", " ") + ", own limits" * own,
-        )
+        lower, upper = np.array([[criterion.lower, criterion.upper] for criterion in octaves]).T
+        title = f"Tolerance, {verdict.source.replace('_', ' ')}" + ", own limits" * own
+        tolerance_boxes(axes, lower, upper, title)
     x = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, x, average.drops.level, recording)
-    expanded = np.array([estimate.expanded for estimate in average.estimates])
+    expanded = np.nan_to_num([estimate.expanded for estimate in average.estimates])
     label = "average, 95 %" if len(recording.drops) > 1 else "drop, 95 %"
-    axes.errorbar(
-        x, average.level, yerr=_bar(expanded), label=label, marker="o", markersize=3, **BARS,
-    )  # fmt: skip
+    axes.errorbar(x, average.level, yerr=expanded, label=label, **ERROR_BARS)
     bounds = average.flag == "background"
     if bounds.any():
         axes.plot(
             x[bounds], average.level[bounds], label="upper bound", linestyle="none", marker="v",
             markersize=6, markerfacecolor="white", color=COLORS[0], zorder=3,
         )  # fmt: skip
-    lowest = np.nanmin(average.level) if np.isfinite(average.level).any() else 0.0
-    visible = np.where(average.background > lowest - MAX_DISTANCE, average.background, np.nan)
-    axes.plot(
-        x, visible, label=_background_label(average.background, visible), color="black",
-        linewidth=0.8, linestyle=":", marker="_", markersize=7,
-    )  # fmt: skip
-    octave_axis(axes, bands)
+    draw_background(axes, average.background, average.level)
+    band_axis(axes, bands)
     axes.set_ylabel("Force exposure level\n(force on the floor), dB")
     legend_above(axes)
     return figure
 
 
-def _background_label(background: NDArray[np.float64], drawn: NDArray[np.float64]) -> str:
-    """Return the label of the background, with its maximum if it is not drawn."""
-    if np.isfinite(drawn).any() or not np.isfinite(background).any():
-        return "background"
-    return f"background, up to {np.nanmax(background):.0f} dB".replace("-", "−")
+def draw_background(
+    axes: Axes, background: NDArray[np.float64], level: NDArray[np.float64]
+) -> None:
+    """Draw levels of the background, or name their maximum if all are far below the levels."""
+    lowest = np.nanmin(level) if np.isfinite(level).any() else 0.0
+    visible = np.where(background > lowest - MAX_DISTANCE, background, np.nan)
+    label = "background"
+    if not np.isfinite(visible).any() and np.isfinite(background).any():
+        label = f"background, up to {np.nanmax(background):.0f} dB".replace("-", "−")
+    axes.plot(visible, "k:_", label=label, linewidth=0.8, markersize=7)
 
 
 def _draw_drops(
     axes: Axes, x: NDArray[np.float64], curves: NDArray[np.float64], recording: Recording
-) -> None:
-    """Draw the curves of the drops, shape (n_drop, n), or their range, and mark outliers."""
-    marked, count = _outliers(recording), len(curves)
+) -> NDArray[np.bool_]:
+    """Draw the curves of the drops, shape (n_drop, n), or their range; return which are outliers.
+
+    Outliers are marked.
+    """
+    names = {outlier.subject for outlier in recording.outliers}
+    marked = np.array([drop.name in names for drop in recording.drops])
+    count, number = len(curves), int(marked.sum())
     if count > MAX_LINES:
         # A band without a level is NaN in all drops.
         axes.fill_between(
             x, curves.min(axis=0), curves.max(axis=0), color="0.6", linewidth=0,
             label=f"range of {count} drops",
         )  # fmt: skip
-    else:
-        name = f"{count} drops" if count > 1 else "drop"
-        for i, curve in enumerate(curves[~marked]):
-            axes.plot(x, curve, label=name if i == 0 else None, **THIN)
-    number = int(marked.sum())
-    name = "outlier" if number == 1 else f"{number} outliers"
-    for i, curve in enumerate(curves[marked]):
-        axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
-
-
-def _outliers(recording: Recording) -> NDArray[np.bool_]:
-    """Return which drops are outliers, shape (n_drop,)."""
-    names = {outlier.subject for outlier in recording.outliers}
-    return np.array([drop.name in names for drop in recording.drops])
-
-
-def _bar(expanded: NDArray[np.float64] | float, unit: float = 1.0) -> NDArray[np.float64]:
-    """Return the half length of an error bar; 0 if the uncertainty is unknown."""
-    return np.nan_to_num(unit * np.asarray(expanded, dtype=np.float64))
+    title = f"{count} drops" if count > 1 else "drop"
+    outliers = f"{number} outliers" if number > 1 else "outlier"
+    for chosen, name, style in ((~marked, title, THIN), (marked, outliers, DEVIANT)):
+        for i, curve in enumerate(curves[chosen] if count <= MAX_LINES or style is DEVIANT else []):
+            axes.plot(x, curve, label=None if i else name, **style)
+    return marked

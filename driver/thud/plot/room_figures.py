@@ -8,9 +8,12 @@ import numpy as np
 
 from thud.plot.style import (
     COLORS,
+    FAST_LEVEL,
     GRAY,
     RATING_SYMBOL,
+    add_levels,
     band_axis,
+    curve_style,
     empty_axes,
     legend_above,
     new_figure,
@@ -25,7 +28,6 @@ if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
     from thud.floors.survey import RoomLevels
 
-FAST_LEVEL = "Maximum Fast level,\ndB re 20 µPa"
 RATING = f"Bands and their A-weighted sum {RATING_SYMBOL}"
 
 
@@ -34,27 +36,15 @@ def room_levels(room: RoomLevels) -> Figure:
     """Draw levels in a room against their bands."""
     figure, axes = empty_axes(2.4)
     x = np.arange(len(room.frequency))
-    if len(room.positions) > 1:
-        for i, levels in enumerate(room.positions):
-            label = "positions" if i == 0 else None
-            axes.plot(x, levels, color="0.65", linewidth=0.6, label=label)
-    number = room.rating.rounded
-    axes.plot(
-        x, room.level, color=COLORS[0], marker="o", markersize=3.5,
-        label=f"in the room: {number} dB",
-    )  # fmt: skip
-    standardized, rating = room.standardized, room.standardized_rating
-    if standardized is not None and rating is not None:
-        axes.plot(
-            x, standardized, color=COLORS[1], marker="s", markersize=3.5,
-            linestyle="--", label=f"standardized: {rating.rounded} dB",
-        )  # fmt: skip
+    for i, levels in enumerate(room.positions if len(room.positions) > 1 else []):
+        label = None if i else "positions"
+        axes.plot(x, levels, color="0.65", linewidth=0.6, label=label)
+    levels = {f"in the room: {room.rating.rounded} dB": room.level}
+    if room.standardized is not None and room.standardized_rating is not None:
+        levels[f"standardized: {room.standardized_rating.rounded} dB"] = room.standardized
+    add_levels(axes, levels, room.bands, room.frequency, 3.5)
     if room.background is not None:
-        axes.plot(
-            x, room.background, color=COLORS[6], linewidth=0.9, linestyle=":",
-            label="background",
-        )  # fmt: skip
-    band_axis(axes, room.frequency, room.bands)
+        axes.plot(x, room.background, "k:", linewidth=0.9, label="background")
     axes.set_ylabel(FAST_LEVEL)
     legend_above(axes, title=RATING)
     return figure
@@ -81,9 +71,7 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     loss.set_ylabel("Loss\nfactor $\\eta$")
     for axes in (radiation, loss):
         axes.set_ylim(bottom=0)
-    band_axis(loss, prediction.frequency, "third")
-    for axes in (below, energy, radiation):
-        axes.tick_params(axis="x", labelbottom=False)
+    band_axis(loss, "third", prediction.frequency)
     figure.align_ylabels()
     legend_above(below, title=RATING)
     return figure
@@ -97,13 +85,13 @@ def _draw_below(axes: Axes, prediction: RoomPrediction) -> None:
         x, level - uncertainty, level + uncertainty, color=GRAY, linewidth=0,
         label="± standard uncertainty",
     )  # fmt: skip
-    edges = {"simply supported": (prediction.simple_level, ":"),
-             "clamped": (prediction.clamped_level, "--")}  # fmt: skip
     if prediction.has_edges:
+        edges = {"simply supported": (prediction.simple_level, ":"),
+                 "clamped": (prediction.clamped_level, "--")}  # fmt: skip
         modal = slice(0, prediction.n_modal)
         for label, (edge, line) in edges.items():
             axes.plot(x[modal], edge[modal], line, color=COLORS[1], linewidth=1, label=label)
-    axes.plot(x, level, color=COLORS[0], marker="o", markersize=3.5, label=f"{prediction.rating}")
+    axes.plot(x, level, label=f"{prediction.rating}", **curve_style(0, 3.5))
 
 
 @own_style()
@@ -111,7 +99,7 @@ def draw_levels(prediction: RoomPrediction) -> Figure:
     """Draw the levels in the room below with their standard uncertainty."""
     figure, axes = empty_axes(2.5)
     _draw_below(axes, prediction)
-    band_axis(axes, prediction.frequency, "third")
+    band_axis(axes, "third", prediction.frequency)
     axes.set_ylabel(FAST_LEVEL)
     legend_above(axes, title=RATING)
     return figure
@@ -129,11 +117,8 @@ def draw_modal_room(room: ModalRoom) -> Figure:
         x, third - first, 0.4, first, facecolor="white", edgecolor="black", linewidth=0.8,
         zorder=2.5, label="50 % of positions",
     )  # fmt: skip
-    axes.plot(
-        x, room.mean, color=COLORS[0], marker="o", markersize=3.5, zorder=3,
-        label="mean of positions",
-    )  # fmt: skip
-    band_axis(axes, room.frequency, "third")
+    axes.plot(x, room.mean, zorder=3, label="mean of positions", **curve_style(0, 3.5))
+    band_axis(axes, "third", room.frequency)
     axes.set_ylabel(FAST_LEVEL)
     legend_above(axes)
     return figure

@@ -6,7 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.plot.style import COLORS, GRAY, LEVEL, WIDTH, new_figure, octave_axis, own_style
+from thud.plot.recording_figures import HEIGHT, draw_background
+from thud.plot.style import (
+    COLORS,
+    ERROR_BARS,
+    GRAY,
+    LEVEL,
+    WIDTH,
+    band_axis,
+    escape_label,
+    own_style,
+    panel_grid,
+)
 from thud.recordings.contact import Contact
 from thud.recordings.drops import Section
 from thud.recordings.measured_drop import Drop
@@ -21,9 +32,7 @@ if TYPE_CHECKING:
 
     from thud.recordings.stage import Stage
 
-# Height of a panel, inch.
-HEIGHT = 2.05
-# Time around the contact that is drawn, s.
+# Time around the contact in which changes of the force are drawn, s.
 AROUND = 0.01
 # Range of forces around the background, in standard deviations of the noise.
 RANGE = 8.0
@@ -33,11 +42,12 @@ RANGE = 8.0
 def draw_stage(stage: Stage) -> Figure:
     """Draw what a stage of the measurement returns, or a drop after each of them."""
     panels = _panels(stage)
-    columns = min(len(panels), 2)
-    rows = len(panels) // columns
-    figure = new_figure(rows * HEIGHT, columns * WIDTH)
-    for axes, (draw, part) in zip(np.ravel(figure.subplots(rows, columns)), panels, strict=True):
-        draw(axes, part)
+    columns = min(2, len(panels))
+    figure, axes = panel_grid(len(panels), columns, HEIGHT - 0.3, width=columns * WIDTH)
+    for panel, (draw, part) in zip(axes, panels, strict=True):
+        draw(panel, part)
+        if len(panel.get_legend_handles_labels()[0]) > 1:
+            panel.legend(loc="upper right")
     return figure
 
 
@@ -54,17 +64,15 @@ def _panels(stage: Stage) -> list[tuple[Callable[[Axes, Any], None], Stage]]:
 
 
 def _draw_section(axes: Axes, section: Section) -> None:
-    for part in (*section.bounces[::-1], section):
+    """Draw the force of a drop and of its bounces, and their contacts."""
+    for part in (*section.bounces, section):
         time = (part.start + np.arange(len(part.force))) / part.sample_rate
-        is_drop = part is section
-        axes.plot(
-            time, 1e-3 * part.force, color=COLORS[0] if is_drop else "0.55", linewidth=0.8,
-            label="as recorded" if is_drop else None,
-        )  # fmt: skip
+        color = COLORS[0] if part is section else "0.55"
+        axes.plot(time, 1e-3 * part.force, color=color, linewidth=0.8)
         axes.axvspan(*time[[part.contact[0], part.contact[1] - 1]], color=GRAY, linewidth=0)
+    axes.set_title(escape_label(section.name))
     axes.set_xlabel("Time in the file, s")
     axes.set_ylabel("Force, kN")
-    axes.legend(loc="upper right", title=section.name)
 
 
 def _draw_changes(axes: Axes, stages: Stages) -> None:
@@ -82,38 +90,33 @@ def _draw_changes(axes: Axes, stages: Stages) -> None:
         axes.plot(1e3 * time, change[shown], color=color, linewidth=0.8, label=label)
     axes.set_xlabel("Time, ms")
     axes.set_ylabel("Change of the force, N")
-    axes.legend()
 
 
 def _draw_contact(axes: Axes, contact: Contact) -> None:
-    """Draw force and removed background on the scale of the noise."""
+    """Draw force, removed background and the gate of the levels on the scale of the noise."""
     rate, touch = contact.sample_rate, contact.touch.value
     time = 1e3 * (np.arange(*contact.span) / rate - touch)
     recorded, removed = contact.force + contact.removed, contact.removed
     first, stop = (index - contact.span[0] for index in contact.gate)
     quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
-    low, high = removed.min(), removed.max()
     spread = max(RANGE * float(quiet.std()), 0.01 * contact.peak)
     axes.axvspan(time[first], time[stop - 1], color=GRAY, linewidth=0, label="gate of the levels")
     axes.plot(time, recorded, color="0.55", linewidth=0.5, label="corrected force")
     axes.plot(time, removed, color=COLORS[1], linewidth=1.0, label="background")
     for edge in (contact.touch, contact.release):
         axes.axvline(1e3 * (edge.value - touch), color=COLORS[0], linewidth=0.6)
-    axes.set_ylim(low - spread, high + spread)
+    axes.set_ylim(removed.min() - spread, removed.max() + spread)
     axes.set_xlabel("Time since first touch, ms")
     axes.set_ylabel("Force, N")
-    axes.legend(loc="upper right")
 
 
 def _draw_levels(axes: Axes, levels: DropLevels) -> None:
+    """Draw the levels of drops with their standard uncertainties, and the background."""
     x, count = np.arange(levels.level.shape[1]), len(levels.names)
     axes.errorbar(
         np.tile(x, count), levels.level.ravel(), yerr=np.nan_to_num(levels.uncertainty.ravel()),
-        color=COLORS[0], marker="o", markersize=3, linestyle="none", capsize=2.5,
-        label="drop" if count == 1 else f"{count} drops",
+        label="drop" if count == 1 else f"{count} drops", **ERROR_BARS,
     )  # fmt: skip
-    background = levels.background.max(axis=0)
-    axes.plot(x, background, color="black", linestyle=":", marker="_", label="background")
-    octave_axis(axes, levels.bands)
+    draw_background(axes, levels.background.max(axis=0), levels.level)
+    band_axis(axes, levels.bands)
     axes.set_ylabel(LEVEL)
-    axes.legend()

@@ -1,4 +1,4 @@
-"""Look of all figures: colors, lines, axes, legends."""
+"""Look of all figures: colors, curves, axes, panels, legends."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from thud.level.assessment import ImpactOrRecording
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.axes import Axes
-    from matplotlib.legend import Legend
+    from matplotlib.cm import ScalarMappable
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, LevelsForce
@@ -37,14 +37,23 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 # Color of areas behind curves.
 GRAY = "0.85"
+# Sizes of the markers of the first and of the last of several curves.
+LARGEST, SMALLEST = 6.0, 2.5
+# Values with their uncertainty.
+ERROR_BARS: dict[str, Any] = {
+    "color": COLORS[0], "linestyle": "none", "marker": "o", "markersize": 3, "capsize": 2.5,
+    "elinewidth": 0.9, "capthick": 0.9,
+}  # fmt: skip
 # Width of a column of a journal page, 8 cm, inch.
 WIDTH = 8 / 2.54
 FORCE_NAMES = {"elastic": "elastic force", "floor": "force on the floor"}
 BAND_NAMES = {"octave": "Octave band", "third": "One-third-octave band"}
 LEVEL = "Force exposure level, dB re 1 N"
+FAST_LEVEL = "Maximum Fast level,\ndB re 20 µPa"
 RATING_SYMBOL = r"$L_\mathrm{iA,Fmax}$"
 # Maximum number of characters in a line of a legend.
 _LINE = 44
+_OCTAVES = np.array([8, 16, 31.5, 63, 125, 250, 500, 1000, 2000, 4000, 8000])
 # Without the backend: figures have no window.
 _STYLE = dict(mpl.rc_params_from_file(Path(__file__).with_name("thud.mplstyle")))
 del _STYLE["backend"]
@@ -87,11 +96,40 @@ def empty_axes(height: float) -> tuple[Figure, Axes]:
     return figure, figure.add_subplot()
 
 
+def panel_grid(
+    count: int, columns: int, height: float, *, width: float = WIDTH, shared: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its panels, row by row; width and height of a row in inches.
+
+    Panels with shared axes have labels of the x axis in the lowest row only.
+    """
+    # Half an inch for labels and colors below the panels.
+    figure = new_figure(0.5 + height * -(-count // columns), width)
+    grid = figure.subplots(
+        -(-count // columns), columns, sharex=shared, sharey=shared, squeeze=False
+    ).ravel()
+    for axes in grid[count:]:
+        axes.remove()
+    panels = list(grid[:count])
+    for i, axes in enumerate(panels if shared else []):
+        axes.tick_params(axis="x", labelbottom=i + columns >= count)
+        axes.xaxis.label.set_visible(i + columns >= count)
+    return figure, panels
+
+
+def add_colorbar(figure: Figure, panels: list[Axes], colors: ScalarMappable, label: str) -> None:
+    """Add the scale of the colors of panels below them."""
+    figure.colorbar(
+        colors, ax=panels, location="bottom", shrink=0.7, aspect=30, pad=0.02,
+        label=label,
+    )  # fmt: skip
+
+
 @own_style()
-def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
+def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
     """Put one legend of all axes above their figure, which grows, in as few rows as possible.
 
-    Text without formulas is small.
+    Text without formulas is small. A single curve needs no legend without a title.
     """
     figure = axes.get_figure(root=True)
     if figure is None:
@@ -102,6 +140,8 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
         for panel in (axes, *others)
         for handle, name in zip(*panel.get_legend_handles_labels(), strict=True)
     ]
+    if len(entries) <= (not title):
+        return
     handles, names = zip(*entries, strict=True)
     size = "medium" if any(map(_has_formula, (*names, title))) else "small"
     rows = 0
@@ -115,7 +155,7 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> Legend:
         if rows >= len(names) or box.width < 0.97 * figure.bbox.width:
             width, height = figure.get_size_inches()
             figure.set_size_inches(width, height + box.height / figure.dpi)
-            return legend
+            return
         legend.remove()
 
 
@@ -128,27 +168,42 @@ def escape_label(label: str) -> str:
     return label.lstrip("_").replace("$", r"\$")
 
 
-def styled(i: int, styles: Sequence[Any]) -> Any:  # noqa: ANN401 - of matplotlib
-    """Return the style of a curve by its index; styles shift by one after each round of colors."""
-    return styles[(i + i // len(COLORS)) % len(styles)]
+def curve_style(i: int, marker_size: float = 0.0) -> dict[str, Any]:
+    """Return color, line style and marker of a curve by its index.
 
-
-def line_style(i: int) -> dict[str, Any]:
-    """Return color and line style of a curve by its index."""
-    return {"color": COLORS[i % len(COLORS)], "linestyle": styled(i, LINES), "linewidth": 1.2}
-
-
-def marker_style(i: int, size: float = 4) -> dict[str, Any]:
-    """Return the marker of a curve by its index."""
-    return {"marker": styled(i, MARKERS), "markersize": size}
+    Line styles and markers shift by one after each round of colors.
+    """
+    shifted = (i + i // len(COLORS)) % len(COLORS)
+    line = {"color": COLORS[i % len(COLORS)], "linestyle": LINES[shifted], "linewidth": 1.2}
+    return line | ({"marker": MARKERS[shifted], "markersize": marker_size} if marker_size else {})
 
 
 def add_curves(
-    axes: Axes, curves: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+    axes: Axes,
+    curves: Mapping[str, tuple[NDArray[Any], NDArray[Any]]],
+    marker_size: float = 0.0,
+    **style: Any,  # noqa: ANN401 - of matplotlib
 ) -> None:
-    """Draw curves of x and y by their names, each in its color and line style."""
+    """Draw curves of x and y by their names, each in its own style but for what `style` states.
+
+    A marker is smaller than that of the curve before: equal values stay distinguishable.
+    """
+    step = max(marker_size - SMALLEST, 0.0) / max(3, len(curves) - 1)
     for i, (name, (x, y)) in enumerate(curves.items()):
-        axes.plot(x, y, label=escape_label(name), **line_style(i))
+        size = marker_size - i * step
+        axes.plot(x, y, label=escape_label(name), **{**curve_style(i, size), **style})
+
+
+def add_levels(
+    axes: Axes,
+    levels: Mapping[str, NDArray[np.float64]],
+    bands: BandSet = "octave",
+    frequency: NDArray[np.float64] | None = None,
+    marker_size: float = LARGEST,
+) -> None:
+    """Draw values in bands by the names of their curves, on an axis as `band_axis` makes it."""
+    add_curves(axes, {name: (np.arange(len(y)), y) for name, y in levels.items()}, marker_size)
+    band_axis(axes, bands, frequency)
 
 
 def named(impact: Impact) -> dict[str, Impact]:
@@ -156,55 +211,63 @@ def named(impact: Impact) -> dict[str, Impact]:
     return {impact.case.name.replace("_", " "): impact}
 
 
-def iterate_curves(
+def assessed_curves(
     impacts: Mapping[str, Curve], force: LevelsForce | None
-) -> Iterator[tuple[str, Curve, LevelsForce]]:
-    """Yield label, impact and kind of force of each curve.
+) -> tuple[dict[str, tuple[Curve, LevelsForce]], str]:
+    """Return impacts and their kinds of force by the names of curves, and the name of the force.
 
-    By default the force is that assessed in each case; labels name forces that differ. Raises
-    InputError if `impacts` is not a mapping of names to impacts, or empty.
+    By default the force is that assessed in each case. Forces that differ are named with the
+    curves; their common name is "force". Raises InputError if `impacts` is not a mapping of names
+    to impacts, or empty.
     """
     require_mapping("impacts", impacts, "impacts")
     for name, impact in impacts.items():
         require_kind(name, impact, ImpactOrRecording)
-    kinds = [impact.assessed_force(force) for impact in impacts.values()]
-    for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
-        suffix = f", {FORCE_NAMES[kind]}" if len(set(kinds)) > 1 else ""
-        yield f"{name}{suffix}", impact, kind
+    curves = {name: (impact, impact.assessed_force(force)) for name, impact in impacts.items()}
+    kinds = {kind for _, kind in curves.values()}
+    if len(kinds) == 1:
+        return curves, FORCE_NAMES[kinds.pop()]
+    return {f"{name}, {FORCE_NAMES[curve[1]]}": curve for name, curve in curves.items()}, "force"
 
 
-def force_name(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
-    """Return the name of the force of all curves, or "force" if the curves differ in it."""
-    kinds = {kind for _, _, kind in iterate_curves(impacts, force)}
-    return FORCE_NAMES[kinds.pop()] if len(kinds) == 1 else "force"
-
-
-def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, label: str = LEVEL) -> str:
-    """Return the label of an axis of levels, with their force if the curves share it."""
-    name = force_name(impacts, force)
+def level_label(name: str, label: str = LEVEL) -> str:
+    """Return the label of an axis of levels with the name of their force, unless forces differ."""
     return label if name == "force" else f"{label}\n({name})"
 
 
-def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:
-    """Label the x axis with all bands of a set."""
-    nominal = get_bands(bands).nominal
-    band_axis(axes, nominal, bands)
+def band_axis(
+    axes: Axes, bands: BandSet = "octave", frequency: NDArray[np.float64] | None = None
+) -> None:
+    """Label the x axis with bands by their mid-band frequencies, Hz; by default all of a set."""
+    nominal = get_bands(bands).nominal if frequency is None else frequency
+    axes.set_xticks(np.arange(len(nominal)), [f"{value:g}" for value in nominal])
     axes.set_xlim(-0.6, len(nominal) - 0.4)
-
-
-def band_axis(axes: Axes, nominal: NDArray[np.float64], bands: BandSet) -> None:
-    """Label the x axis with bands of a set, by their nominal mid-band frequencies, Hz."""
-    axes.set_xticks(np.arange(len(nominal)), [f"{frequency:g}" for frequency in nominal])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel(f"{BAND_NAMES[bands]}, Hz")
     if bands == "third":
         axes.tick_params(axis="x", labelrotation=90)
 
 
-def octave_boxes(
-    axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], label: str
+def frequency_axis(axes: Axes, marks: NDArray[np.float64] | None = None) -> None:
+    """Label a logarithmic x axis with frequencies, Hz; by default octaves that it shows."""
+    axes.set_xscale("log")
+    low, high = axes.get_xlim()
+    marks = _OCTAVES[(low <= _OCTAVES) & (high >= _OCTAVES)] if marks is None else marks
+    axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlabel("Frequency, Hz")
+
+
+def tolerance_boxes(
+    axes: Axes,
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+    name: str,
+    middle: str = "Nominal",
 ) -> None:
-    """Draw the range of each octave as a gray box, with one label for all."""
+    """Draw the range of each band as a gray box with a line in its middle."""  # fmt: skip
+    x = np.arange(len(lower))
     for i, limits in enumerate(zip(lower, upper, strict=True)):
-        name = None if i else label
-        axes.fill_between([i - 0.4, i + 0.4], *limits, color="0.82", linewidth=0, label=name)
+        label = None if i else name
+        axes.fill_between([i - 0.4, i + 0.4], *limits, color="0.82", linewidth=0, label=label)
+    axes.hlines((lower + upper) / 2, x - 0.4, x + 0.4, color="0.45", linewidth=0.8, label=middle)

@@ -153,7 +153,7 @@ def _add_legend(axes: Axes, trends: list[Trend | None], history: History) -> Non
         axes.plot([], [], label="calibration", **CALIBRATION)
     balls = [f"{number}: {name}" for name, number in _ball_numbers(history).items()]
     title = fill("; ".join(balls), MAX_TITLE) or history.title
-    legend_above(axes, title=escape_label(title)).get_title().set_fontweight("bold")
+    legend_above(axes, title=escape_label(title))
 
 
 def _ball_numbers(history: History) -> dict[str, int]:
