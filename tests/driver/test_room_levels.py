@@ -430,7 +430,7 @@ def test_titles_that_would_mislead_are_refused(
         thud.read_room_levels(path)
 
 
-def test_workbook_is_read_like_a_table(tmp_path: Path) -> None:
+def test_workbook_is_read_like_a_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     book.active.append(["Messung vom 3. Mai"])
@@ -448,6 +448,9 @@ def test_workbook_is_read_like_a_table(tmp_path: Path) -> None:
     sheet["C6"] = "60 dB"
     book.save(path)
     with pytest.raises(thud.InputError, match=naming("Pegel", "line 6", "60 dB")):
+        thud.read_room_levels(path)
+    monkeypatch.setattr("thud.base.workbooks.MAX_ROWS", 6)
+    with pytest.raises(thud.InputError, match=naming("levels.xlsx", "Pegel", "6 rows")):
         thud.read_room_levels(path)
     path.write_bytes(b"PK no workbook")
     with pytest.raises(thud.InputError, match=naming("levels.xlsx", "cannot be read")):

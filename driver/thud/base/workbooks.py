@@ -30,7 +30,7 @@ def read_workbook(path: str | os.PathLike[str], allowed: str) -> tuple[str, list
     try:
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         sheets = {
-            sheet.title: list(sheet.iter_rows(max_row=MAX_ROWS, values_only=True))
+            sheet.title: list(sheet.iter_rows(max_row=MAX_ROWS + 1, values_only=True))
             for sheet in book.worksheets
         }
         book.close()
@@ -38,6 +38,8 @@ def read_workbook(path: str | os.PathLike[str], allowed: str) -> tuple[str, list
         refuse(f"{path}: cannot be read ({error})", allowed, error)
     for name, rows in sheets.items():
         if any(isinstance(cell, int | float) for row in rows for cell in row):
+            if len(rows) > MAX_ROWS:
+                refuse(f"{path}: sheet {name!r} has more than {MAX_ROWS} rows", "a table as text")
             return name, ["\t".join(map(_text, row)) for row in rows]
     return refuse(f"{path}: cannot be read (no numbers)", allowed)
 
@@ -65,13 +67,10 @@ def workbook(sheets: Mapping[str, Iterable[Sequence[str | float]]]) -> bytes:
                     cell.data_type = "s"
         sheet.freeze_panes = "B2"
         for column in sheet.columns:
-            width = max(len(_shown(cell.value)) for cell in column) + 2
-            sheet.column_dimensions[column[0].column_letter].width = min(width, _MAX_WIDTH)
+            values = (cell.value for cell in column)
+            shown = (f"{v:.9g}" if isinstance(v, float) else str(v) for v in values)
+            width = min(max(map(len, shown)) + 2, _MAX_WIDTH)
+            sheet.column_dimensions[column[0].column_letter].width = width
     content = io.BytesIO()
     book.save(content)
     return content.getvalue()
-
-
-def _shown(value: object) -> str:
-    """Return a cell about as spreadsheet programs show it."""
-    return f"{value:.9g}" if isinstance(value, float) else str(value)

@@ -11,8 +11,14 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.units import factor_to, find_unit
-from thud.recordings.channel import MAX_COLUMNS, MAX_IN_MEMORY, MIN_SAMPLES, Channel
-from thud.recordings.times import rise_uniformly, uniform_grid
+from thud.recordings.channel import (
+    MAX_COLUMNS,
+    MAX_IN_MEMORY,
+    MIN_SAMPLES,
+    Channel,
+    rise_uniformly,
+    uniform_grid,
+)
 from thud.recordings.words import (
     DATE,
     TIME,

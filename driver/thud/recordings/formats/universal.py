@@ -13,9 +13,8 @@ from thud.base.checks import refuse
 from thud.base.extras import library
 from thud.base.note import Note
 from thud.base.units import factor_to, size_of
-from thud.recordings.channel import Channel, require_small, shown_path
+from thud.recordings.channel import Channel, require_small, shown_path, uniform_grid
 from thud.recordings.signal import read_array
-from thud.recordings.times import uniform_grid
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,10 +25,9 @@ MAX_SETS = 1024
 FUNCTION, UNIT_SYSTEM = 58, 164
 TIME_RESPONSE = 1
 REAL = (2, 4)
-# Specific data types: unknown or general, forces (reaction, excitation), and SI units of others.
+# Specific data types: unknown or general, and forces (reaction, excitation).
 UNKNOWN = (0, 1)
 FORCES = (9, 13)
-SYMBOLS = {8: "m", 11: "m/s", 12: "m/s2"}
 # Relative difference between two statements of the same unit.
 SAME_UNIT = 1e-3
 
@@ -129,6 +127,5 @@ def _ordinate(data_set: DataSet) -> tuple[str, float, tuple[Note, ...]]:
         return label, 1.0, ()
     if kind in FORCES:
         return "N", force or 1.0, (Note("unit_of_data_type", value=force or 1.0, unit="N"),)
-    if kind in UNKNOWN and force in {None, 1.0}:
-        return "", 1.0, ()
-    return SYMBOLS.get(kind, "units of data set 164"), 1.0, ()
+    is_unknown = kind in UNKNOWN and force in {None, 1.0}
+    return "" if is_unknown else "units of data set 164", 1.0, ()
