@@ -362,17 +362,6 @@ def test_rate_of_header_and_times_must_agree(tmp_path: Path) -> None:
         opened(tmp_path / "t.csv")
 
 
-def test_times_without_decimals_and_commas_before_blanks_agree_with_the_header(
-    tmp_path: Path,
-) -> None:
-    pulse = half_sine(4000.0)
-    rows = "".join(f"{250 * i}, {v:.3f}\n" for i, v in enumerate(pulse))
-    (tmp_path / "t.csv").write_text("fs = 4000 Hz\ntime [us], force [N]\n" + rows)
-    (signal,) = opened(tmp_path / "t.csv")
-    assert signal.sample_rate == pytest.approx(4000)
-    np.testing.assert_array_equal(signal.read(0, signal.n_sample), np.round(pulse, 3))
-
-
 def test_rounded_times_are_told(tmp_path: Path) -> None:
     rows = "".join(f"{i / 44100:.6f},{v:g}\n" for i, v in enumerate(half_sine(44100.0)))
     (tmp_path / "t.csv").write_text("time_s,force_N\n" + rows)
@@ -758,46 +747,6 @@ def test_matlab_structures_are_read(packed: bool, tmp_path: Path) -> None:  # no
     assert re.search(naming("lab", "array", "structures"), refusal(path))
 
 
-def matlab_file(order: str, *arrays: tuple[bytes, int, int, bytes]) -> bytes:
-    """Return a MATLAB file of rows: name, class, type of their numbers, and the numbers."""
-
-    def element(kind: int, data: bytes) -> bytes:
-        return struct.pack(f"{order}II", kind, len(data)) + data + bytes(-len(data) % 8)
-
-    size = {4: 2, 9: 8}
-    return b"MATLAB 5.0".ljust(124) + struct.pack(f"{order}HH", 0x100, 0x4D49) + b"".join(
-        element(14, b"".join([
-            element(6, struct.pack(f"{order}II", group, 0)),
-            element(5, struct.pack(f"{order}ii", 1, len(data) // size[kind])),
-            element(1, name), element(kind, data),
-        ]))
-        for name, group, kind, data in arrays
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("order", ["<", ">"])
-def test_matlab_files_of_both_byte_orders_are_read(order: str, tmp_path: Path) -> None:
-    force, path = half_sine(48000.0), tmp_path / "plate.mat"
-    unit = "kN".encode("utf-16-le" if order == "<" else "utf-16-be")
-    columns = (
-        (b"Force", 6, 9, (1e-3 * force).astype(f"{order}f8").tobytes()),
-        (b"Fs", 6, 9, struct.pack(f"{order}d", 48000.0)),
-        (b"unit", 4, 4, unit),
-    )
-    path.write_bytes(matlab_file(order, *columns))
-    (signal,) = opened(path)
-    assert signal.sample_rate == 48000.0
-    np.testing.assert_allclose(signal.read(0, signal.n_sample), force, rtol=1e-15)
-    # Classes 6 to 15 are numbers; 5 is sparse, and 16 is a handle of a function.
-    for group in range(1, 20):
-        odd = (b"Odd", group, *columns[0][2:])
-        path.write_bytes(matlab_file(order, *columns, odd))
-        if 6 <= group <= 15:
-            assert len(opened(path)) == 2
-        else:
-            refusal(path)
-
-
 def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
     """A quarter of a gibibyte of zeros in a quarter of a mebibyte."""
     path = write_pulse(tmp_path, "packed.mat")
@@ -1103,28 +1052,6 @@ def test_configurations_that_are_wrong_are_told(
     with pytest.raises(InputError, match=words) as caught:
         read_config(tmp_path / "lab.toml")
     assert "\n" not in str(caught.value)
-
-
-def german(value: float, decimals: int) -> str:
-    """Return a number with thousands points and a decimal comma."""
-    return f"{value:,.{decimals}f}".translate(str.maketrans(",.", ".,"))
-
-
-@pytest.mark.parametrize("separator", [";", "\t", "quoted"])
-def test_german_numbers_have_thousands_points(separator: str, tmp_path: Path) -> None:
-    force = half_sine(8000.0)
-    rows = [["Zeit [ms]", "Kraft [N]"]]
-    rows += [[german(i / 8, 3), german(value, 2)] for i, value in enumerate(force)]
-    if separator == "quoted":
-        lines = [",".join(f'"{cell}"' for cell in row) for row in rows]
-    else:
-        lines = [separator.join(row) for row in rows]
-    path = tmp_path / "german.csv"
-    path.write_text("Abtastrate: 8.000 Hz\n" + "\n".join(lines), encoding="utf-8")
-    signal, found = read_all(path)
-    assert signal.sample_rate == pytest.approx(8000)
-    assert "1.500,00" in path.read_text(encoding="utf-8")
-    np.testing.assert_allclose(found, force, atol=0.006)
 
 
 EXCEL = datetime(2026, 11, 23, 9, 58, 59, 980000)  # noqa: DTZ001 - spreadsheets have no time zone

@@ -307,17 +307,6 @@ def big_endian_tdms() -> bytes:
     return lead + struct.pack(">IQQ", 4713, len(head) + len(raw), len(head)) + head + raw
 
 
-def big_endian_matlab_4() -> bytes:
-    """Return a MATLAB 4 file of a force and a sample rate whose numbers are big-endian."""
-    return b"".join(
-        struct.pack(">5i", 1000, len(values), 1, 0, len(name) + 1)
-        + name.encode()
-        + b"\0"
-        + np.asarray(values, dtype=">f8").tobytes()
-        for name, values in (("Force", FORCE), ("Fs", [RATE]))
-    )
-
-
 def matrix_73(path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["M"] = np.stack([TIME, FORCE])
@@ -349,7 +338,6 @@ def nanoseconds(path: Path) -> None:
     ("name", "write"),
     [
         ("a.tdms", lambda path: path.write_bytes(big_endian_tdms())),
-        ("a.mat", lambda path: path.write_bytes(big_endian_matlab_4())),
         ("b.mat", matrix_73),
         ("a.nc", packed_times),
         ("b.nc", nanoseconds),
