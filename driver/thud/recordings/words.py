@@ -239,23 +239,12 @@ def find_word(items: Iterable[tuple[str, str]], words: frozenset[str]) -> str:
     return ""
 
 
-def neutral_value(name: str, unit: str = "") -> float | None:
-    """Return the value of a factor or an offset that changes nothing; None of any other name.
-
-    >>> neutral_value("scale_factor"), neutral_value("add_offset"), neutral_value("date")
-    (1.0, 0.0, None)
-    """
-    alias = plain(split_title(name)[0])
-    if alias in _OFFSET:
-        return 0.0
-    is_factor = not unit if alias in _SENSITIVITY else _FACTOR.fullmatch(alias)
-    return 1.0 if is_factor else None
-
-
 def find_unapplied(items: Iterable[tuple[str, str]], unit: str) -> str:
     """Return the first factor or offset in a header that changes values; `unit` is theirs."""
     for title, value in items:
-        neutral = neutral_value(title, unit)
+        alias = plain(split_title(title)[0])
+        is_factor = not unit if alias in _SENSITIVITY else _FACTOR.fullmatch(alias)
+        neutral = 0.0 if alias in _OFFSET else 1.0 if is_factor else None
         if neutral is not None and (read_number(value) or (None, ""))[0] != neutral:
             return f"{title[:MAX_LENGTH]} = {value[:MAX_LENGTH]}"
     return ""
