@@ -143,6 +143,19 @@ def test_prediction_is_the_normal_distribution_given_the_quiet(background: Backg
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-4 * expected.max())
 
 
+def test_step_at_an_unknown_instant_is_a_line_with_the_error_of_its_instant() -> None:
+    """Offsets before and after that are known: the step to an instant is uniformly distributed."""
+    ends, step = (QUIET[1][QUIET[1] < 0].max(), QUIET[0][QUIET[0] > 0].min()), 40.0
+    mean, few = np.where(middle(QUIET) > 0, step, 0.0), np.array([1e-9, 1e-9, 1e-9, 1e-9, 1e-9])
+    found = Background(QUIET, mean, few, PEAK, ends=ends, step=step)
+    passed = (middle(CONTACT) - ends[0]) / (ends[1] - ends[0])
+    np.testing.assert_allclose(found.predict(CONTACT), step * passed, atol=0.01 * step)
+    instants = ends[0] + (ends[1] - ends[0]) * (np.arange(20_000) + 0.5) / 20_000
+    errors = step * (passed - (middle(CONTACT) > instants[:, None]))
+    expected = errors.T @ errors / len(errors)
+    np.testing.assert_allclose(found.error_covariance(CONTACT), expected, atol=0.01 * step**2)
+
+
 @pytest.mark.parametrize("code", ["drift_removed", "hum_removed"])
 def test_drift_and_hum_are_told_from_three_deviations_on(background: Background, code: str) -> None:
     """They are means given the quiet, and proportional to it."""
@@ -240,16 +253,6 @@ def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
     # Eight errors of their own stated size: their mean square between quantiles of chi squared.
     square = np.sum((error / stated) ** 2)
     assert stats.chi2.ppf(1e-3, 8) < square < stats.chi2.ppf(1 - 1e-3, 8)
-
-
-def test_background_in_reversed_time_has_the_same_noise() -> None:
-    amplitude = np.where(middle(QUIET) < 0, 1.0, 8.0)
-    mean = 20 + amplitude * np.random.default_rng(4).normal(size=len(amplitude))
-    found = fit_noise(QUIET, mean, PEAK)
-    begins, ends = QUIET
-    reverse = fit_noise((-ends[::-1], -begins[::-1]), mean[::-1], PEAK)
-    for one, other in zip(reverse, found, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("rate", [2500.0, 25600.0])
