@@ -373,7 +373,7 @@ def _calibrated(
     )
     result = calibrate(path, force=weight.mass * GRAVITY, uncertainty=1e-4, unit="FS")
     factor = float(result.chain.split()[0])
-    said = tuple(map(str, result.notes))
+    said = tuple(str(note) for note in result.notes if note.is_warning)
     concerned = CALIBRATION in set().union(*map(concern, said)) if said else False
     u = result.uncertainty
     return {CALIBRATION: Value(factor / chain.full_scale - 1, u, concerned)}, said

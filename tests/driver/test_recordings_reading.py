@@ -927,7 +927,7 @@ def test_calibration_record_of_a_file(tmp_path: Path) -> None:
         (np.zeros(1000), {"force": 10.0, "unit": "V"}, naming("recording", "step")),
         (np.arange(1000.0), {"force": 10.0, "mass": 1.0, "unit": "V"}, naming("force", "mass")),
         (np.arange(1000.0), {"unit": "V"}, naming("force", "mass")),
-        (np.arange(1000.0), {"force": -1.0, "unit": "V"}, naming("force", "-1 N")),
+        (np.arange(1000.0), {"force": -1.0, "unit": "V"}, naming("force", "-1.0")),
         (np.arange(1000.0), {"force": math.nan, "unit": "V"}, naming("force", "nan")),
         (np.arange(1000.0), {"force": 1.0}, naming("unit")),
         (np.arange(3.0), {"force": 1.0, "unit": "V"}, naming("recording", "step")),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import fdtrc
 
-from thud.base.checks import refuse, refuse_value, require_number
+from thud.base.checks import refuse, require_number
 from thud.base.note import Note
 from thud.base.units import find_unit
 from thud.recordings.channel import regular_file, shown_path, shown_text
@@ -50,7 +49,7 @@ N_MEAN = 24
 CUT = 0.2
 CLIPPED = 0.999
 MIN_NOISE = 3.0
-# Standard deviations from zero at which a droop, or a further term, is significant, and those of a
+# Standard deviations from zero at which a droop, or a second one, is significant, and those of a
 # bound with 95 %.
 SIGNIFICANT = 3.0
 BOUND = 1.645
@@ -63,7 +62,9 @@ MISFIT_WEIGHT = 30.0
 MAX_MISFIT = 1e-2
 # Maximum decay within the lag, in time constants: a faster one is hardly distinguished from a step.
 MAX_DECAY = 0.5
-# Maximum relative uncertainty of the step.
+# Range of a known force, N, or mass, kg; maximum relative uncertainty of it, and of the step.
+KNOWN = (1e-3, 1e9)
+MAX_KNOWN_UNCERTAINTY = 0.5
 MAX_UNCERTAINTY = 0.1
 
 
@@ -112,20 +113,22 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     """
     if (force is None) == (mass is None):
         refuse("calibrate(): state either force or mass", "force in N or mass in kg")
-    local = _require_gravity(gravity, mass)
-    name, known = ("force", force) if mass is None else ("mass", mass)
-    newtons = require_number(f"calibrate(): {name}", known) * (1.0 if mass is None else local)
-    require_number("calibrate(): uncertainty", uncertainty)
-    if not newtons > 0 or not 0 <= uncertainty < 1:
-        refuse(
-            f"calibrate(): force = {newtons:g} N, uncertainty = {uncertainty:g}",
-            "a positive force, 0 <= uncertainty < 1",
-        )
+    if mass is None and gravity is not None:
+        refuse("calibrate(): gravity is stated with a force", "gravity with a mass")
+    local = STANDARD_GRAVITY if gravity is None else gravity
+    require_number("calibrate(): gravity", local, *ALLOWED_GRAVITY, "m/s2")
+    require_number("calibrate(): uncertainty", uncertainty, 0.0, MAX_KNOWN_UNCERTAINTY)
+    if mass is None:
+        newtons = require_number("calibrate(): force", force, *KNOWN, "N")
+        load = f"{newtons:.6g} N"
+    else:
+        newtons = local * require_number("calibrate(): mass", mass, *KNOWN, "kg")
+        load = f"{mass:g} kg (g = {local:g} m/s2)"
     signal, symbol, unapplied = open_source(record, channel, unit)
     if not symbol:
         refuse(f"{signal.name}: the values are without a unit", f"unit = one of {ALLOWED}")
     steps, notes = _measure_steps(signal)
-    size, number = float(steps.sizes.mean()), len(steps.sizes)
+    size, number = float(np.abs(steps.changes).mean()), len(steps.changes)
     if steps.uncertainty > MAX_UNCERTAINTY * size:
         refuse(
             f"{signal.name}: the step is {size:.4g} {symbol} with an uncertainty of "
@@ -133,7 +136,7 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
     spread = 0.0
-    if (steps.signs[1:] == steps.signs[:-1]).any():
+    if (steps.changes[1:] * steps.changes[:-1] > 0).any():
         notes.append(Note("steps_in_one_direction", value=newtons, unit="N"))
     if unapplied:
         notes.append(Note("stored_values_calibrated", others={"factor": unapplied}))
@@ -145,26 +148,12 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
         spread = (high - low) / math.sqrt(12) / STANDARD_GRAVITY
         others = {"spread": spread}
         notes.append(Note("gravity_assumed", "", local, low, high, "m/s2", others=others))
-    load = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg (g = {local:g} m/s2)"
     return Calibration(
-        f"{float(newtons / size)!r} N/{symbol}",
+        f"{newtons / size!r} N/{symbol}",
         math.hypot(steps.uncertainty / size, uncertainty, spread),
         f"{number} step{'s' * (number > 1)} of {load} in {signal.name}",
         tuple(notes),
     )
-
-
-def _require_gravity(gravity: float | None, mass: float | None) -> float:
-    """Return the gravity of a mass, m/s2; raise InputError if it is not one on the earth."""
-    if gravity is None:
-        return STANDARD_GRAVITY
-    if mass is None:
-        refuse("calibrate(): gravity is stated with a force", "gravity with a mass")
-    require_number("calibrate(): gravity", gravity)
-    low, high = ALLOWED_GRAVITY
-    if not low <= gravity <= high:
-        refuse_value("calibrate(): gravity", gravity, f"{low} to {high} m/s2, such as 9.81")
-    return gravity
 
 
 def open_source(
@@ -195,14 +184,13 @@ def open_source(
 
 
 class _Steps(NamedTuple):
-    """Magnitudes and signs of steps, and the standard uncertainty of their mean.
+    """Changes of the level at the steps, and the standard uncertainty of their mean magnitude.
 
-    Then the rate of the droop, the reciprocal of its time constant, and its standard uncertainty,
-    per mean, and other curvature of the plateaus.
+    Then the rate of the droop per mean, the reciprocal of its time constant, and its standard
+    uncertainty, and other curvature of the plateaus.
     """
 
-    sizes: NDArray[np.float64]
-    signs: NDArray[np.float64]
+    changes: NDArray[np.float64]
     uncertainty: float
     rate: float
     rate_uncertainty: float
@@ -212,10 +200,8 @@ class _Steps(NamedTuple):
 def _measure_steps(signal: Signal) -> tuple[_Steps, list[Note]]:
     """Return the steps of a record and a note on the time constant of its amplifier.
 
-    Without times, there is no note.
-
-    Raise InputError if there is no clear step, if a plateau is clipped, or if the level between the
-    steps fits no exponential decay.
+    Without times, there is no note. Raise InputError if there is no clear step, if a plateau is
+    clipped, or if the level between the steps fits no exponential decay.
     """
     name, width = signal.name, max(1, signal.n_sample // MEANS)
     # NaN if it is unknown.
@@ -228,10 +214,10 @@ def _measure_steps(signal: Signal) -> tuple[_Steps, list[Note]]:
         refuse(
             f"{name}: has no clear step", "a record in which a known force is put on or taken off"
         )
-    _refuse_clipped(signal, high, plateaus, "maximum")
-    _refuse_clipped(signal, -low, plateaus, "minimum")
+    for side, values in (("maximum", high), ("minimum", -low)):
+        _refuse_clipped(signal, values, plateaus, side)
     steps = _fit_steps(level, plateaus)
-    misfit = steps.misfit / float(steps.sizes.mean())
+    misfit = steps.misfit / float(np.abs(steps.changes).mean())
     if MISFIT_WEIGHT * misfit > MAX_MISFIT:
         refuse(
             f"{name}: the level between the steps deviates by {misfit:.2g} of the step from any "
@@ -249,11 +235,9 @@ def _measure_steps(signal: Signal) -> tuple[_Steps, list[Note]]:
     minimum = interval / (steps.rate + BOUND * steps.rate_uncertainty)
     if steps.rate <= SIGNIFICANT * steps.rate_uncertainty:
         return steps, [Note("no_droop", low=minimum, unit="s")]
-    relative = steps.rate_uncertainty / steps.rate
-    others = {"uncertainty": relative}
-    return steps, [
-        Note("droop_removed", "", interval / steps.rate, minimum, unit="s", others=others)
-    ]
+    others = {"uncertainty": steps.rate_uncertainty / steps.rate}
+    droop = Note("droop_removed", "", interval / steps.rate, minimum, unit="s", others=others)
+    return steps, [droop]
 
 
 def _means(signal: Signal, width: int) -> NDArray[np.float64]:
@@ -318,49 +302,34 @@ def _fit_steps(level: NDArray[np.float64], plateaus: list[NDArray[np.int64]]) ->
     record begins.
     """
     parts = [np.array_split(plateau, min(len(plateau), N_MEAN)) for plateau in plateaus]
-    blocks = list(itertools.chain(*parts))
-    counts = [len(part) for part in parts]
-    # The mean of the level is a linear drift of the integral.
-    integral = _integral(level - level.mean())
-    index = np.arange(len(level)) / len(level)
+    # Integrals from the first mean to the middle of each; the mean level is a drift of the first.
+    centered = level - level.mean()
+    once = np.cumsum(centered) - centered / 2
+    twice = np.cumsum(once) - once / 2
     values, position, once, twice = (
-        np.array([series[block].mean() for block in blocks])
-        for series in (level, index, integral, _integral(integral))
+        np.array([series[block].mean() for blocks in parts for block in blocks])
+        for series in (level, np.arange(len(level)) / len(level), once, twice)
     )
-    levels = block_diag(*[np.ones((count, 1)) for count in counts])
-    steady = np.column_stack([levels, position, position**2])
-    columns = np.column_stack([steady, -once])
+    levels = block_diag(*[np.ones((len(blocks), 1)) for blocks in parts])
+    columns = np.column_stack([levels, position, position**2, -once])
     parameters, covariance, residual = _least_squares(columns, values)
-    rate, u_rate = max(float(parameters[-1]), 0.0), math.sqrt(covariance[-1, -1])
-    if rate:
-        # A second high-pass in series takes away the integral of the integral, too.
-        models = columns, np.column_stack([columns, twice])
-    else:
-        # It fits nothing, but is uncertain. A bend of the drift may be a curvature of other cause.
-        columns, models = steady, (steady[:, :-1], steady)
+    rate, rate_uncertainty = max(float(parameters[-1]), 0.0), math.sqrt(covariance[-1, -1])
+    if not rate:  # it fits nothing, but is uncertain
+        columns = columns[:, :-1]
         parameters, _, residual = _least_squares(columns, values)
-    misfit = _misfit(columns, residual, counts)
+    misfit = _misfit(columns, residual, [len(blocks) for blocks in parts])
 
     count = len(plateaus)
-    steps = np.diff(parameters[:count])
-    sizes, signs = np.abs(steps), np.sign(steps)
-    weights = -np.diff(signs, prepend=0, append=0) / len(steps)
+    changes = np.diff(parameters[:count])
+    weights = -np.diff(np.sign(changes), prepend=0, append=0) / len(changes)
     variance = weights @ covariance[:count, :count] @ weights + (MISFIT_WEIGHT * misfit) ** 2
-    # The integral of the noise between the plateaus, at random from one mean to the next.
-    between = sum(after[0] - before[-1] for before, after in itertools.pairwise(plateaus))
-    noise = residual @ residual / (len(values) - columns.shape[1])
-    variance += (rate / len(steps)) ** 2 * noise * between * max(len(block) for block in blocks)
-    (smaller, *_), (larger, u_larger, _) = (_least_squares(model, values) for model in models)
-    if abs(larger[-1]) > SIGNIFICANT * math.sqrt(u_larger[-1, -1]):
-        variance += float(weights @ (larger[:count] - smaller[:count])) ** 2
-    if len(steps) > 1:
-        variance = max(variance, sizes.var(ddof=1) / len(steps))
-    return _Steps(sizes, signs, math.sqrt(variance), rate, u_rate, misfit)
-
-
-def _integral(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the integral of values from the first to the middle of each."""
-    return np.asarray(np.cumsum(values) - values / 2)
+    # A second high-pass in series takes away the integral of the integral, too.
+    further, uncertainty, _ = _least_squares(np.column_stack([columns, twice]), values)
+    if abs(further[-1]) > SIGNIFICANT * math.sqrt(uncertainty[-1, -1]):
+        variance += float(weights @ (further[:count] - parameters[:count])) ** 2
+    if len(changes) > 1:
+        variance = max(variance, np.abs(changes).var(ddof=1) / len(changes))
+    return _Steps(changes, math.sqrt(variance), rate, rate_uncertainty, misfit)
 
 
 def _least_squares(
