@@ -36,22 +36,10 @@ def refuse(  # noqa: PLR0913 - the fields of a note
     low: float = math.nan,
     high: float = math.nan,
 ) -> NoReturn:
-    """Raise InputError with a message that states the problem and what is allowed.
+    """Raise InputError with a message: the name of an argument or key, its problem, the mend.
 
-    Parameters
-    ----------
-    problem
-        What is wrong, or what is wrong with the argument or key of the name.
-    allowed
-        What is allowed, after the problem.
-    cause
-        Exception that shows the problem.
-    name
-        Name of an argument or key, with which the message begins.
-    subject
-        Key that would mend it, by default that of the name.
-    value, low, high
-        Number that is not allowed, and its range.
+    `cause` is the exception that shows the problem, `subject` the key that would mend it, by
+    default that of the name; `value`, `low` and `high` are a number and its range.
     """
     text = f"{problem}; allowed: {allowed}"
     number = float(value) if isinstance(value, int | float) and not math.isnan(low) else math.nan
