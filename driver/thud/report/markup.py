@@ -1,18 +1,17 @@
-"""Markup of reports: texts, tables and figures as HTML."""
+"""Markup of reports: templates, texts and figures as HTML."""
 
 from __future__ import annotations
 
-import html
 import re
-from typing import TYPE_CHECKING
+from typing import Any
+
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
 
 from thud.base.display import html_text
 from thud.report.fonts import FAMILY
 from thud.report.notes import shorten
 from thud.report.rows import NOT_KNOWN
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 # Maximum length of a list of notes.
 MAX_NOTES = 40
@@ -24,47 +23,41 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
-def escaped(text: str) -> str:
-    """Return a text in one line as HTML."""
-    return html.escape(plain(text))
+def _one_line(value: Any) -> Any:  # noqa: ANN401 - of a template
+    """Return a text in one line; markup and other values as they are."""
+    return plain(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
 
-def symbols(text: str) -> str:
+def _symbols(text: str) -> Markup:
     """Return a text in one line as HTML, with the indices of symbols below the line."""
-    return html_text(plain(text))
+    return text if isinstance(text, Markup) else Markup(html_text(plain(text)))  # noqa: S704
 
 
-def css_string(text: str) -> str:
+def _css_string(text: str) -> Markup:
     """Return a text for a string of CSS, with an escape for all but letters and digits."""
-    return "".join(
+    escapes = (
         c if c.isascii() and (c.isalnum() or c == " ") else f"\\{ord(c):x} " for c in plain(text)
     )
+    return Markup("".join(escapes))  # noqa: S704 - letters, digits and escapes
 
 
-def pair_rows(pairs: Iterable[tuple[str, str]]) -> str:
-    """Return rows of a table of names and values; lines of a value stay lines."""
-    rows = []
-    for label, value in pairs:
-        shown = "<br>".join(map(escaped, value.split("\n"))) if value else NOT_KNOWN
-        rows.append(f'<tr><th>{escaped(label)}</th><td dir="auto">{shown}</td></tr>')
-    return "\n".join(rows)
+_TEMPLATES = Environment(
+    loader=PackageLoader("thud.report", ""), autoescape=True, finalize=_one_line
+)
+_TEMPLATES.globals |= {"FAMILY": FAMILY, "NOT_KNOWN": NOT_KNOWN}
+_TEMPLATES.filters |= {
+    "symbols": _symbols,
+    "css": _css_string,
+    "shorten": lambda messages: shorten(messages, MAX_NOTES),
+}
 
 
-def labeled(cells: Sequence[str], head: Sequence[str]) -> str:
-    """Return cells of a table with the titles of their columns, shown on narrow screens."""
-    return "".join(
-        f'<td data-label="{escaped(title)}">{cell}</td>'
-        for cell, title in zip(cells, head, strict=True)
-    )
+def render(template: str, **values: Any) -> str:  # noqa: ANN401 - of a template
+    """Return a page by its template; texts are escaped, each as one line."""
+    return _TEMPLATES.get_template(template).render(values)
 
 
-def notes(title: str, messages: Sequence[str]) -> str:
-    """Return a list of messages below a title; empty without messages."""
-    items = "".join(f"<li>{escaped(message)}</li>" for message in shorten(messages, MAX_NOTES))
-    return f"<h2>{escaped(title)}</h2><ul>{items}</ul>" if messages else ""
-
-
-def inline_svg(svg: str, prefix: str) -> str:
+def inline_svg(svg: str, prefix: str) -> Markup:
     """Return a figure as inline SVG; the prefix makes its identifiers unique on the page.
 
     Styles become attributes, which WeasyPrint reads in less than half the time.
@@ -77,7 +70,7 @@ def inline_svg(svg: str, prefix: str) -> str:
     box = re.search(r'viewBox="[^"]*"', text)
     assert box  # noqa: S101 - matplotlib writes it
     head = f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax"'
-    return f'{head} font-family="{FAMILY}">{text[text.index(">") + 1 :]}'
+    return Markup(f'{head} font-family="{FAMILY}">{text[text.index(">") + 1 :]}')  # noqa: S704
 
 
 def _attributes(style: re.Match[str]) -> str:

@@ -7,20 +7,12 @@ import math
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 from thud.base._schema import QUANTITIES, VERDICTS
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND
-from thud.report.fonts import FAMILY
-from thud.report.markup import (
-    css_string,
-    escaped,
-    inline_svg,
-    labeled,
-    notes,
-    pair_rows,
-    plain,
-    symbols,
-)
+from thud.report.markup import inline_svg, plain, render
 from thud.report.notes import shorten
 from thud.report.rows import (
     COUNT,
@@ -37,7 +29,6 @@ from thud.report.rows import (
     value_text,
     width_text,
 )
-from thud.report.template import BODY, PAGE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,8 +37,6 @@ if TYPE_CHECKING:
 MAX_FILES = 60
 # Maximum number of characters of the name at the foot of each page.
 MAX_IDENTITY = 70
-# Title of the levels, which are the first criteria.
-LEVEL = "Force exposure level L_FE, dB re 1 N"
 # Minimum number of drops for the test for outliers.
 MIN_DROPS = 3
 STANDARDS = {
@@ -85,46 +74,40 @@ def report_page(
     column width as SVG, `checksum` is the SHA-256 of ``report.json``, and `mark` the media type and
     the content of the accreditation mark.
     """
-    source = data["source"].replace("_", " ")
-    report = data["report"]
-    body = BODY.substitute(
-        mark=_mark(mark),
-        number=escaped(report["number"]),
-        source=escaped(source),
-        verdict=escaped(data["verdict"]),
-        reason=escaped(_reason(data["criteria"])),
-        about=pair_rows(_about(data)),
-        measured=pair_rows(_measured(data)),
-        head="".join(f"<th>{escaped(name)}</th>" for name in _with_picture(HEAD, "")),
-        level=symbols(LEVEL),
-        rows="\n".join(map(_row, data["criteria"])),
-        rule="<br>".join(map(escaped, _rules(data))),
-        figures="\n".join(f"<td>{inline_svg(svg, f'f{i}')}</td>" for i, svg in enumerate(figures)),
-        budget_head="".join(f"<th>{name}</th>" for name in BUDGET_HEAD),
-        budgets="\n".join(map(_budget, data["criteria"])),
-        budget_rule=escaped(_budget_rule(data)),
-        drops=notes("Drops and methods", _drops_and_methods(data)),
-        properties=notes("Properties of the ball, as stated", _properties(data["properties"])),
-        processing=notes("Signal processing", data["processing"] or ["nothing"]),
-        warnings=notes("Warnings", data["warnings"] or ["none"]),
-        files=_files(data["files"]),
-        statement=escaped(
-            "The results relate only to the item tested. This report shall not be reproduced "
-            "except in full without the approval of the laboratory."
-        ),
-        signature=_signature(data),
-        footer=escaped(f"thud {data['thud']} · report.json: SHA-256 {checksum} · end of report"),
-    )
+    report, criteria = data["report"], data["criteria"]
     name = data["serial"] or data["name"]
     identity = f"Report {report['number'] or f'of {name}'}"
     if len(identity) > MAX_IDENTITY or not report["number"]:
         identity = f"{identity[:MAX_IDENTITY]}, SHA-256 {checksum[:16]}…"
-    return PAGE.substitute(
-        title=escaped(f"Calibration report: {report['number'] or name}"),
-        family=FAMILY,
-        identity=css_string(identity),
-        style="",
-        body=body,
+    head = _with_picture(HEAD, "")
+    return render(
+        "calibration.html",
+        title=f"Calibration report: {report['number'] or name}",
+        identity=identity,
+        data=data,
+        checksum=checksum,
+        mark=mark and f"data:{mark[0]};base64,{base64.b64encode(mark[1]).decode()}",
+        source=data["source"].replace("_", " "),
+        reason=_reason(criteria),
+        about=_about(data),
+        measured=_measured(data),
+        head=head,
+        rows=[(c, _with_picture(criterion_row(c), _range_picture(c))) for c in criteria],
+        excluded=excluded_text(criteria),
+        standards=STANDARDS.get(data["source"], "the standards"),
+        has_own_limits=any(not criterion["limits_of_standard"] for criterion in criteria),
+        figures=[inline_svg(svg, f"f{i}") for i, svg in enumerate(figures)],
+        budget_head=BUDGET_HEAD,
+        budgets=[_budget(criterion) for criterion in criteria if _has_budget(criterion)],
+        without_budget=", ".join(
+            criterion_style(criterion).quantity.title
+            for criterion in criteria
+            if criterion["name"] != COUNT and not criterion["uncertainty"]
+        ),
+        drops=_drops_and_methods(data),
+        properties=_properties(data["properties"]),
+        files=_files(data["files"]),
+        issued=", ".join(filter(None, [report["place"], report["issued"]])),
     )
 
 
@@ -137,15 +120,6 @@ def laboratory_text(data: dict[str, Any]) -> str:
     for value in (value for table in tables for value in table.values()):
         texts += value if isinstance(value, tuple) else [value] if isinstance(value, str) else []
     return plain("".join(texts))
-
-
-def _mark(mark: tuple[str, bytes] | None) -> str:
-    """Return the accreditation mark as an image with its data."""
-    if mark is None:
-        return ""
-    kind, content = mark
-    data = base64.b64encode(content).decode()
-    return f'<img class="mark" alt="accreditation mark" src="data:{kind};base64,{data}">\n'
 
 
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
@@ -258,20 +232,14 @@ def _with_picture(row: Sequence[str], picture: str) -> list[str]:
     return [*row[:-1], picture, row[-1]]
 
 
-def _row(criterion: dict[str, Any]) -> str:
-    cells = _with_picture(
-        [escaped(cell) for cell in criterion_row(criterion)], _range_picture(criterion)
-    )
-    style = criterion["verdict"].replace(" ", "-")
-    return f'<tr class="{style}">{labeled(cells, _with_picture(HEAD, ""))}</tr>'
+def _has_budget(criterion: dict[str, Any]) -> bool:
+    known = any(part["uncertainty"] for part in criterion["contributions"])
+    return known and bool(criterion["uncertainty"]) and criterion["value"] is not None
 
 
-def _budget(criterion: dict[str, Any]) -> str:
-    """Return the rows of the uncertainty budget of a criterion."""
-    parts = [part for part in criterion["contributions"] if part["uncertainty"]]
+def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
+    """Return summary and contributions of the uncertainty budget of a criterion."""
     combined = criterion["uncertainty"]
-    if not parts or not combined or criterion["value"] is None:
-        return ""
     style = criterion_style(criterion)
     unit = style.quantity.display_unit
 
@@ -286,47 +254,31 @@ def _budget(criterion: dict[str, Any]) -> str:
             f"k = {number(criterion['coverage_factor'], 2)}",
         ]
     )
-    rows = [f'<tr><th colspan="{len(BUDGET_HEAD)}"><span>{escaped(summary)}</span></th></tr>']
-    for part in parts:
+    rows: list[tuple[str, ...]] = []
+    for part in criterion["contributions"]:
+        if not part["uncertainty"]:
+            continue
         share = f"{100 * (part['uncertainty'] / combined) ** 2:.1f} %"
         size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] / style.unit, unit), "1"
         if part["size"] is not None:
             size = with_unit(part["size"], part["unit"])
             per = f"/{part['unit']}" if part["unit"] else ""
             sensitivity = with_unit(part["sensitivity"] / style.unit, f"{unit}{per}")
-        cells = (
+        rows.append((
             part["name"], part["kind"], size, f"{part['divisor']:.4g}", sensitivity,
             with_unit(part["uncertainty"] / style.unit, unit), freedom_text(part["freedom"]),
             share if part["counted"] else "included",
-        )  # fmt: skip
-        rows.append(f"<tr>{labeled([escaped(cell) for cell in cells], BUDGET_HEAD)}</tr>")
-    return f"<tbody>{''.join(rows)}</tbody>"
+        ))  # fmt: skip
+    return summary, rows
 
 
-def _budget_rule(data: dict[str, Any]) -> str:
-    without = [
-        criterion_style(criterion).quantity.title
-        for criterion in data["criteria"]
-        if criterion["name"] != COUNT and not criterion["uncertainty"]
-    ]
-    missing = f" No uncertainty is known or stated of: {', '.join(without)}." if without else ""
-    return (
-        "Type: A by statistics of observations, B by other means. u = value / divisor · "
-        "sensitivity, divisor √3 for a rectangular distribution, √n for the mean of n drops. "
-        "Share: of the combined variance; contributions are independent; included: repeatability "
-        "contains noise, so that one of them counts. Effective degrees of "
-        "freedom by Welch and Satterthwaite; U = k u with Student's t for 95 % (JCGM 100:2008, "
-        "annex G)." + missing
-    )
-
-
-def _range_picture(criterion: dict[str, Any]) -> str:
+def _range_picture(criterion: dict[str, Any]) -> Markup:
     """Return the limits of a criterion, its value and its expanded uncertainty as SVG."""
     (lower, upper), value = limits_of(criterion), criterion["value"]
     span = UPPER_LIMIT_X - LOWER_LIMIT_X
     box = f'<rect x="{LOWER_LIMIT_X}" y="1" width="{span}" height="8" fill="#ccc"/>'
     if value is None or lower == upper:
-        return ""
+        return Markup()
     scale = span / (upper - lower)
     position = LOWER_LIMIT_X + scale * (value - lower)
     shown = min(max(position, 2.0), 98.0)
@@ -339,37 +291,10 @@ def _range_picture(criterion: dict[str, Any]) -> str:
     if shown != position:
         tip = math.copysign(3.0, position - shown)
         mark = f'<path d="M{shown + tip / 2:.2f} 5l{-tip} -3v6z"/>'
-    return (
+    return Markup(  # noqa: S704 - numbers only
         f'<svg class="range" viewBox="0 0 100 10" aria-hidden="true">{box}'
         f'<path d="{bar}" fill="none" stroke="#000" stroke-width="0.9"/>{mark}</svg>'
     )
-
-
-def _rules(data: dict[str, Any]) -> list[str]:
-    """Return decision rule, source of the limits, and rule for counting peaks."""
-    has_own_limits = any(not criterion["limits_of_standard"] for criterion in data["criteria"])
-    limits = (
-        f"Limits: {STANDARDS.get(data['source'], 'the standards')}, as given in a published "
-        "transcription, not taken from the standards themselves"
-    )
-    limits += "; those marked * are the laboratory's own." if has_own_limits else "."
-    excluded = excluded_text(data["criteria"])
-    excluded += " " * bool(excluded)
-    decision = (
-        "Decision rule: non-binary statement with guard bands w = U (ILAC-G8:09/2019, 4.2; "
-        "JCGM 106:2012). A criterion conforms if value ± U lies within its limits, does not "
-        f"conform if it lies outside, and is undecided otherwise. {excluded}"
-        "P (outside): probability that the true value lies outside the limits, which for a "
-        "criterion that conforms is the probability of a false acceptance. U: expanded "
-        "uncertainty for 95 %. Spread: standard deviation of single drops, for levels in dB; the "
-        "repeatability in the budgets is that of the mean energy, which differs slightly."
-    )
-    peaks = (
-        "Peaks: a maximum of the force, low-passed at 1.25 kHz, counts if the force falls on "
-        "both sides by more than 10 % of its greatest value; the standards require a single peak "
-        "without defining one."
-    )
-    return [decision, limits, peaks]
 
 
 def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
@@ -447,22 +372,12 @@ def _outliers(data: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _signature(data: dict[str, Any]) -> str:
-    report = data["report"]
-    issued = ", ".join(filter(None, [report["place"], report["issued"]]))
-    cells = {"Place and date": issued, "Authorized by": report["authorized_by"], "Signature": ""}
-    return "".join(f"<td>{escaped(text)}<span>{name}</span></td>" for name, text in cells.items())
-
-
-def _files(files: Sequence[dict[str, Any]]) -> str:
-    names = shorten([plain(file["name"]) for file in files], MAX_FILES)
+def _files(files: Sequence[dict[str, Any]]) -> list[tuple[str, str]]:
+    names = shorten([file["name"] for file in files], MAX_FILES)
     # If there are more files, the last text says how many and has no checksum.
     listed = files if len(files) <= MAX_FILES else files[: MAX_FILES - 1]
     checksums = [file["sha256"] for file in listed]
-    return "\n".join(
-        f"<tr><td>{escaped(name)}</td><td>{checksum}</td></tr>"
-        for name, checksum in zip_longest(names, checksums, fillvalue="")
-    )
+    return list(zip_longest(names, checksums, fillvalue=""))
 
 
 def _count(number_of: int, noun: str) -> str:
