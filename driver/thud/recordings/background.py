@@ -359,22 +359,26 @@ def unit_covariances(cells: Cells, other: Cells) -> NDArray[np.float64]:
     constant, which the unknown offset absorbs: those of means are differences of their second
     integrals at the corners of a pair of cells.
     """
-    (a, b), (c, d) = cells, other
-    pairs = ((b, c), (a, c), (b, d), (a, d))
-    size = np.maximum(np.abs([np.subtract.outer(*pair) for pair in pairs]), 1e-300)
-    integrals = [size**2 * (0.75 - 0.5 * np.log(size)), -(np.pi**2) / 6 * size**3]
-    signs = np.array([1, -1, -1, 1])
-    pink, brown = np.tensordot(integrals, signs, (1, 0)) / np.multiply.outer(b - a, d - c)
+    (times, corners), (other_times, other_corners) = (
+        np.unique(pair, return_inverse=True) for pair in (cells, other)
+    )
+    size = np.maximum(np.abs(np.subtract.outer(times, other_times)), 1e-300)
+    integrals = np.array([size**2 * (0.75 - 0.5 * np.log(size)), -(np.pi**2) / 6 * size**3])
+    for k, (begin, end) in enumerate((corners, other_corners), 1):
+        integrals = integrals.take(end, axis=k) - integrals.take(begin, axis=k)
+    widths = [end - begin for begin, end in (cells, other)]
+    centers = [(begin + end) / 2 for begin, end in (cells, other)]
+    noise = -integrals / np.multiply.outer(*widths)
     # Each harmonic has two frequencies: of the mains plus and minus its deviation.
     order = np.arange(1, N_HARMONIC + 1)
     mains = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
     frequency = np.multiply.outer(mains, order).reshape(len(MAINS), 1, -1)
     weight = np.tile(np.sqrt(0.5) / order, 2)
     waves, others = (
-        weight * np.sinc(frequency * (end - begin)[:, None])
-        * np.exp(1j * np.pi * frequency * (begin + end)[:, None])
-        for begin, end in (cells, other)
+        weight * np.sinc(frequency * width[:, None])
+        * np.exp(2j * np.pi * frequency * center[:, None])
+        for width, center in zip(widths, centers, strict=True)
     )  # fmt: skip
     hum = (waves @ others.conj().swapaxes(1, 2)).real
-    drift = np.multiply.outer((a + b) / 2, (c + d) / 2)
-    return np.array([pink, brown, *hum, np.ones_like(drift), drift])
+    drift = np.multiply.outer(*centers)
+    return np.array([*noise, *hum, np.ones_like(drift), drift])

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -336,13 +336,16 @@ def _flanks(time: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     return np.asarray((rise + JUMPS * jump) / (1 + JUMPS))
 
 
+_quadrature = cache(leggauss)
+
+
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
     """Return functionals of samples whose squares add up to the energy in a band, [n, count].
 
     They are the Fourier integrals at the nodes of a Gauss quadrature over the band.
     """
     time = np.arange(count) / rate
-    nodes, weights = leggauss(12 + int(2 * (upper - lower) * count / rate))
+    nodes, weights = _quadrature(12 + int(2 * (upper - lower) * count / rate))
     phase = np.multiply.outer(np.pi * (lower + upper + (upper - lower) * nodes), time)
     scale = np.sqrt((upper - lower) * weights)[:, None] / rate
     return np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])

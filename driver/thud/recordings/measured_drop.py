@@ -19,7 +19,7 @@ from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
 from thud.recordings.checks import CHECKS
-from thud.recordings.contact import SAMPLE_ERROR, Contact, find_contact
+from thud.recordings.contact import SAMPLE_ERROR, Contact, find_edge
 from thud.recordings.differences import robust_deviation
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import min_background
@@ -238,13 +238,11 @@ def _landings(section: Section, contact: Contact, count: int) -> list[tuple[Esti
         minimum = min_background(bounce.sample_rate)
         if first < minimum or len(bounce.force) - stop < minimum:
             break
-        landing = find_contact(bounce, *remove_background(bounce, contact.background))
+        force, background = remove_background(bounce, contact.background)
+        edges = (find_edge(bounce, force, background, side)[0] for side in (1, -1))
         delay = (bounce.start - section.start) / section.sample_rate
-        touch, release = landing.touch, landing.release
-        landings.append((
-            replace(touch, value=delay + touch.value),
-            replace(release, value=delay + release.value),
-        ))  # fmt: skip
+        touch, release = (replace(edge, value=delay + edge.value) for edge in edges)
+        landings.append((touch, release))
     return landings
 
 
