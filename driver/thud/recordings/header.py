@@ -64,9 +64,13 @@ class Layout(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A line above the numbers, and name and unit of each column; without them it has no titles."""
+    """A line above the numbers: its number, itself, and without the marks of a comment.
 
-    line: int
+    `titles` are name and unit of each column, empty if the line does not hold them.
+    """
+
+    number: int
+    line: str
     text: str
     titles: Pairs
 
@@ -84,7 +88,7 @@ def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
         if pair := _read_pair(text):
             header.append(pair)
         elif text:
-            rows.append(Row(number, text, _read_titles(line, text, layout)))
+            rows.append(Row(number, line, text, _read_titles(line, text, layout)))
     units = [row for row in rows if _are_units(row.titles)]
     titles = [row for row in rows if row.titles and row not in units]
     # Of several lines the titles are those with units, with times, or next to the numbers.
@@ -95,7 +99,7 @@ def read_header(above: list[str], layout: Layout) -> tuple[Pairs, Pairs, bool]:
     chosen = [titles[max(ranks)[-1]]] if titles else []
     for row in rows:
         if row not in units and row not in chosen:
-            _refuse_row(row, above, layout, is_open=not chosen)
+            _refuse_row(row, layout, is_open=not chosen)
     width = max([layout.width, *(len(row.titles) for row in units + chosen)])
     names = [*(chosen[0].titles if chosen else ()), *[("", "")] * width][:width]
     stated = [[unit, layout.units.get(i, "")] for i, (_, unit) in enumerate(names)]
@@ -191,20 +195,19 @@ def _one_unit(name: str, stated: list[str], label: str) -> str:
     return next(iter(known.values()), name if name in UNITS else "")
 
 
-def _refuse_row(row: Row, above: list[str], layout: Layout, *, is_open: bool) -> None:
+def _refuse_row(row: Row, layout: Layout, *, is_open: bool) -> None:
     """Raise InputError for a line with numbers, units or titles that do not fit the columns.
 
     With `is_open` the columns have no titles yet.
     """
-    line, is_last = above[row.line - 1].strip(" "), row.line == len(above)
-    is_comment = line[:1] in tuple(COMMENTS)
-    cells = [] if is_comment else split_row(line, layout.separator)
+    is_last, is_comment = row.number == layout.first - 1, row.line.strip(" ")[:1] in tuple(COMMENTS)
+    cells = [] if is_comment else split_row(row.line, layout.separator)
     if len(cells) >= layout.width and any(map(is_number, cells)):
         # A word may stand in front of the numbers of the first row.
         is_row = is_last and all(is_number(cells[i]) for i in layout.units)
         wrong = next((cell for cell in cells if cell and not is_number(cell)), "")
         if wrong and (is_row or not any(map(str.isalpha, next(filter(None, cells))))):
-            layout.refuse(row.line, f"{shown_text(wrong)!r} is not a number")
+            layout.refuse(row.number, f"{shown_text(wrong)!r} is not a number")
     if VALUE.search(row.text):
         return
     pieces = re.split(r"[\t;,]", row.text)
@@ -217,4 +220,4 @@ def _refuse_row(row: Row, above: list[str], layout: Layout, *, is_open: bool) ->
         reason = f"{count} title{'s' * (count > 1)} for {layout.width} columns"
         reason = "is a second line of titles" if row.titles else reason
         allowed = "a title for each column, with its unit if it is known"
-        layout.refuse(row.line, f"{shown_text(row.text)!r}: {reason}", allowed)
+        layout.refuse(row.number, f"{shown_text(row.text)!r}: {reason}", allowed)

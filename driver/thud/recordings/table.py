@@ -194,11 +194,9 @@ def _find_encoding(path: Path) -> str:
 
 
 def _read_lines(path: Path, encoding: str, name: str, allowed: str) -> Iterator[str]:
-    """Yield the lines of a text without line ends; refuse long ones and zero bytes."""
+    """Yield the lines of a text without line ends; refuse long ones."""
     with path.open(encoding=encoding, errors="replace") as text:
         for number, line in enumerate(iter(lambda: text.readline(MAX_LINE + 2), ""), start=1):
-            if "\0" in line:
-                refuse(f"{name}: line {number} holds zero bytes", allowed)
             if len(line) > MAX_LINE + 1:
                 refuse(f"{name}: line {number} is longer than {MAX_LINE} characters", allowed)
             yield line.removesuffix("\n")
