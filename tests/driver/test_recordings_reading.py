@@ -1075,7 +1075,7 @@ def test_dates_and_times_of_day_show_no_rate(title: str, shown: str, tmp_path: P
         ("サンプリング周波数: 8000 Hz", "力（N）", "cp932"),  # noqa: RUF001 - as printed
         ("샘플링 주파수: 8000 Hz", "충격력 (N)", "cp949"),
         ("Prüfer: Müller\nAbtastrate: 8000 Hz", "Stoßkraft (N)", "latin-1"),
-        ("Prüfer: Müller – Lab\nAbtastrate: 8000 Hz", "Stoßkraft (N)", "cp1252"),  # noqa: RUF001
+        ("Prüfer: Müller – Lab\nAbtastrate: 8000 Hz", "Stoßkraft (N)", "cp1252"),
     ],
 )
 def test_headers_are_read_in_encodings_of_spreadsheets(
