@@ -21,6 +21,7 @@ from thud.base.errors import InputError
 from thud.level.estimate import Estimate
 from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config, require_channels
+from thud.recordings.force_units import Calibration
 from thud.recordings.recorded_levels import average_levels, measure_levels
 from thud.recordings.signal import Signal, add_signals
 
@@ -111,7 +112,7 @@ def test_configuration_and_keywords_select_channels(tmp_path: Path) -> None:
     lab.write_text('channels = "F1+F2+F3+F4"\ncalibration = ["1 N/V", 1, "1", "0.001 N/mV"]\n')
     config = read_config(lab)
     assert config.channels == tuple(NAMES)
-    assert config.calibration == ("1 N/V", 1.0, 1.0, "0.001 N/mV")
+    assert config.calibration == (Calibration("1 N/V"), 1.0, 1.0, Calibration("0.001 N/mV"))
     total = thud.read_recording(path, config=lab)
     peak = total.peak_force
     assert peak == pytest.approx(1500, rel=0.01)

@@ -294,8 +294,8 @@ def test_calibrations_lead_to_newtons(
 @pytest.mark.parametrize(
     ("calibration", "newtons"),
     [
-        (1.1e-30, 1.1e-30), (-0.9e30, -0.9e30), ("0.9e30 N/V", 0.9e30),
-        (0.9e-30, None), (1.1e30, None), ("1.1e30 N/V", None),
+        (1.1e-30, 1.1e-30), (-0.9e30, -0.9e30), (Calibration("0.9e30 N/V"), 0.9e30),
+        (0.9e-30, None), (1.1e30, None), (Calibration("1e20 pC/V, 1e20 N/pC"), None),
     ],
 )  # fmt: skip
 def test_calibrations_have_a_possible_size(calibration: float | str, newtons: float | None) -> None:
@@ -621,7 +621,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.wav")
     (tmp_path / "loop.wav").symlink_to(tmp_path / "loop.wav")
     (tmp_path / "empty.wav").touch()
-    assert "directory" in refusal(tmp_path)
+    assert "no regular file" in refusal(tmp_path)
     assert "pipe.wav" in refusal(tmp_path / "pipe.wav")
     assert "/dev/zero" in refusal(tmp_path.joinpath("/dev/zero"))
     assert "loop.wav" in refusal(tmp_path / "loop.wav")
@@ -629,7 +629,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     assert "empty" in refusal(tmp_path / "empty.wav")
     refusal(tmp_path / "a\0b.wav")
     refusal(tmp_path / ("a" * 5000))
-    with pytest.raises(InputError, match=naming("recording", 7)):
+    with pytest.raises(InputError, match=naming("path", 7)):
         opened(7)  # type: ignore[arg-type]
 
 
@@ -981,7 +981,7 @@ octave_500 = [10.0, 15.0]
 def test_configuration_is_read(tmp_path: Path) -> None:
     (tmp_path / "lab.toml").write_text(LAB)
     found = read_config(tmp_path / "lab.toml")
-    assert found.calibration == "4.1 pC/N, 10 mV/pC"
+    assert found.calibration == Calibration("4.1 pC/N, 10 mV/pC")
     assert found.calibration_uncertainty == 0.005
     names = [entry.name for entry in found.instruments]
     assert names == ["force plate 9281", "charge amplifier 5015"]

@@ -461,5 +461,6 @@ def test_missing_package_of_workbooks_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "openpyxl", None)
+    (tmp_path / "levels.xlsx").touch()
     with pytest.raises(thud.InputError, match=naming("openpyxl", "pip install")):
         thud.read_room_levels(tmp_path / "levels.xlsx")

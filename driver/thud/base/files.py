@@ -30,7 +30,7 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
     try:
         target = Path(path)
         if target.exists():
-            _require_regular(target)
+            require_regular(target)
         part = unique_path(target)
         try:
             part.write_bytes(content)
@@ -177,11 +177,11 @@ def is_failure(error: BaseException) -> bool:
 
 def read_input(path: Path) -> bytes:
     """Return the content of an input file; raise OSError if it is not a regular file."""
-    _require_regular(path)
+    require_regular(path)
     return path.read_bytes()
 
 
-def _require_regular(path: Path) -> None:
+def require_regular(path: Path) -> None:
     """Raise OSError if a file is missing or is not a regular one: opening others may block."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))

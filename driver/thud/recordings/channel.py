@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from thud.base.checks import refuse, require_kind
 from thud.base.errors import InputError
+from thud.base.files import require_regular
 from thud.base.note import Note
 from thud.base.units import size_of
 
@@ -150,8 +150,6 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except MemoryError as error:
-        refuse(f"{shown_path(path)}: needs too much memory", f"an undamaged {kind} file", error)
     except Exception as error:  # noqa: BLE001 - libraries raise anything on damaged files
         # soundfile repeats the path.
         reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__
@@ -164,19 +162,15 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
 
 def regular_file(path: str | os.PathLike[str]) -> Path:
     """Return a path; raise InputError if it is no readable regular file (a pipe could block)."""
-    require_kind("recording", path, str | os.PathLike)
+    require_kind("path", path, str | os.PathLike)
     file = Path(path)
-    name = shown_path(file).replace("\0", "\N{REPLACEMENT CHARACTER}")
     try:
-        mode = file.stat().st_mode
-        if stat.S_ISREG(mode):
-            file.open("rb").close()
+        require_regular(file)
+        file.open("rb").close()
     except (OSError, ValueError) as error:  # a zero byte
+        name = shown_path(file).replace("\0", "\N{REPLACEMENT CHARACTER}")
         reason = getattr(error, "strerror", "no path")
         refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
-    if not stat.S_ISREG(mode):
-        kind = "a directory" if stat.S_ISDIR(mode) else "no regular file"
-        refuse(f"{name}: is {kind}", "a file")
     return file
 
 

@@ -26,7 +26,7 @@ from thud.base.toml_tables import (
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.channel import regular_file, shown_path
-from thud.recordings.force_units import Calibration, plain_number, read_chain, require_unit
+from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.response import Chain, Plate, RecorderFilter
 from thud.recordings.signs import POLARITIES
 from thud.recordings.words import read_date
@@ -80,7 +80,7 @@ def require_channels(value: object, name: str = "channels") -> str | tuple[int |
     return tuple(cells)
 
 
-def to_calibrations(value: object, name: str) -> Any:  # noqa: ANN401 - one, or a tuple of them
+def to_calibrations(value: Any, name: str) -> Any:  # noqa: ANN401 - of a user; one, or a tuple
     """Return a calibration, also that of a list of one, or one for each channel.
 
     Each is a number, a chain of factors or a `Calibration`.
@@ -89,16 +89,16 @@ def to_calibrations(value: object, name: str) -> Any:  # noqa: ANN401 - one, or 
         if len(value) == 1:
             return to_calibrations(value[0], name)
         return tuple(to_calibrations(v, f"{name}, entry {i}") for i, v in enumerate(value, 1))
-    value = plain_number(value)
+    try:
+        value = float(value) if isinstance(value, str) else value
+    except ValueError:
+        try:
+            return Calibration(value)
+        except InputError as error:
+            raise error.within(name) from error
     if isinstance(value, Calibration):
         return value
-    if not isinstance(value, str):
-        return require_number(name, value, -MAX_FACTOR, MAX_FACTOR)
-    try:
-        read_chain(to_line(value, name))
-    except InputError as error:
-        raise error.within(name) from error
-    return value
+    return require_number(name, value, -MAX_FACTOR, MAX_FACTOR)
 
 
 def parse_numbers(text: str, name: str) -> list[range]:
@@ -224,7 +224,7 @@ class Config(TomlTable):
     unit: str | None = key(
         require_unit, "unit of the recorded values, if the file does not state it"
     )
-    calibration: Calibration | str | float | tuple[Calibration | str | float, ...] | None = key(
+    calibration: Calibration | float | tuple[Calibration | float, ...] | None = key(
         to_calibrations, 'factors such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"'
     )
     calibration_uncertainty: float | None = key(

@@ -7,7 +7,8 @@ import math
 import re
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base.checks import refuse, refuse_value, shown
 from thud.base.units import UNITS, find_unit, size_of
@@ -25,7 +26,6 @@ EXAMPLES = (
 FACTOR = re.compile(
     r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<top>[^\s/]+)\s*/\s*(?P<bottom>.+)"
 )
-T = TypeVar("T")
 # Maximum number of factors in a chain, and range of N per unit.
 MAX_FACTORS = 8
 SIZES = (1e-30, 1e30)
@@ -64,10 +64,41 @@ class Calibration:
 
     def __post_init__(self) -> None:
         """Raise InputError if the chain or the uncertainty are not allowed."""
-        read_chain(self.chain)
+        if not isinstance(self.chain, str) or not 1 <= len(self.factors) <= MAX_FACTORS:
+            refuse_value("calibration", self.chain, f"1 to {MAX_FACTORS} factors, {EXAMPLES}")
         value = self.uncertainty
         if value is not None and not (isinstance(value, int | float) and 0 <= value < 1):
             refuse(f"calibration: uncertainty = {value!r}", "0 <= uncertainty < 1")
+
+    @cached_property
+    def factors(self) -> list[Factor]:
+        """Factors of the chain; raise InputError if it is none.
+
+        >>> Calibration("10 mV/pC").factors
+        [Factor(value=0.01, top='V', bottom='pC')]
+        """
+        factors = []
+        for term in filter(None, map(str.strip, re.split(r"[;,]", self.chain[:1000]))):
+            label = f"calibration {term[:60]!r}"
+            match = FACTOR.fullmatch(term)
+            value = float(match["value"]) if match else 0.0
+            if not match or not SIZES[0] < abs(value) < SIZES[1]:
+                refuse(f"{label} is not a number with units", EXAMPLES, subject="calibration")
+            top, top_size = size_of(require_unit(match["top"], label))
+            bottom, bottom_size = size_of(require_unit(match["bottom"], label))
+            factors.append(Factor(value * top_size / bottom_size, top, bottom))
+        return factors
+
+    @property
+    def unit(self) -> str:
+        """Base unit from which the chain converts to newtons; empty if it is not clear.
+
+        >>> Calibration("4.1 pC/N, 10 mV/pC").unit
+        'V'
+        """
+        others = {unit for _, *units in self.factors for unit in units} - {"N"}
+        ends = [unit for unit in others if _product(unit, self.factors) is not None]
+        return ends[0] if len(ends) == 1 else ""
 
 
 def require_unit(text: object, label: str) -> str:
@@ -78,52 +109,8 @@ def require_unit(text: object, label: str) -> str:
     return unit
 
 
-def read_chain(text: object) -> list[Factor]:
-    """Return the factors of a chain; raise InputError if the text is not a chain.
-
-    >>> read_chain("10 mV/pC")
-    [Factor(value=0.01, top='V', bottom='pC')]
-    """
-    if not isinstance(text, str):
-        refuse_value("calibration", text, EXAMPLES)
-    factors = []
-    for term in filter(None, map(str.strip, re.split(r"[;,]", text[:1000]))):
-        label = f"calibration {term[:60]!r}"
-        match = FACTOR.fullmatch(term)
-        value = float(match["value"]) if match else 0.0
-        if not match or not SIZES[0] < abs(value) < SIZES[1]:
-            refuse(f"{label} is not a number with units", EXAMPLES, subject="calibration")
-        top, top_size = size_of(require_unit(match["top"], label))
-        bottom, bottom_size = size_of(require_unit(match["bottom"], label))
-        factors.append(Factor(value * top_size / bottom_size, top, bottom))
-    if not 1 <= len(factors) <= MAX_FACTORS:
-        refuse(f"calibration: {len(factors)} factors", f"1 to {MAX_FACTORS}, {EXAMPLES}")
-    return factors
-
-
-def plain_number(calibration: T) -> T | float:
-    """Return a calibration, as a number if it is the text of one."""
-    try:
-        return float(calibration) if isinstance(calibration, str) else calibration
-    except ValueError:
-        return calibration
-
-
-def unit_of_chain(calibration: str | Calibration) -> str:
-    """Return the base unit from which a chain converts to newtons; empty if it is not clear.
-
-    >>> unit_of_chain("4.1 pC/N, 10 mV/pC")
-    'V'
-    """
-    chain = calibration.chain if isinstance(calibration, Calibration) else calibration
-    factors = read_chain(chain)
-    others = {unit for factor in factors for unit in (factor.top, factor.bottom)} - {"N"}
-    ends = [unit for unit in others if _product(unit, factors) is not None]
-    return ends[0] if len(ends) == 1 else ""
-
-
 def newtons_per_unit(
-    unit: str, calibration: float | str | Calibration | None, counts: float | None, label: str
+    unit: str, calibration: float | Calibration | None, counts: float | None, label: str
 ) -> tuple[float, str, float | None]:
     """Return N per unit of the values, its description, and its relative uncertainty or None.
 
@@ -132,7 +119,6 @@ def newtons_per_unit(
     values are integers, and `label` names file and channel in messages.
     """
     base, size = size_of(unit)
-    uncertainty = None
     if calibration is None:
         if base != "N":
             described = "full-scale values" if unit == "FS" else f"values in {unit}"
@@ -142,23 +128,21 @@ def newtons_per_unit(
                 subject="calibration",
             )
         return size, f"values in {unit}", None
-    if isinstance(calibration, str | Calibration):
-        stated = Calibration(calibration) if isinstance(calibration, str) else calibration
-        factors = read_chain(stated.chain)
-        product = _product(base, factors)
+    if isinstance(calibration, Calibration):
+        product = _product(base, calibration.factors)
         if product is None and counts:
-            product = _product(base, [*factors, Factor(counts, "counts", "FS")])
+            product = _product(base, [*calibration.factors, Factor(counts, "counts", "FS")])
         if product is None:
             refuse(
-                f"{label}: calibration {stated.chain!r} does not convert {unit} to N with all of "
-                "its factors",
+                f"{label}: calibration {calibration.chain!r} does not convert {unit} to N with "
+                "all of its factors",
                 EXAMPLES,
             )
-        value, uncertainty = product * size, stated.uncertainty
-        origin = f" ({stated.origin})" if stated.origin else ""
-        description = f"{stated.chain}: {value:.6g} N per {unit}{origin}"
+        value, uncertainty = product * size, calibration.uncertainty
+        origin = f" ({calibration.origin})" if calibration.origin else ""
+        description = f"{calibration.chain}: {value:.6g} N per {unit}{origin}"
     else:
-        value = float(calibration)
+        value, uncertainty = float(calibration), None
         description = f"{calibration:.6g} N per {unit or 'recorded value'}"
     if not SIZES[0] < abs(value) < SIZES[1]:
         refuse_value(f"{label}: calibration", calibration, EXAMPLES)

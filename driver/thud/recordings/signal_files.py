@@ -12,13 +12,7 @@ from thud.base.note import Note
 from thud.base.units import find_unit
 from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_path, shown_text
 from thud.recordings.config import SUM, Config
-from thud.recordings.force_units import (
-    ALLOWED,
-    RECORDED,
-    Calibration,
-    newtons_per_unit,
-    unit_of_chain,
-)
+from thud.recordings.force_units import ALLOWED, RECORDED, Calibration, newtons_per_unit
 from thud.recordings.formats import read_channels
 from thud.recordings.signal import Signal, add_signals
 from thud.recordings.signs import HINT, POLARITIES, find_peaks, orient
@@ -28,8 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from thud.recordings.channel import Channel
-
-    AnyCalibration = float | str | Calibration
 
 # Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and room for a filter.
 RATES = (2500.0, 1e8)
@@ -166,7 +158,7 @@ def _find_channel(channels: list[Channel], channel: int | str, name: str) -> Cha
 def _in_newtons(
     file: Path,
     channel: Channel,
-    calibration: AnyCalibration | None,
+    calibration: float | Calibration | None,
     config: Config,
     *,
     several: bool,
@@ -228,7 +220,7 @@ def _in_newtons(
 
 
 def _unit(
-    channel: Channel, stated: str | None, calibration: AnyCalibration | None, name: str
+    channel: Channel, stated: str | None, calibration: float | Calibration | None, name: str
 ) -> tuple[str, list[Note]]:
     """Return the unit of a channel: stated, of the file, or from which the calibration leads."""
     of_file = find_unit(channel.unit)
@@ -248,13 +240,12 @@ def _unit(
         )
     if calibration is None:
         return "N", [Note("unit_assumed", unit="N")]
-    if not isinstance(calibration, str | Calibration):
+    if not isinstance(calibration, Calibration):
         return "", []
-    unit = unit_of_chain(calibration)
     # A chain for another file would change a table in N or kN without a trace.
-    if not unit or (unit == "FS" and not channel.may_be_fractions):
+    if not calibration.unit or (calibration.unit == "FS" and not channel.may_be_fractions):
         refuse(f"{name}: the values are without a unit", f"unit = one of {ALLOWED}")
-    return unit, [Note("unit_of_calibration", unit=unit)]
+    return calibration.unit, [Note("unit_of_calibration", unit=calibration.unit)]
 
 
 def _with_missing(signal: Signal, file: Path, others: list[Channel]) -> Signal:

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 import codecs
 import itertools
-import os
 import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, require_kind
+from thud.base.checks import refuse
 from thud.base.errors import InputError
 from thud.base.units import factor_to, size_of
 from thud.base.workbooks import read_workbook
-from thud.recordings.channel import require_small, shown_path, shown_text
+from thud.recordings.channel import regular_file, require_small, shown_path, shown_text
 from thud.recordings.header import Layout, read_header
 from thud.recordings.words import (
     COMMENT,
@@ -35,7 +33,9 @@ from thud.recordings.words import (
 )
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -134,8 +134,7 @@ def read_table(path: str | os.PathLike[str], allowed: str = ALLOWED) -> Table:
         number of columns, or if units are stated that cannot be attributed to a column; the message
         names file and line.
     """
-    require_kind("path", path, str | os.PathLike)
-    file = Path(path)
+    file = regular_file(path)
     name = shown_path(file)
     try:
         lines: Callable[[], Iterable[str]]
@@ -143,8 +142,6 @@ def read_table(path: str | os.PathLike[str], allowed: str = ALLOWED) -> Table:
             sheet, rows = read_workbook(file, allowed)
             name, lines = f"{name}, sheet {sheet!r}", lambda: rows
         else:
-            if not file.is_file():  # opening a pipe could block
-                refuse(f"{name}: cannot be read (no such regular file)", allowed)
             require_small(file, "text")
             encoding = _find_encoding(file)
             lines = lambda: _read_lines(file, encoding, name, allowed)  # noqa: E731
