@@ -827,7 +827,7 @@ def test_files_that_change_are_told(tmp_path: Path) -> None:
 def test_missing_packages_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_pulse(tmp_path, "plate.tdms")
     monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
-    with pytest.raises(InputError, match=naming("TDMS", "nptdms", "pip install")):
+    with pytest.raises(InputError, match=naming("nptdms", "pip install")):
         opened(path)
 
 

@@ -12,7 +12,7 @@ from scipy.special import fdtrc
 from thud.base.checks import refuse, require_number
 from thud.base.note import Note
 from thud.base.units import find_unit
-from thud.recordings.channel import regular_file, shown_path, shown_text
+from thud.recordings.channel import regular_file, shown_text
 from thud.recordings.config import Config
 from thud.recordings.force_units import ALLOWED, Calibration, require_unit
 from thud.recordings.formats import read_channels
@@ -167,7 +167,7 @@ def open_source(
     if isinstance(record, Signal):
         return record, "" if unit is None else require_unit(unit, record.name), ""
     path = regular_file(record)
-    name = shown_path(path)
+    name = shown_text(path)
     channels = choose_channels(read_channels(path), Config(channel=channel), name)
     if len(channels) != 1:
         refuse(

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 # Maximum size of files that are read as a whole, bytes.
 MAX_IN_MEMORY = 2**27
-# Maximum number of characters of a library's message that are shown.
-MAX_SHOWN = 100
+# Maximum number of characters of a text or a path that are shown.
+MAX_SHOWN = 200
 MIB = 2**20
 # Minimum number of samples of a recording.
 MIN_SAMPLES = 8
@@ -133,14 +133,14 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
 
 
 def shown_text(text: object) -> str:
-    """Return text from a file or a library for a message: short, printable, in one line."""
-    line = " ".join(str(text).encode("utf-8", "replace").decode("utf-8").split())
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line[:MAX_SHOWN])
+    """Return text of a file or a library, or a path, for a message: printable, in one line.
 
-
-def shown_path(path: Path | str) -> str:
-    """Return a path for a message, even if its name is not UTF-8."""
-    return os.fsencode(path).decode("utf-8", "replace")
+    Of long texts both ends are shown.
+    """
+    line = " ".join(str(text).split())
+    if len(line) > MAX_SHOWN:
+        line = f"{line[: MAX_SHOWN // 2]} ... {line[-MAX_SHOWN // 2 :]}"
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 @contextmanager
@@ -154,7 +154,7 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
         # soundfile repeats the path.
         reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__
         refuse(
-            f"{shown_path(path)}: cannot be read as {kind} ({reason})",
+            f"{shown_text(path)}: cannot be read as {kind} ({reason})",
             f"a complete, undamaged {kind} file",
             error,
         )
@@ -168,9 +168,8 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
         require_regular(file)
         file.open("rb").close()
     except (OSError, ValueError) as error:  # a zero byte
-        name = shown_path(file).replace("\0", "\N{REPLACEMENT CHARACTER}")
         reason = getattr(error, "strerror", "no path")
-        refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
+        refuse(f"{shown_text(file)}: cannot be read ({reason})", "a file that can be read", error)
     return file
 
 
@@ -179,6 +178,6 @@ def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
     size = path.stat().st_size
     if size > limit:
         refuse(
-            f"{shown_path(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
+            f"{shown_text(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
             f"up to {limit // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
         )

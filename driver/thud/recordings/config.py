@@ -25,7 +25,7 @@ from thud.base.toml_tables import (
 )
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
-from thud.recordings.channel import regular_file, shown_path
+from thud.recordings.channel import regular_file, shown_text
 from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.response import Chain, Plate, RecorderFilter
 from thud.recordings.signs import POLARITIES
@@ -327,7 +327,7 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     Raise InputError if a key is unknown, or its value of the wrong type or out of range.
     """
     file = regular_file(path)
-    config = config_from(read_toml(file)[0], shown_path(file))
+    config = config_from(read_toml(file)[0], shown_text(file))
     mark = config.report.accreditation_mark
     if not mark:
         return config

@@ -10,7 +10,7 @@ from thud.base.checks import refuse, shown
 from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.base.units import find_unit
-from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_path, shown_text
+from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_text
 from thud.recordings.config import SUM, Config
 from thud.recordings.force_units import ALLOWED, RECORDED, Calibration, newtons_per_unit
 from thud.recordings.formats import read_channels
@@ -59,12 +59,12 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
     config = config or Config()
     file = regular_file(path)
     channels = read_channels(file)
-    chosen = choose_channels(channels, config, shown_path(file))
+    chosen = choose_channels(channels, config, shown_text(file))
     stated = config.calibration
     calibrations = stated if isinstance(stated, tuple) else (stated,) * len(chosen)
     if len(calibrations) != len(chosen):
         refuse(
-            f"{shown_path(file)}: {len(calibrations)} calibrations for {len(chosen)} "
+            f"{shown_text(file)}: {len(calibrations)} calibrations for {len(chosen)} "
             f"channel{'s' * (len(chosen) > 1)}",
             "one calibration, or one for each entry of channels",
         )
@@ -76,7 +76,7 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
         ]
         if config.channels is not None:
             titles = " + ".join(channel.title for channel in chosen)
-            signals = [add_signals(signals, f"{shown_path(file.name)}, {titles}")]
+            signals = [add_signals(signals, f"{shown_text(file.name)}, {titles}")]
         signals = [orient(signal, config.polarity) for signal in signals]
     except InputError as error:
         if len(chosen) == 1 or config.channels is not None:
@@ -167,7 +167,7 @@ def _in_newtons(
 
     Its sign is that of the file, or with a stated polarity that of a compression.
     """
-    name = shown_path(file.name) + (f", {channel.title}" if several else "")
+    name = shown_text(file.name) + (f", {channel.title}" if several else "")
     if channel.n_sample < MIN_SAMPLES:
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     notes = list(channel.notes)

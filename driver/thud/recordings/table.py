@@ -17,7 +17,7 @@ from thud.base.checks import refuse
 from thud.base.errors import InputError
 from thud.base.units import factor_to, size_of
 from thud.base.workbooks import read_workbook
-from thud.recordings.channel import regular_file, require_small, shown_path, shown_text
+from thud.recordings.channel import regular_file, require_small, shown_text
 from thud.recordings.header import Layout, read_header
 from thud.recordings.words import (
     COMMENT,
@@ -135,7 +135,7 @@ def read_table(path: str | os.PathLike[str], allowed: str = ALLOWED) -> Table:
         names file and line.
     """
     file = regular_file(path)
-    name = shown_path(file)
+    name = shown_text(file)
     try:
         lines: Callable[[], Iterable[str]]
         if is_workbook := file.suffix.lower() == ".xlsx":

@@ -13,7 +13,7 @@ from thud.base.checks import refuse, require_kind
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, content_of
-from thud.recordings.channel import shown_path, shown_text
+from thud.recordings.channel import shown_text
 
 if TYPE_CHECKING:
     import os
@@ -108,7 +108,7 @@ def read_picture(path: Path) -> tuple[str, bytes]:
     """Return media type and content of a picture; raise InputError if it cannot be used."""
     kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
     allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
-    problem = f"report: accreditation_mark = {shown_path(path)} cannot be used"
+    problem = f"report: accreditation_mark = {shown_text(path)} cannot be used"
     try:
         content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
     except (OSError, ValueError) as error:

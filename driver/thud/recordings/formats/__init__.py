@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base.checks import refuse
-from thud.recordings.channel import Channel, guarded, shown_path
+from thud.recordings.channel import Channel, guarded, shown_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,7 +57,7 @@ def read_channels(path: Path) -> list[Channel]:
     """
     with guarded(path, "a file"), path.open("rb") as file:
         head = file.read(HEAD)
-    name = shown_path(path)
+    name = shown_text(path)
     if not head:
         refuse(f"{name}: is empty", "a recording")
     actual = next((entry for entry in FORMATS if re.match(entry.pattern, head, re.DOTALL)), None)

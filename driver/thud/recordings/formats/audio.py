@@ -11,7 +11,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.extras import library
-from thud.recordings.channel import Channel, guarded, shown_path
+from thud.recordings.channel import Channel, guarded, shown_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -44,7 +44,7 @@ def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the channels of an audio file; integers are fractions of full scale."""
-    name = shown_path(path)
+    name = shown_text(path)
     with library("soundfile", "recordings").SoundFile(os.fsencode(path)) as file:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate, is_flac = float(file.samplerate), file.format == "FLAC"
@@ -99,7 +99,7 @@ def _wav_date(path: Path) -> str:
                     length = int.from_bytes(start[RF64_LENGTH], "little") if is_rf64 else 0
                 if (missing := begin + length - size) > 0:
                     text = f"is cut off, {missing} bytes are missing"
-                    refuse(f"{shown_path(path)}: {text}", "a complete file")
+                    refuse(f"{shown_text(path)}: {text}", "a complete file")
                 break
             file.seek(begin + length + length % 2)
     return date

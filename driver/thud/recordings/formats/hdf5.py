@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.extras import library
-from thud.recordings.channel import Channel, guarded, shown_path, shown_text
+from thud.recordings.channel import Channel, guarded, shown_text
 from thud.recordings.variables import (
     Header,
     Vector,
@@ -52,7 +52,7 @@ def read_channels(path: Path) -> list[Channel]:
     Links to other files are not followed.
     """
     h5py = library("h5py", "recordings")
-    name = shown_path(path)
+    name = shown_text(path)
     vectors: list[Vector] = []
     header: Header = []
 

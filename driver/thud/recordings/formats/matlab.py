@@ -10,7 +10,7 @@ import numpy as np
 import scipy.io
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MAX_IN_MEMORY, MIB, require_small, shown_path, shown_text
+from thud.recordings.channel import MAX_IN_MEMORY, MIB, require_small, shown_text
 from thud.recordings.variables import (
     Vector,
     channels_of_vectors,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the numeric vectors of a MATLAB file, also those in structures."""
-    name = shown_path(path)
+    name = shown_text(path)
     require_small(path, "a MATLAB file")
     file = os.fsencode(path)
     if sum(8 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(file)) > MAX_IN_MEMORY:

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.extras import library
-from thud.recordings.channel import Channel, guarded, shown_path, shown_text
+from thud.recordings.channel import Channel, guarded, shown_text
 from thud.recordings.words import (
     DATE,
     UNIT,
@@ -59,7 +59,7 @@ def read_channels(path: Path) -> list[Channel]:
             if channel.dtype.kind in "iuf" and len(channel)
         ]
     if _is_cut(path) or not channels:
-        refuse(f"{shown_path(path)}: is cut off or has no channel of numbers", "a complete file")
+        refuse(f"{shown_text(path)}: is cut off or has no channel of numbers", "a complete file")
     return channels
 
 
@@ -82,12 +82,12 @@ def _channel(path: Path, number: int, owners: tuple[Any, Any, Any]) -> Channel:
     channel, group, _ = owners
     size = path.stat().st_size
     if len(channel) > size:  # a sample has one byte or more
-        refuse(f"{shown_path(path)}: {len(channel)} samples in {size} bytes", "an undamaged file")
+        refuse(f"{shown_text(path)}: {len(channel)} samples in {size} bytes", "an undamaged file")
     items = [(str(key), text_of(value)) for o in owners for key, value in o.properties.items()]
     scales = {value for key, value in items if key.endswith("_Scale_Type")}
     if unknown := scales - SCALES:
         refuse(
-            f"{shown_path(path)}: npTDMS does not apply the scale {shown_text(min(unknown))!r}",
+            f"{shown_text(path)}: npTDMS does not apply the scale {shown_text(min(unknown))!r}",
             f"a table of the scaled values, or scales of {', '.join(sorted(SCALES))}",
         )
     unit = find_word(items, UNIT)

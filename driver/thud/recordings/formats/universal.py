@@ -13,7 +13,7 @@ from thud.base.checks import refuse
 from thud.base.extras import library
 from thud.base.note import Note
 from thud.base.units import factor_to, size_of
-from thud.recordings.channel import Channel, require_small, shown_path, uniform_grid
+from thud.recordings.channel import Channel, require_small, shown_text, uniform_grid
 from thud.recordings.signal import read_array
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def read_data_sets(path: Path, function_type: int) -> list[DataSet]:
     file = library("pyuff", "recordings").UFF(os.fsencode(path))
     kinds = [int(kind) for kind in file.get_set_types()]
     if len(kinds) > MAX_SETS:
-        refuse(f"{shown_path(path)}: {len(kinds)} data sets", f"up to {MAX_SETS}")
+        refuse(f"{shown_text(path)}: {len(kinds)} data sets", f"up to {MAX_SETS}")
     length: float | None = None
     force: float | None = None
     found = []
@@ -65,7 +65,7 @@ def read_data_sets(path: Path, function_type: int) -> list[DataSet]:
             continue
         if not all(0 < record[name] < math.inf for name in ("length", "force")):
             refuse(
-                f"{shown_path(path)}: data set 164 has units of length {record['length']:g} and "
+                f"{shown_text(path)}: data set 164 has units of length {record['length']:g} and "
                 f"force {record['force']:g}",
                 "positive numbers per m and per N",
             )
@@ -81,12 +81,12 @@ def read_channels(path: Path) -> list[Channel]:
         if data_set.record.get("ord_data_type") in REAL
     ]
     if not histories:
-        refuse(f"{shown_path(path)}: has no time history", "data sets 58 of function type 1, real")
+        refuse(f"{shown_text(path)}: has no time history", "data sets 58 of function type 1, real")
     return [_channel(path, number, data_set) for number, data_set in enumerate(histories, start=1)]
 
 
 def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
-    name, record = f"{shown_path(path)}: data set {number}", data_set.record
+    name, record = f"{shown_text(path)}: data set {number}", data_set.record
     data = np.asarray(record["data"], dtype=np.float64)
     expected = int(record["num_pts"])
     # A final line feed may add a value to binary data sets.
