@@ -128,19 +128,16 @@ def _channel(
     own, near, entries = _header_of(vector, header)
     notes: tuple[Note, ...] = ()
     rate = find_rate(near)
-    fitting = [
-        time
-        for time in times
-        if time.n_sample == vector.n_sample and f"{vector.array}/".startswith(time.group)
-    ]
-    group = max((time.group for time in fitting), key=len, default="")
-    inner = [time for time in fitting if time.group == group]
     # Times override a rate in the header of an outer group; of several it is not known which apply.
+    own_key, count = f"{vector.array}/", vector.n_sample
+    fitting = [t for t in times if t.n_sample == count and own_key.startswith(t.group)]
+    depth = max((len(time.group) for time in fitting), default=0)
+    inner = [time for time in fitting if len(time.group) == depth]
     if len(inner) == 1 and rate is None:
         rate, notes = _rate(inner[0], header, name)
     stated, titled = find_word(own, UNIT), split_title(vector.title)[1]
     unit = stated or titled or find_word(entries, UNIT)
-    if find_unit(stated) and find_unit(titled) and find_unit(stated) != find_unit(titled):
+    if len({find_unit(stated), find_unit(titled)} - {""}) > 1:
         unit = f"{stated} by the attribute, {titled} by the name"
     return Channel(
         name=vector.array + (f"[{vector.column}]" if vector.column else ""),
@@ -176,15 +173,10 @@ def _header_of(vector: Vector, header: Header) -> tuple[Header, Header, Header]:
 
 
 def _holds_times(vector: Vector) -> bool:
-    """Whether a vector holds times by its name, or by the end of its name and its values.
-
-    The first column of a matrix holds times if it rises.
-    """
-    if not vector.column and is_time(*split_title(vector.title)):
-        return True
-    may_be = vector.column == 1 or (
-        not vector.column and vector.title.rpartition("_")[2].casefold() in TIME
-    )
+    """Whether a vector rises and is named as times, or is the first column of a matrix."""
+    name, unit = split_title(vector.title)
+    is_named = is_time(name, unit) or vector.title.rpartition("_")[2].casefold() in TIME
+    may_be = vector.column == 1 if vector.column else is_named
     return may_be and rise_uniformly(vector.read(0, min(MAX_TIMES, vector.n_sample)))
 
 
@@ -193,14 +185,12 @@ def _rate(time: Vector, header: Header, name: str) -> tuple[float | None, tuple[
 
     The rate is None if it is not known whether the times were multiplied by a factor.
     """
-    label, own = f"{name}: {time.array}", _header_of(time, header)[0]
-    scale = 1.0
+    label, own, scale = f"{name}: {time.array}", _header_of(time, header)[0], 1.0
     if not time.column:
         if find_unapplied(own, "s"):
             return None, ()
         # NetCDF: "seconds since 2024-05-06".
         unit = find_word(own, UNIT).partition(" since ")[0] or split_title(time.title)[1]
         scale = factor_to("s", unit, label)
-    values = time.read(0, min(MAX_TIMES, time.n_sample)) * scale
-    _, step, notes = uniform_grid(values, label)
+    _, step, notes = uniform_grid(time.read(0, min(MAX_TIMES, time.n_sample)) * scale, label)
     return 1 / step, notes
