@@ -68,26 +68,26 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
             f"channel{'s' * (len(chosen) > 1)}",
             "one calibration, or one for each entry of channels",
         )
-    several = len(channels) > 1
+    name = shown_text(file.name)
+    names = [f"{name}, {entry.title}" if len(channels) > 1 else name for entry in chosen]
     try:
         signals = [
-            _in_newtons(file, channel, calibration, config, several=several)
-            for channel, calibration in zip(chosen, calibrations, strict=True)
+            _in_newtons(file, channel, own, calibration, config)
+            for channel, own, calibration in zip(chosen, names, calibrations, strict=True)
         ]
         if config.channels is not None:
             titles = " + ".join(channel.title for channel in chosen)
-            signals = [add_signals(signals, f"{shown_text(file.name)}, {titles}")]
+            signals = [add_signals(signals, f"{name}, {titles}")]
         signals = [orient(signal, config.polarity) for signal in signals]
     except InputError as error:
         if len(chosen) == 1 or config.channels is not None:
             raise
         message = f"{error}; if several channels are forces: {HINT}"
         raise InputError(message, error.note) from error
-    is_chosen = config.channel is not None or config.channels is not None
-    if any(calibrations) or not is_chosen or not all(channel.is_force for channel in chosen):
-        return signals
-    others = [entry for entry in channels if entry not in chosen and entry.is_force]
-    return [_with_missing(signals[0], file, others)]
+    others = [channel for channel in channels if channel.is_force and channel not in chosen]
+    if others and not any(calibrations) and all(channel.is_force for channel in chosen):
+        signals = [_with_missing(signals[0], file, others)]
+    return signals
 
 
 def choose_channels(channels: list[Channel], config: Config, name: str) -> list[Channel]:
@@ -158,16 +158,14 @@ def _find_channel(channels: list[Channel], channel: int | str, name: str) -> Cha
 def _in_newtons(
     file: Path,
     channel: Channel,
+    name: str,
     calibration: float | Calibration | None,
     config: Config,
-    *,
-    several: bool,
 ) -> Signal:
     """Return a channel in N; raise InputError if its rate or unit is unknown.
 
     Its sign is that of the file, or with a stated polarity that of a compression.
     """
-    name = shown_text(file.name) + (f", {channel.title}" if several else "")
     if channel.n_sample < MIN_SAMPLES:
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
     notes = list(channel.notes)
@@ -253,9 +251,8 @@ def _with_missing(signal: Signal, file: Path, others: list[Channel]) -> Signal:
     own, peaks = find_peaks(signal)[0], {}
     for entry in others:
         try:
-            peaks[entry.title] = max(
-                find_peaks(_in_newtons(file, entry, None, Config(), several=True))
-            )
+            force = _in_newtons(file, entry, entry.title, None, Config())
+            peaks[entry.title] = max(find_peaks(force))
         except InputError:  # it holds no signal
             continue
     large = [title for title, peak in peaks.items() if peak > MIN_MISSING * own]
