@@ -95,7 +95,7 @@ class RoomSound(Displayed):
     def wav(self) -> bytes:
         """Return the content of the WAV file, of 24 bit; raise InputError without soundfile."""
         samples = self.pressure / self.full_scale
-        return wav_file(samples, self.sample_rate, self.comment, whole=True)
+        return wav_file(samples, self.sample_rate, self.comment, "PCM_24")
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the WAV file, replacing an existing one; raise OSError if that is not possible."""

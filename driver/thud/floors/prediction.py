@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base._schema import RATINGS, VERDICTS, Room
+from thud.base._schema import LIMITS, RATINGS, VERDICTS, Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.note import Note
@@ -20,8 +20,8 @@ from thud.floors.survey import RoomLevels
 from thud.impact.compute import compute, new_floor_impact, new_room_level
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.room_level import RoomLevel
-from thud.level.assessment import ImpactOrRecording, octave_limits
-from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
+from thud.level.assessment import ImpactOrRecording, criterion_quantity
+from thud.level.levels import BANDWIDTHS, SOURCES
 from thud.level.rating import (
     PredictedRating,
     Requirement,
@@ -274,10 +274,11 @@ def _source_notes(source: ImpactResult) -> tuple[Note, ...]:
     levels = (
         source.blocked_levels() if isinstance(source, FloorImpact) else source.levels(force="floor")
     )
-    limits = octave_limits(source.limits_source or SOURCES[0])
+    # The octaves are the first criteria.
+    octaves = zip(LIMITS[source.limits_source or SOURCES[0]], levels, strict=False)
     outside = [
-        f"{band:g} Hz {level - (lower + upper) / 2:.1f} dB"
-        for band, level, lower, upper in zip(get_bands().nominal, levels, *limits, strict=True)
+        f"{criterion_quantity(name).title} {level - (lower + upper) / 2:.1f} dB"
+        for (name, _, lower, upper), level in octaves
         if not lower <= level <= upper
     ]
     if not outside:
