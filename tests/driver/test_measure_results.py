@@ -23,6 +23,7 @@ from thud.base.note import Note
 from thud.recordings.config import Instrument
 from thud.recordings.signal import Signal
 from thud.report import recording_files
+from thud.report.contents import criteria_data
 from thud.report.rows import HEAD
 from thud.report.write import PDF
 
@@ -62,7 +63,7 @@ def names(folder: Path) -> set[str]:
 
 def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Path) -> None:
     recording_files.save(noisy, Results(tmp_path, "measure"))
-    head, *screen = recording_files.table(noisy)
+    head, *screen = recording_files.table(criteria_data(noisy))
     table = rows_of(tmp_path / "criteria.csv")
     data = json.loads((tmp_path / "report.json").read_text())
     rows = re.findall(r'<tr class="[a-z-]+">(.*?)</tr>', (tmp_path / "report.html").read_text())

@@ -35,13 +35,13 @@ from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.recording import Recording
 from thud.recordings.response import Plate
 from thud.recordings.words import read_date
-from thud.report.contents import FIELDS, missing_fields, report_data
+from thud.report.contents import FIELDS, criteria_data, missing_fields, report_data
 from thud.report.fonts import missing_characters
 from thud.report.notes import group_notes, shorten
 from thud.report.page import _range_picture, report_page
 from thud.report.pdf import html_to_pdf
-from thud.report.recording_files import table, uncertainty_text
-from thud.report.rows import criterion_row, freedom_text, risk_text
+from thud.report.recording_files import table
+from thud.report.rows import criterion_row, excluded_text, freedom_text, risk_text
 from thud.report.write import read_picture, write_report
 
 if TYPE_CHECKING:
@@ -748,7 +748,7 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
     assert lacking["mass"] == ["mass"]
     assert lacking["drop_height"] == ["drop height"]
     assert lacking["peak_count"] == []
-    note = uncertainty_text(one)
+    note = excluded_text(criteria_data(one))
     assert note.startswith(
         "† U excludes calibration, mass, drop height (uncertainty not stated: undecided); scatter "
         "between drops (unknown from one drop). Stated standard uncertainties that decide:"
@@ -758,7 +758,7 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
     assert "U is incomplete where it is marked †" in words_of(page)
     assert len(re.findall(r'data-label="U \(95 %\)">[^<]* †<', page)) == 9
     # The table on the screen has the same marks.
-    marked = [row[0] for row in table(one)[1:] if row[2].endswith(" †")]
+    marked = [row[0] for row in table(criteria_data(one))[1:] if row[2].endswith(" †")]
     assert len(marked) == 9
     assert "Force peaks" not in marked
 
@@ -766,7 +766,7 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
 def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
     assert not any(excluded(recording).values())
-    assert uncertainty_text(recording) == ""
+    assert excluded_text(criteria_data(recording)) == ""
     assert "†" not in report_page(report_data(recording), [], "")
     # An effective mass has the uncertainties of its origins.
     effective = replace(many(one, 1), config=replace(LAB, mass=None), calibration_uncertainty=None)

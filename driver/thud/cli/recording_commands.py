@@ -39,7 +39,9 @@ def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings.read_recording import read_recording
     from thud.report import recording_files
+    from thud.report.contents import criteria_data, missing_fields
     from thud.report.notes import sentences
+    from thud.report.rows import excluded_text
 
     figures = not options.no_figures
     files = results_of(
@@ -62,15 +64,17 @@ def measure(options: argparse.Namespace) -> int:
         print_results(format_rows(rows[: MAX_PRINTED + 1]))
         if len(rows) > MAX_PRINTED + 1:
             print_path(f"and {len(rows) - MAX_PRINTED - 1} more drops", folder / "report.json")
-        print_results(f"\n{format_rows(recording_files.table(recording))}\n")
+        criteria = criteria_data(recording)
+        print_results(f"\n{format_rows(recording_files.table(criteria))}\n")
         for step in sentences(recording, is_warning=False):
             print_results(f"  {step}")
-        print_results(f"  {recording_files.verdict_text(recording)}")
-        excluded = recording_files.uncertainty_text(recording)
+        print_results(f"  {recording_files.verdict_text(recording, criteria)}")
+        excluded = excluded_text(criteria)
         if excluded:
             print_results(f"  {excluded}")
         if figures:
-            print_results(recording_files.missing_text(recording))
+            missing = ", ".join(missing_fields(recording.config, recording.origins)) or "nothing"
+            print_results(f"  Missing in the report (ISO/IEC 17025:2017, 7.8): {missing}")
     print_notes(sentences(recording, is_warning=True))
     if not options.quiet:
         print_path("Results", folder)

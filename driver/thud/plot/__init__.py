@@ -56,7 +56,6 @@ from thud.plot.save_figures import (
     FORMATS as FORMATS,
     figure_files as figure_files,
     save as save,
-    save_all as save_all,
 )
 from thud.plot.study_figures import (
     draw_design as draw_design,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import require_choice, shown
+from thud.base.checks import shown
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError
-from thud.base.files import Results, replace_file
+from thud.base.files import replace_file
 from thud.plot.style import own_style
 
 if TYPE_CHECKING:
@@ -80,42 +80,6 @@ def figure_files(figures: Mapping[str, Figure], kind: str = FORMATS[0]) -> dict[
         with warn_if_not_drawn(f"{name}.{kind}"):
             contents[f"{name}.{kind}"] = _content(figure, name, kind)
     return contents
-
-
-def save_all(
-    figures: Mapping[str, Figure],
-    directory: str | os.PathLike[str],
-    *,
-    kind: str = FORMATS[0],
-    replace: bool = False,
-) -> list[Path]:
-    """Save figures under their names and return the paths of the files.
-
-    Parameters
-    ----------
-    figures
-        Figures by name.
-    directory
-        Directory of the files; replaced as a whole if it holds earlier figures.
-    kind
-        Format: ``"svg"``, ``"png"`` or ``"pdf"``.
-    replace
-        Also replace results of something else.
-
-    Raises
-    ------
-    InputError
-        If the directory holds a file that is not replaced.
-    OSError
-        If a file cannot be written.
-
-    Warns
-    -----
-    ReportWarning
-        If a figure cannot be drawn.
-    """
-    require_choice("kind", kind, FORMATS)
-    return Results(Path(directory), "plot", replace=replace).write(figure_files(figures, kind))
 
 
 def page_files(name: str, draw: Callable[[], Figure], html: str) -> dict[str, bytes]:

@@ -138,29 +138,24 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
 def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
     """Return what is known of laboratory, client and item; [report] only where it is stated."""
     report = data["report"]
-    stated = {
-        "Address": "\n".join(report["address"]),
-        "Client": "\n".join(report["client"]),
-        "Item": report["item"],
-        "State of the item": report["state"],
-        "Received on": report["received"],
-        "Issued on": report["issued"],
-        "Accreditation": report["accreditation"],
-    }
-    known = {name: [(name, text)] if text else [] for name, text in stated.items()}
     return [
         ("Laboratory", data["laboratory"]),
-        *known["Address"],
-        *known["Accreditation"],
-        *known["Client"],
+        *_stated("Address", "\n".join(report["address"])),
+        *_stated("Accreditation", report["accreditation"]),
+        *_stated("Client", "\n".join(report["client"])),
         ("Ball", data["ball"]),
         ("Serial number", data["serial"]),
-        *known["Item"],
-        *known["State of the item"],
-        *known["Received on"],
+        *_stated("Item", report["item"]),
+        *_stated("State of the item", report["state"]),
+        *_stated("Received on", report["received"]),
         ("Measured on", data["date"]),
-        *known["Issued on"],
+        *_stated("Issued on", report["issued"]),
     ]
+
+
+def _stated(name: str, text: str) -> list[tuple[str, str]]:
+    """Return a name with its text, if there is one."""
+    return [(name, text)] if text else []
 
 
 def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
@@ -174,32 +169,23 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
         f"u = {100 * relative:.2g} %" if relative is not None else "uncertainty not stated"
     )
     calibration = "; ".join(shorten(calibrations, MAX_FILES)) or NOT_KNOWN
-    texts = {
-        "Place": report["place"],
-        "Procedure": report["procedure"],
-        "Deviations": report["deviations"],
-    }
-    traceability = report["traceability"]
+    pressure = report["pressure"]
     return [
-        *((name, text) for name, text in texts.items() if text),
+        *_stated("Place", report["place"]),
+        *_stated("Procedure", report["procedure"]),
+        *_stated("Deviations", report["deviations"]),
         ("Temperature", _number_text(data["temperature"], 1, "°C")),
-        *_optional("Humidity", report["humidity"], 0, "%"),
-        *_optional("Air pressure", report["pressure"], 0, "hPa", 100.0),
+        *_stated("Humidity", _number_text(report["humidity"], 0, "%")),
+        *_stated("Air pressure", _number_text(pressure and pressure / 100, 0, "hPa")),
         ("Recordings", amount),
         ("Calibration", f"{calibration}; {uncertainty}"),
         ("Instruments", "\n".join(map(_instrument, data["instruments"]))),
-        *([("Traceability", traceability)] if traceability else []),
+        *_stated("Traceability", report["traceability"]),
     ]
 
 
 def _number_text(value: float | None, decimals: int, unit: str) -> str:
     return "" if value is None else f"{number(value, decimals)} {unit}"
-
-
-def _optional(
-    name: str, value: float | None, decimals: int, unit: str, scale: float = 1.0
-) -> list[tuple[str, str]]:
-    return [] if value is None else [(name, _number_text(value / scale, decimals, unit))]
 
 
 def _instrument(item: dict[str, str]) -> str:

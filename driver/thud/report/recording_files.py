@@ -15,12 +15,12 @@ from thud.base.tables import csv_text, marked
 from thud.level.estimate import Estimate
 from thud.level.levels import get_bands
 from thud.report import write
-from thud.report.contents import criteria_data, missing_fields, report_data
-from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows, excluded_text
+from thud.report.contents import report_data
+from thud.report.rows import HEAD, NOT_KNOWN, criterion_row
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from thud.base.files import Results
@@ -62,11 +62,10 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
     return rows
 
 
-def table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return the criteria as rows of text, without the columns that only the page has."""
+def table(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
+    """Return the criteria of a report as rows of text, without the columns of the page alone."""
     shown = [i for i, title in enumerate(HEAD) if title in _SHOWN]
-    rows = criterion_rows(criteria_data(recording))
-    return [tuple(row[i] for i in shown) for row in rows]
+    return [tuple(row[i] for i in shown) for row in (HEAD, *map(criterion_row, criteria))]
 
 
 def _with_u(estimate: Estimate, unit: float, decimals: int) -> str:
@@ -75,30 +74,17 @@ def _with_u(estimate: Estimate, unit: float, decimals: int) -> str:
     return f"{estimate.value / unit:.{decimals}f} ± {estimate.uncertainty / unit:.{decimals + 1}f}"
 
 
-def verdict_text(recording: Recording) -> str:
+def verdict_text(recording: Recording, criteria: Sequence[dict[str, Any]]) -> str:
     """Return the verdict, marked, as a sentence with a note on limits of the laboratory."""
     assessment = recording.assess()
-    name = assessment.source.replace("_", " ")
-    subject = "The result is" if assessment.conforms == VERDICTS[2] else "The source"
-    relation = "by" if assessment.conforms == VERDICTS[2] else "to"
+    is_undecided = assessment.conforms == VERDICTS[2]
+    subject, relation = ("The result is", "by") if is_undecided else ("The source", "to")
     verdict = marked(assessment.conforms, assessment.conforms)
-    sentence = f"{subject} {verdict} {relation} the limits of the {name}"
-    has_own_limits = any(
-        not criterion["limits_of_standard"] for criterion in criteria_data(recording)
-    )
+    limits = f"the limits of the {assessment.source.replace('_', ' ')}"
+    has_own_limits = any(not criterion["limits_of_standard"] for criterion in criteria)
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
-    return f"{sentence} at 95 %: {count_verdicts(d.conforms for d in assessment.criteria)}.{note}"
-
-
-def uncertainty_text(recording: Recording) -> str:
-    """Return what the marked uncertainties exclude, as a sentence; empty if none is marked."""
-    return excluded_text(criteria_data(recording))
-
-
-def missing_text(recording: Recording) -> str:
-    """Return what the report does not state although ISO/IEC 17025 asks for it, in a line."""
-    missing = ", ".join(missing_fields(recording.config, recording.origins)) or "nothing"
-    return f"  Missing in the report (ISO/IEC 17025:2017, 7.8): {missing}"
+    counts = count_verdicts(criterion.conforms for criterion in assessment.criteria)
+    return f"{subject} {verdict} {relation} {limits} at 95 %: {counts}.{note}"
 
 
 def count_verdicts(results: Iterable[str]) -> str:
@@ -109,12 +95,10 @@ def count_verdicts(results: Iterable[str]) -> str:
     """
     listed = list(results)
     counts = {verdict: listed.count(verdict) for verdict in VERDICTS if verdict in listed}
-    parts = [
-        f"{count} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}"
-        for verdict, count in counts.items()
-    ]
-    count, words = parts[0].split(" ", 1)
-    parts[0] = f"{count} {'criterion' if count == '1' else 'criteria'} {words}"
+    parts: list[str] = []
+    for verdict, count in counts.items():
+        noun = "" if parts else " criterion" if count == 1 else " criteria"
+        parts.append(f"{count}{noun} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}")
     return ", ".join(parts)
 
 

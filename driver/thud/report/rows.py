@@ -107,11 +107,6 @@ def risk_text(probability: float | None) -> str:
     return "< 0.01 %" if percent < 0.01 else f"{percent:.{2 if percent < 1 else 1}f} %"  # noqa: PLR2004
 
 
-def criterion_rows(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    """Return the criteria of a report as rows of text below `HEAD`."""
-    return [HEAD, *map(criterion_row, criteria)]
-
-
 def excluded_text(criteria: Sequence[dict[str, Any]], name: str = "U") -> str:
     """Return what the marked uncertainties lack, as a sentence; empty if none is marked.
 
