@@ -154,7 +154,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         name=f"drop {seed + 1}",
         onset=before,
         contact=Contact(
-            touch, release, touch, release, 1500.0, (0, len(time)), force,
+            touch, release, touch, release, 1500.0, 0, force,
             np.zeros(len(time)), gate, offset, (before, after),
             Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 1500.0), rate,
         ),

@@ -117,7 +117,9 @@ def test_noise_of_the_quiet_is_that_outside_the_gate() -> None:
 def test_offset_is_the_mean_of_what_lies_under_the_contact() -> None:
     one = make_drop(1.0, RATE).contact
     gate = np.array(one.gate) / RATE
-    removed = np.interp(np.arange(*one.span) / RATE, [gate[0], gate[1] - 1 / RATE], [-2.0, 12.0])
+    removed = np.interp(
+        np.arange(len(one.force)) / RATE, [gate[0], gate[1] - 1 / RATE], [-2.0, 12.0]
+    )
     notes = replace(one, removed=removed).notes
     assert noted(notes, "offset_removed").value == pytest.approx(5.0)
 

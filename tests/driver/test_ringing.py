@@ -84,7 +84,7 @@ def test_plate_that_is_stated_wrongly_rings_on() -> None:
 def test_short_quiet_tells_nothing(force: np.ndarray) -> None:
     recording = thud.read_recording(Signal.from_array(np.pad(force, QUIET), RATE))
     contact = recording.drops[0].contact
-    short = replace(contact, force=contact.force[: contact.gate[1] - contact.span[0] + 100])
+    short = replace(contact, force=contact.force[: contact.gate[1] + 100])
     assert find_ringing(short, Chain((Plate(1100.0, 25.0),))) is None
 
 

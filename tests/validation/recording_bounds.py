@@ -204,21 +204,12 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     after = last + distances[distances <= len(clean) - last]
     background = Background(*cell_means(clean, rate, before, after), variances, peak)
     covariance = background.error_covariance(uniform_cells(first, last, rate))
+    begin = onset - first / rate
+    touch, release = Estimate(begin, 0), Estimate(begin + contact_time, 0)
     contact = Contact(
-        Estimate(onset, 0),
-        Estimate(onset + contact_time, 0),
-        Estimate(onset, 0),
-        Estimate(onset + contact_time, 0),
-        peak,
-        (first, last),
-        clean[first:last],
-        np.zeros(last - first),
-        (first, last),
-        covariance,
-        (1.0, 1.0),
-        background,
-        rate,
-    )
+        touch, release, touch, release, peak, first, clean[first:last], np.zeros(last - first),
+        (0, last - first), covariance, (1.0, 1.0), background, rate,
+    )  # fmt: skip
     speed = np.sqrt(2 * GRAVITY * HEIGHT)
     ones = np.full((1, last - first), 1 / rate)
     spread = float(np.sqrt(contact.covariance_of(ones)[0, 0])) / (MASS * speed)
@@ -234,8 +225,9 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     and curvature, for the half sine.
     """
     rate, contact = draw.rate, oracle.contact
-    touch, release = contact.touch.value, contact.release.value
-    section = Section("record", record, rate, 0, contact.span)
+    touch = contact.start / rate + contact.touch.value
+    span = contact.start, contact.start + len(contact.force)
+    section = Section("record", record, rate, 0, span)
     with mock.patch.object(background_module, "DISTANCES", ALL_DISTANCES):
         force, background = background_module.remove_background(section, contact.background)
     found = find_contact(section, force, background)
@@ -245,7 +237,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     count = max(4, int(FLANK * min(rate, 2e4)))
     edges = np.linspace(0, FLANK, count + 1)
     tau = (edges[1:] + edges[:-1]) / 2
-    slope = np.pi * contact.peak / (release - touch)
+    slope = np.pi * contact.peak / (contact.release.value - contact.touch.value)
     shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
     cells = touch + edges[:-1], touch + edges[1:]
     covariance = contact.background.error_covariance(cells)

@@ -95,9 +95,9 @@ def _draw_changes(axes: Axes, stages: Stages) -> None:
 def _draw_contact(axes: Axes, contact: Contact) -> None:
     """Draw force, removed background and the gate of the levels on the scale of the noise."""
     rate, touch = contact.sample_rate, contact.touch.value
-    time = 1e3 * (np.arange(*contact.span) / rate - touch)
+    time = 1e3 * (np.arange(len(contact.force)) / rate - touch)
     recorded, removed = contact.force + contact.removed, contact.removed
-    first, stop = (index - contact.span[0] for index in contact.gate)
+    first, stop = contact.gate
     quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
     spread = max(RANGE * float(quiet.std()), 0.01 * contact.peak)
     axes.axvspan(time[first], time[stop - 1], color=GRAY, linewidth=0, label="gate of the levels")

@@ -6,7 +6,7 @@ Derivations: docs/recordings_theory.md, sections 3 and 4.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -52,6 +52,8 @@ NOISE_ORDER = 8
 MIN_NOISE_RATE = 5e3
 MIN_NOISE_SAMPLES = 50
 MIN_INCREASE = 4.0
+# Band in which the noise of the background is compared with its fit, Hz.
+NOISE_BAND = (100.0, 600.0)
 # A flank is A (t**n + r)/(1 + r), t in ms since first touch, with one of these pairs of n and r:
 # bodies that touch over an area (1) or at a point (1.5, Hertz), soft releases, jumps of shells.
 POWERS = np.array([0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 1.0, 1.0, 1.0, 1.0, 1.0])
@@ -91,7 +93,7 @@ DELAYS = np.concatenate([np.linspace(0, 0.5, 101), np.linspace(0.52, 4, 175)])
 
 @dataclass(frozen=True, eq=False)
 class Contact(Stage):
-    """Contact of one pulse; times are in s from the first sample of the window.
+    """Contact of one pulse; times are in s from the first sample of `force`.
 
     Attributes
     ----------
@@ -102,15 +104,14 @@ class Contact(Stage):
         (`thud.impact.contact_time`).
     peak : float
         Approximate maximum of the force below 1.25 kHz without the offset, N.
-    span : tuple of int
-        First and stop index of `force` in the window: the gate and up to MAX_BACKGROUND on either
-        side.
-    force : ndarray, shape (span[1] - span[0],)
-        Force without background, N.
-    removed : ndarray, shape (span[1] - span[0],)
+    start : int
+        Index of the first sample of `force` in the section.
+    force : ndarray, shape (n,)
+        Force without background in the gate and up to MAX_BACKGROUND on either side, N.
+    removed : ndarray, shape (n,)
         Removed background, N.
     gate : tuple of int
-        First and stop index of the contact with its margins in the window.
+        First and stop index of the contact with its margins.
     covariance : ndarray, shape (n_cell, n_cell)
         Covariance of the error of the background in uniform cells of the gate, N2.
     background_lengths : tuple of float
@@ -126,7 +127,7 @@ class Contact(Stage):
     begin: Estimate
     end: Estimate
     peak: float
-    span: tuple[int, int]
+    start: int
     force: NDArray[np.float64]
     removed: NDArray[np.float64]
     gate: tuple[int, int]
@@ -138,15 +139,13 @@ class Contact(Stage):
     @property
     def notes(self) -> tuple[Note, ...]:
         """What was removed with the background."""
-        first, stop = (index - self.span[0] for index in self.gate)
-        offset = float(self.removed[first:stop].mean())
+        offset = float(self.removed[slice(*self.gate)].mean())
         return (*self.background.notes, Note("offset_removed", value=offset, unit="N"))
 
     @property
     def gated(self) -> NDArray[np.float64]:
         """Force within the gate, N."""
-        first = self.span[0]
-        return self.force[self.gate[0] - first : self.gate[1] - first]
+        return self.force[slice(*self.gate)]
 
     @cached_property
     def white_variance(self) -> float:
@@ -163,6 +162,25 @@ class Contact(Stage):
         deviation = max(map(robust_deviation, thirds))
         variance = deviation**2 / float(comb(2 * NOISE_ORDER, NOISE_ORDER))
         return variance if variance > MIN_INCREASE * background else background
+
+    @cached_property
+    def noise_bandwidth(self) -> float:
+        """Equivalent bandwidth of the noise of the background, Hz; infinite if it is not known.
+
+        The noise is that of the fit below a filter, and ends at it. Its spectrum is the mean over
+        sections of the length of the gate.
+        """
+        (first, stop), count = self.gate, len(self.gated)
+        sides = self.force[first % count : first], self.force[stop:]
+        sections = np.concatenate([sides[0], sides[1][: len(sides[1]) // count * count]])
+        if not sections.size or self.background.quantization.offset:
+            return math.inf
+        frequency = np.fft.rfftfreq(count, 1 / self.sample_rate)[1:]
+        windowed = np.hanning(count + 2)[1:-1] * sections.reshape(-1, count)
+        power = (np.abs(np.fft.rfft(windowed, axis=1)[:, 1:]) ** 2).mean(axis=0)
+        ratio = power / self.background.density(frequency)
+        reference = np.median(ratio[(frequency > NOISE_BAND[0]) & (frequency < NOISE_BAND[1])])
+        return float(ratio.sum() / reference * frequency[0]) if reference > 0 else math.inf
 
     @property
     def quantization_errors(self) -> NDArray[np.float64]:
@@ -214,27 +232,20 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
     # Samples into which filters spread the flanks belong to the gate.
     margin = GATE_SAMPLES + int((GATE_RATE / rate) ** 2)
     margin += int(CORRECTION_PERIODS * rate / chain.highest / 2) if chain else 0
-    gate = (
-        max(int((touch.value - 3 * touch.uncertainty) * rate) - margin, 0),
-        min(int((release.value + 3 * release.uncertainty) * rate) + margin + 1, len(force)),
-    )
+    first = max(int((touch.value - 3 * touch.uncertainty) * rate) - margin, 0)
+    stop = min(int((release.value + 3 * release.uncertainty) * rate) + margin + 1, len(force))
     length = int(MAX_BACKGROUND * rate)
-    span = (max(0, gate[0] - length), min(len(force), gate[1] + length))
-    return Contact(
-        touch,
-        release,
-        begin,
-        end,
-        background.peak,
-        span,
-        force[slice(*span)],
-        (section.force - force)[slice(*span)],
-        gate,
-        background.error_covariance(uniform_cells(*gate, rate)),
-        (background.ends[0], len(force) / rate - background.ends[1]),
-        background,
-        rate,
+    start = max(0, first - length)
+    shown = slice(start, stop + length)
+    touch, release, begin, end = (
+        replace(edge, value=edge.value - start / rate) for edge in (touch, release, begin, end)
     )
+    return Contact(
+        touch, release, begin, end, background.peak, start, force[shown],
+        (section.force - force)[shown], (first - start, stop - start),
+        background.error_covariance(uniform_cells(first, stop, rate)),
+        (background.ends[0], len(force) / rate - background.ends[1]), background, rate,
+    )  # fmt: skip
 
 
 def find_edge(

@@ -45,8 +45,6 @@ MIN_WARNED = 0.1
 # Cutoff of a filter over the equivalent bandwidth of its noise: 0.89 of a mean, 0.96 of a Bessel
 # filter of order 4. White noise up to half the rate has more than a quarter of the rate.
 CUTOFF_RATIO = 0.9
-# Minimum standard deviation of this noise, as a fraction of the peak.
-MIN_NOISE = 1e-5
 # Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines.
 PADDING = 16
 # Contributions of instruments that are not stated: rectangular distributions.
@@ -238,15 +236,8 @@ def _gains(drops: Sequence[Drop], config: Config) -> dict[str, Gain]:
 
 
 def _effective_rate(drop: Drop) -> float:
-    """Return the sample rate, Hz, or the one that the noise of the background would have.
-
-    The equivalent bandwidth of its samples follows from their variance and the density of the cells
-    of the background, which are longer. Of noise that hardly exceeds rounding it is not known.
-    """
-    rate, background = drop.sample_rate, drop.contact.background
-    if background.quantization.offset or drop.noise < MIN_NOISE * background.peak:
-        return rate
-    return min(rate, 4 * CUTOFF_RATIO * drop.noise**2 / float(background.variances[0]))
+    """Return the sample rate, Hz, or the one that the noise of the background would have."""
+    return min(drop.sample_rate, 4 * CUTOFF_RATIO * drop.contact.noise_bandwidth)
 
 
 def check_assumptions(

@@ -118,7 +118,7 @@ class Drop(Stage):
     @property
     def begin(self) -> float:
         """Time of the first sample, s; zero is the first touch."""
-        return self.contact.span[0] / self.sample_rate - self.contact.touch.value
+        return -self.contact.touch.value
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -128,8 +128,7 @@ class Drop(Stage):
     @property
     def gate(self) -> tuple[int, int]:
         """First and stop index of the contact with its margins, whose levels are measured."""
-        first = self.contact.span[0]
-        return self.contact.gate[0] - first, self.contact.gate[1] - first
+        return self.contact.gate
 
     @cached_property
     def noise(self) -> float:
@@ -210,7 +209,7 @@ def measure_drop(
             contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
     return Drop(
         name=section.name,
-        onset=section.start / section.sample_rate + contact.touch.value,
+        onset=(section.start + contact.start) / section.sample_rate + contact.touch.value,
         contact=contact,
         contact_time=contact_time,
         restitution=estimates.get(RESTITUTION, Estimate.unknown()),
@@ -231,7 +230,7 @@ def _between(start: Estimate, end: Estimate) -> Estimate:
 
 
 def _landings(section: Section, contact: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
-    """Return first touch and release of each of the first bounces, s from the start."""
+    """Return first touch and release of each of the first bounces, in the time of a contact, s."""
     landings = []
     for bounce in section.bounces[:count]:
         first, stop = bounce.contact
@@ -240,7 +239,7 @@ def _landings(section: Section, contact: Contact, count: int) -> list[tuple[Esti
             break
         force, background = remove_background(bounce, contact.background)
         edges = (find_edge(bounce, force, background, side)[0] for side in (1, -1))
-        delay = (bounce.start - section.start) / section.sample_rate
+        delay = (bounce.start - section.start - contact.start) / section.sample_rate
         touch, release = (replace(edge, value=delay + edge.value) for edge in edges)
         landings.append((touch, release))
     return landings

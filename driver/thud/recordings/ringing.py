@@ -88,7 +88,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     Frequency and quality are those of the oscillation of least squares.
     """
     rate, pause = contact.sample_rate, int(PAUSE * contact.sample_rate)
-    first, stop = (edge - contact.span[0] for edge in contact.gate)
+    first, stop = contact.gate
     after, before = contact.force[stop + pause :], contact.force[: max(first - pause, 0)][::-1]
     if len(after) < MIN_LENGTH * rate:
         return None
@@ -129,7 +129,8 @@ def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | No
     less. This is unclear if noise hides the difference.
     """
     rate = contact.sample_rate
-    raw = replace(contact, force=recorded.force[slice(*contact.span)] - contact.removed)
+    as_recorded = recorded.force[contact.start :][: len(contact.force)]
+    raw = replace(contact, force=as_recorded - contact.removed)
     ringing = find_ringing(raw)
     tolerance = max(MATCH, 3 * (plate.f0_uncertainty or 0.0))
     if ringing and abs(ringing.frequency / plate.f0 - 1) < tolerance:
