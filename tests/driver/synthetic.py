@@ -154,8 +154,8 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         name=f"drop {seed + 1}",
         onset=before,
         contact=Contact(
-            touch, release, touch, release, 1500.0, 0, force,
-            np.zeros(len(time)), gate, offset, (before, after),
+            touch, release, touch, release, 0, force,
+            np.zeros(len(time)), gate, offset,
             Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 1500.0), rate,
         ),
         contact_time=Estimate(0.02, 0),

@@ -207,8 +207,8 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     begin = onset - first / rate
     touch, release = Estimate(begin, 0), Estimate(begin + contact_time, 0)
     contact = Contact(
-        touch, release, touch, release, peak, first, clean[first:last], np.zeros(last - first),
-        (0, last - first), covariance, (1.0, 1.0), background, rate,
+        touch, release, touch, release, first, clean[first:last], np.zeros(last - first),
+        (0, last - first), covariance, background, rate,
     )  # fmt: skip
     speed = np.sqrt(2 * GRAVITY * HEIGHT)
     ones = np.full((1, last - first), 1 / rate)
@@ -237,7 +237,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     count = max(4, int(FLANK * min(rate, 2e4)))
     edges = np.linspace(0, FLANK, count + 1)
     tau = (edges[1:] + edges[:-1]) / 2
-    slope = np.pi * contact.peak / (contact.release.value - contact.touch.value)
+    slope = np.pi * contact.background.peak / (contact.release.value - contact.touch.value)
     shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
     cells = touch + edges[:-1], touch + edges[1:]
     covariance = contact.background.error_covariance(cells)
@@ -246,7 +246,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     unit = 1 / np.sqrt(np.diagonal(normal))
     inverse = np.linalg.inv(normal * unit[:, None] * unit) * unit[:, None] * unit
     # What the three make of the time at which the flank passes the threshold.
-    delay = THRESHOLD * contact.peak / slope
+    delay = THRESHOLD * contact.background.peak / slope
     change = np.array([1, delay / slope, delay**2 / slope / 2])
     return spread, float(np.sqrt(2 * change @ inverse @ change))
 

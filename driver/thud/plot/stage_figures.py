@@ -99,7 +99,7 @@ def _draw_contact(axes: Axes, contact: Contact) -> None:
     recorded, removed = contact.force + contact.removed, contact.removed
     first, stop = contact.gate
     quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
-    spread = max(RANGE * float(quiet.std()), 0.01 * contact.peak)
+    spread = max(RANGE * float(quiet.std()), 0.01 * contact.background.peak)
     axes.axvspan(time[first], time[stop - 1], color=GRAY, linewidth=0, label="gate of the levels")
     axes.plot(time, recorded, color="0.55", linewidth=0.5, label="corrected force")
     axes.plot(time, removed, color=COLORS[1], linewidth=1.0, label="background")

@@ -15,7 +15,6 @@ from numpy.polynomial.legendre import leggauss
 from scipy.linalg import solve_triangular
 from scipy.special import comb
 
-from thud.base.note import Note
 from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
@@ -102,8 +101,6 @@ class Contact(Stage):
     begin, end : Estimate
         Times at which the force exceeds, and falls below, 1 % of its peak
         (`thud.impact.contact_time`).
-    peak : float
-        Approximate maximum of the force below 1.25 kHz without the offset, N.
     start : int
         Index of the first sample of `force` in the section.
     force : ndarray, shape (n,)
@@ -114,8 +111,6 @@ class Contact(Stage):
         First and stop index of the contact with its margins.
     covariance : ndarray, shape (n_cell, n_cell)
         Covariance of the error of the background in uniform cells of the gate, N2.
-    background_lengths : tuple of float
-        Length of the background before and after, s.
     background : Background
         The fitted background and its noise.
     sample_rate : float
@@ -126,21 +121,13 @@ class Contact(Stage):
     release: Estimate
     begin: Estimate
     end: Estimate
-    peak: float
     start: int
     force: NDArray[np.float64]
     removed: NDArray[np.float64]
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
-    background_lengths: tuple[float, float]
     background: Background
     sample_rate: float
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        """What was removed with the background."""
-        offset = float(self.removed[slice(*self.gate)].mean())
-        return (*self.background.notes, Note("offset_removed", value=offset, unit="N"))
 
     @property
     def gated(self) -> NDArray[np.float64]:
@@ -241,10 +228,10 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
         replace(edge, value=edge.value - start / rate) for edge in (touch, release, begin, end)
     )
     return Contact(
-        touch, release, begin, end, background.peak, start, force[shown],
+        touch, release, begin, end, start, force[shown],
         (section.force - force)[shown], (first - start, stop - start),
         background.error_covariance(uniform_cells(first, stop, rate)),
-        (background.ends[0], len(force) / rate - background.ends[1]), background, rate,
+        background, rate,
     )  # fmt: skip
 
 

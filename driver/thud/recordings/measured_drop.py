@@ -168,11 +168,15 @@ def measure_drop(
             f"{1e3 * contact_time.uncertainty:.2g} ms",
             f"an uncertainty up to 1/{MIN_CONTACT_RATIO:g} of it",
         )
-    notes = [*section.notes, *contact.notes]
+    offset = float(contact.removed[slice(*contact.gate)].mean())
+    notes = [*section.notes, *contact.background.notes]
+    notes.append(Note("offset_removed", value=offset, unit="N"))
+    begin, end = contact.background.ends
+    lengths = {"before": begin, "after": len(section.force) / section.sample_rate - end}
     notes += (
         Note("short_background", value=1e3 * length, low=1e3 * SHORT_BACKGROUND, unit="ms",
              others={"side": side})
-        for side, length in zip(("before", "after"), contact.background_lengths, strict=True)
+        for side, length in lengths.items()
         if length < SHORT_BACKGROUND
     )  # fmt: skip
     ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
@@ -186,7 +190,7 @@ def measure_drop(
         flight = _between(contact.release, landings[0][0]).value
         bounce = section.bounces[0]
         peak = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
-        ratio = peak / contact.peak
+        ratio = peak / contact.background.peak
         expected = GRAVITY * flight / (2 * math.sqrt(2 * GRAVITY * config.height))
         if not ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
             landings, others = [], {"ratio": ratio, "height": config.height}
@@ -260,7 +264,7 @@ def _peak(contact: Contact) -> Estimate:
     cell = index * len(contact.covariance) // len(contact.gated)
     density = float(contact.background.density(RECORDED_BAND))
     noise = math.sqrt(density * min(RECORDED_BAND, rate / 2))
-    variance = 2 * noise**2 + (SAMPLE_ERROR * contact.peak) ** 2
+    variance = 2 * noise**2 + (SAMPLE_ERROR * contact.background.peak) ** 2
     # The top stays within a step for some time: its error is that of the offset again.
     variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
     return Estimate(float(low.max()) - noise, math.sqrt(variance))

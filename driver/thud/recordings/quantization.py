@@ -115,6 +115,6 @@ def check(section: Section, contact: Contact) -> tuple[Note, ...]:
     """
     del section
     step, offset = contact.background.quantization.step, contact.background.quantization.offset
-    if offset < MAX_OFFSET * contact.peak:
+    if offset < MAX_OFFSET * contact.background.peak:
         return ()
     return (Note("coarse_steps", value=offset, unit="N", others={"step": step}),)

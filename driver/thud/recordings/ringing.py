@@ -111,7 +111,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
             return None
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
     amplitude = 2 * math.sqrt(energy / window)
-    if amplitude < MIN_AMPLITUDE[chain is not None] * contact.peak:
+    if amplitude < MIN_AMPLITUDE[chain is not None] * contact.background.peak:
         return None
     start, ringing = np.array([[frequency, -math.log(decay)]]), after[: int(LENGTH * decay * rate)]
     ((fitted, log_rate),), _ = fit_oscillations(ringing, start, rate)

@@ -45,7 +45,8 @@ def check(section: Section, contact: Contact) -> tuple[Note, ...]:
     start = contact.gate[0] + count
     first = max(int(contact.touch.value * rate + margin) - start, 0)
     inside = slice(first, max(int(contact.release.value * rate - margin) - start, first))
-    least = max(MIN_JUMP * contact.peak, MIN_STEPS * contact.background.quantization.step)
+    background = contact.background
+    least = max(MIN_JUMP * background.peak, MIN_STEPS * background.quantization.step)
     for what, before, after in (
         ("force", line, line[::-1]), ("slope of the force", slope, slope),
     ):  # fmt: skip
