@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.level.estimate import Estimate
+from thud.level.estimate import UNKNOWN, Estimate
 from thud.recordings.background import Background, uniform_cells
 from thud.recordings.contact import Contact
 from thud.recordings.drops import Section, cut_section, find_drops
@@ -159,10 +159,10 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
             Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 1500.0), rate,
         ),
         contact_time=Estimate(0.02, 0),
-        restitution=Estimate.unknown(),
+        restitution=UNKNOWN,
         peak_force=Estimate(1500, 0),
-        impulse=Estimate.unknown(),
-        effective_mass=Estimate.unknown(),
+        impulse=UNKNOWN,
+        effective_mass=UNKNOWN,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from synthetic import make_drop
 
 import thud
 from thud.recordings.config import Config
-from thud.recordings.instruments import instrument_contributions, mean_level_changes
+from thud.recordings.instruments import instrument_uncertainties, mean_level_changes
 from thud.recordings.response import Chain, Plate, RecorderFilter
 from thud.recordings.signal import Signal
 
@@ -50,11 +50,7 @@ def measured(force: np.ndarray, noise: float = 0.5, **config: Any) -> thud.Recor
 
 def contributions(recording: thud.Recording) -> dict[str, np.ndarray]:
     """Return the contributions of the instruments to the octave levels, dB."""
-    lines = instrument_contributions(recording.drops, recording.config, None)
-    return {
-        name: np.array([{part.name: part.uncertainty for part in line}[name] for line in lines])
-        for name in {part.name for part in lines[0]}
-    }
+    return instrument_uncertainties(recording.drops, recording.config, None)
 
 
 def names(recording: thud.Recording) -> list[str]:
@@ -229,6 +225,9 @@ def test_gain_of_two_is_six_decibels_in_every_band() -> None:
         ({"filter": {"kind": "elliptic"}}, ("filter: kind", "bessel")),
         ({"filter": {"kind": "bessel", "order": 40, "cutoff": 1e3}}, ("order", "1 to 12")),
         ({"plate": {"share": 0.4}}, ("plate: f0", "missing")),
+        ({"plate": {"f0": 0.0, "Q": 9.0}}, ("plate: f0", "0.0")),
+        ({"plate": {"f0": 1500.0, "Q": -1.0}}, ("plate: Q", "-1.0")),
+        ({"plate": {"f0": 1500.0, "Q": 9.0, "f0_uncertainty": 1.0}}, ("f0_uncertainty", "1.0")),
         ({"plate": {"f0": 1500.0, "Q": 9.0, "flat_limit": 700.0}}, ("f0 and flat_limit",)),
         ({"plate": {"f0": 1500.0, "Q": 9.0, "share": 0.0}}, ("share", "0.001")),
     ],

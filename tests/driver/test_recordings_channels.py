@@ -19,7 +19,6 @@ import thud
 from thud import cli
 from thud.base.errors import InputError
 from thud.level.estimate import Estimate
-from thud.recordings.budgets import average_estimates
 from thud.recordings.config import Config, read_config, require_channels
 from thud.recordings.force_units import Calibration
 from thud.recordings.recorded_levels import average_levels, measure_levels
@@ -307,20 +306,21 @@ def test_repeatability_is_not_below_the_noise(count: int) -> None:
     values = np.random.default_rng(count).normal(scale=noise, size=(20_000, count))
     within = 0
     for drops in values[:4000]:
-        mean = average_estimates([Estimate(float(value), noise) for value in drops])
+        mean = Estimate.of_drops(float(np.mean(drops)), drops, [noise] * count)
         assert mean.expanded >= 1.95 * noise / math.sqrt(count)
         within += abs(mean.value) <= mean.expanded
     # By scatter or noise, whichever is larger, at least 95 %, less three binomial deviations.
     assert within / 4000 > 0.95 - 3 * math.sqrt(0.95 * 0.05 / 4000)
     # Equal drops: only the noise is known.
-    mean = average_estimates([Estimate(5.0, noise)] * count)
+    mean = Estimate.of_drops(5.0, [5.0] * count, [noise] * count)
     assert mean.uncertainty == pytest.approx(noise / math.sqrt(count))
     assert mean.freedom == math.inf
 
 
 def test_noise_counts_in_bands_where_it_exceeds_the_scatter() -> None:
     for scatter, expected in ((0.1, stats.t.ppf(0.975, 4) * 0.1 < 1.96 * 0.2), (1.0, False)):
-        repeated, noise = Estimate.of_mean(39.0, 0.2, scatter, 5).contributions
+        samples = 39 + math.sqrt(5) * scatter * np.array([-1, -1, 0, 1, 1])
+        repeated, noise = Estimate.of_drops(39.0, samples, [0.2 * math.sqrt(5)] * 5).contributions
         assert (repeated.counted, noise.counted) == (not expected, expected)
     entry = measure_levels([make_drop(3.0, seed=1)] * 3)
     average = average_levels(entry)

@@ -13,13 +13,12 @@ from synthetic import cut_drops, half_sine
 
 import thud
 from thud.level.levels import force_exposure_levels
-from thud.recordings.budgets import average_mass
 from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
 from thud.recordings.drops import Section
+from thud.recordings.quantities import GRAVITY, drop_estimates
 from thud.recordings.quantization import Quantization, find_quantization
 from thud.recordings.read_recording import measure_stages, read_recording
-from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -158,7 +157,7 @@ def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
     force = record(15.625, 0.5, 4)
     force[40_000:] += np.rint(half_sine(RATE, 0.05, force.size - 40_000) / 20) * 15.625
     drop = one_drop(force)
-    mass = average_mass([drop], Config(height=1.0), None)
+    mass = drop_estimates([drop], Config(height=1.0), None)["effective_mass"]
     (part,) = (part for part in mass.contributions if part.name == "quantization")
     relative = drop.contact.quantization_impulse / drop.impulse.value
     assert part.uncertainty == pytest.approx(mass.value * relative)

@@ -92,8 +92,6 @@ WARNINGS = {
     "force off, and all levels are wrong",
     "no_bounce": "the pulse {value:.0f} {unit} after the contact has {ratio:.2g} times its peak: "
     "it is no bounce after a drop from {height:g} m",
-    "restitution_second": "the restitution at the second impact is {value:.3f}; that at the first "
-    "impact is unknown without the drop height",
     # The recording as a whole.
     "peaks_unknown": "the number of peaks is unknown: some may be noise or the plate",
     "restitution_partly_known": "the restitution is known of {value:g} of {high:g} drops only",

@@ -18,7 +18,7 @@ WITHOUT_EFFECT = {
     "coarse_steps", "effective_mass", "filter_assumed", "no_bounce", "noise_ends", "offset_step",
     "peaks_unknown", "plate_assumed", "plate_estimated", "plate_not_recorded", "plate_rings",
     "plate_rings_differently", "restitution_impossible", "restitution_partly_known",
-    "restitution_second", "restitutions_differ", "share_assumed", "uncertainty_not_stated",
+    "restitutions_differ", "share_assumed", "uncertainty_not_stated",
 }  # fmt: skip
 # Warnings whose value is their effect on the octave of 500 Hz, dB.
 WITH_EFFECT = {"aliasing", "plate_unclear"}

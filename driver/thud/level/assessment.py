@@ -24,7 +24,7 @@ from thud.base.display import Displayed
 from thud.base.immutable import Immutable
 from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
-from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
+from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, UNKNOWN, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
 if TYPE_CHECKING:
@@ -382,9 +382,8 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
 def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
     """Return the criteria of the standards for a source, with unknown values."""
     require_choice("source", source, SOURCES)
-    unknown = Estimate.unknown()
     return tuple(
-        Criterion(name, replace(unknown, unit=unit), lower, upper)
+        Criterion(name, replace(UNKNOWN, unit=unit), lower, upper)
         for name, unit, lower, upper in LIMITS[source]
     )
 

@@ -7,10 +7,14 @@ from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Self
 
+import numpy as np
+
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
 
 CONFIDENCE = 0.95
 # Name of the contribution of a computed value; see `Estimate.computed`.
@@ -124,39 +128,38 @@ class Estimate(Immutable):
         return cls.from_budget(value, Contribution(NUMERICAL_ERROR, error / NORMAL_FACTOR))
 
     @classmethod
-    def of_mean(  # noqa: PLR0913 - a mean and what contributes to its uncertainty
+    def of_drops(  # noqa: PLR0913 - a mean and what contributes to its uncertainty
         cls,
         value: float,
-        noise: float,
-        scatter: float,
-        count: int,
+        samples: Sequence[float] | NDArray[np.float64],
+        noises: Sequence[float] | NDArray[np.float64],
         shared: Iterable[Contribution] = (),
         *,
         upper_bound: bool = False,
         not_stated: tuple[str, ...] = (),
     ) -> Self:
-        """Return a mean over a number of drops with its budget.
+        """Return the mean over drops with its budget.
 
-        `noise` and `scatter` are standard uncertainties of the mean by the noise of each drop and
-        by the scatter between several drops, which includes the noise. That with the larger
-        expanded uncertainty counts: a scatter of few drops may be small by chance. Drops share the
-        contributions `shared`, which their mean does not reduce.
+        `samples` are the values of the drops, `noises` their standard uncertainties by noise, shape
+        (n_drop,), both in the unit of the mean. That of noise and scatter with the larger expanded
+        uncertainty counts: a scatter, which includes the noise, may be small by chance. Drops share
+        the contributions `shared`, which their mean does not reduce.
         """
-        random = [Contribution(NOISE, noise)]
+        count = len(noises)
+        noise = Contribution(NOISE, math.hypot(*noises) / count)
+        random = [noise]
         if count > 1:
+            scatter = float(np.std(samples, ddof=1)) / math.sqrt(count)
             repeated = Contribution(REPEATABILITY, scatter, count - 1, divisor=math.sqrt(count))
-            is_noise = NORMAL_FACTOR * noise > cls.from_budget(value, repeated).expanded
-            random = [
-                replace(repeated, counted=not is_noise),
-                Contribution(NOISE, noise, counted=is_noise),
-            ]
+            is_noise = NORMAL_FACTOR * noise.uncertainty > cls.from_budget(value, repeated).expanded
+            random = [replace(repeated, counted=not is_noise), replace(noise, counted=is_noise)]
         lines = (*random, *shared)
         return cls.from_budget(value, *lines, upper_bound=upper_bound, not_stated=not_stated)
 
-    @classmethod
-    def unknown(cls) -> Self:
-        """Return an unknown value."""
-        return cls(math.nan, math.nan)
+    def __sub__(self, other: Estimate) -> Estimate:
+        """Return the difference of independent values."""
+        uncertainty = math.hypot(self.uncertainty, other.uncertainty)
+        return Estimate(self.value - other.value, uncertainty)
 
     def widened(self, uncertainty: float) -> Self:
         """Return the estimate with a further standard uncertainty of infinite freedom."""
@@ -178,3 +181,7 @@ class Estimate(Immutable):
     def expanded(self) -> float:
         """Expanded uncertainty: half the width of the interval with 95 % coverage."""
         return self.coverage_factor * self.uncertainty if self.uncertainty else 0.0
+
+
+# An unknown value.
+UNKNOWN = Estimate(math.nan, math.nan)

@@ -1,4 +1,4 @@
-"""Force plate and recorder filter: their responses, requirements on them, effects on levels.
+"""Uncertainty of the force by plate and recorder filter, and their effects on levels and peak.
 
 What is stated is corrected, and its uncertainty contributes to the levels. What is not stated may
 change them by any amount between nothing and an assumed response, a rectangular distribution.
@@ -7,13 +7,13 @@ change them by any amount between nothing and an assumed response, a rectangular
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from thud.base.note import Note
-from thud.level.estimate import NORMAL_FACTOR, RECTANGULAR, Contribution
+from thud.level.estimate import RECTANGULAR
 from thud.level.levels import get_bands, low_pass
 from thud.recordings.response import Plate, RecorderFilter
 
@@ -23,16 +23,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.level.estimate import Estimate
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
 
     Gain = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 # Requirements of the standard on a force plate: a flat response between these frequencies, Hz, and
-# up to this force, N, and linearity within this relative tolerance, which is used for flatness too.
+# linearity within this relative tolerance, which is used for flatness too.
 FLAT = (0.2, 1000.0)
-RANGE = 5000.0
 TOLERANCE = 0.02
 # If no filter is stated, it is assumed to be at worst a Bessel filter of this order whose cutoff is
 # this fraction of the sample rate.
@@ -47,7 +45,9 @@ MIN_WARNED = 0.1
 CUTOFF_RATIO = 0.9
 # Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines.
 PADDING = 16
-# Contributions of instruments that are not stated: rectangular distributions.
+# Contributions to the uncertainty; those of instruments that are not stated are half the width of
+# a rectangular distribution.
+CALIBRATION = "calibration"
 ASSUMED_PLATE, ASSUMED_SHARE, ASSUMED_FILTER = ASSUMED = (
     "plate, assumed",
     "share of the plate's resonance, assumed",
@@ -57,109 +57,66 @@ ASSUMED_PLATE, ASSUMED_SHARE, ASSUMED_FILTER = ASSUMED = (
 MIN_SHARE = 0.5
 
 
-@dataclass(frozen=True)
-class PlateCheck:
-    """A requirement on the force plate, whether it is met (None if unknown), and a note on it.
+class Doubt(NamedTuple):
+    """How the recorded force may differ from the applied one by an instrument.
 
-    Requirements: ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"``, ``"linear"``.
+    Attributes are the contribution to the uncertainty, the gain, a function of frequencies in Hz,
+    and the code of the warning if the instrument is assumed.
     """
 
-    requirement: str
-    met: bool | None
-    note: Note
+    name: str
+    gain: Gain
+    code: str = ""
 
 
-def check_plate(plate: Plate | None) -> tuple[PlateCheck, ...]:
-    """Check a plate by the standard: flat from 0.2 to 1000 Hz, 0 to 5000 N, linear within 2 %.
-
-    The resonance of the plate is corrected. Without a plate there are no checks.
-    """
+def find_doubts(drops: Sequence[Drop], config: Config) -> list[Doubt]:
+    """Return how the recorded force in drops may differ from the applied one."""
+    plate, recorder = config.resonance, config.recorder_filter
+    doubts = []
+    if plate and plate.f0_uncertainty:
+        higher = replace(plate, f0=plate.f0 * (1 + plate.f0_uncertainty))
+        doubts.append(Doubt("plate", lambda f: higher.response(f) / plate.response(f)))
+    if recorder and recorder.cutoff_uncertainty:
+        shifted = replace(recorder, cutoff=recorder.cutoff * (1 + recorder.cutoff_uncertainty))
+        gain: Gain = lambda f: shifted.response(f) / recorder.response(f)  # noqa: E731
+        doubts.append(Doubt("recorder filter", gain))
+    seen = {drop.plate_recorded for drop in drops}
     if plate is None:
-        return ()
-    low, high = FLAT
-    checks = (
-        ("flat above", _check_low, f"response at {low:g} Hz", "time_constant"),
-        ("flat below", _check_high, f"response up to {high:g} Hz", "f0, f0_uncertainty"),
-        ("range", _check_range, "measuring range", "full_scale"),
-        ("linear", _check_linearity, "linearity", "linearity"),
-    )
-    result = []
-    for requirement, check, what, keys in checks:
-        met, note = None, _plate_note("plate_unknown", math.nan, {"what": what, "keys": keys})
-        if getattr(plate, keys.split(", ")[-1]):
-            met, note = check(plate)
-        result.append(PlateCheck(requirement, met, note))
-    return tuple(result)
+        ringing = [(drop.ringing.frequency, drop.ringing.quality) for drop in drops if drop.ringing]
+        limit = config.plate.flat_limit if config.plate else None
+        # Else a mass on a spring that is TOLERANCE off at the limit of its flat response.
+        worst = ((limit or FLAT[1]) * math.sqrt(1 + 1 / TOLERANCE), 100.0)
+        code = "plate_estimated" if ringing else "" if limit else "plate_assumed"
+        assumed = Plate(*np.median(ringing or [worst], axis=0))
+        doubts.append(Doubt(ASSUMED_PLATE, assumed.response, code))
+    elif False in seen and True not in seen:
+        doubts.append(Doubt(ASSUMED_PLATE, plate.response, "plate_not_recorded"))
+    if plate and plate.share is None:
+        # A force that was corrected for the whole share is multiplied by it.
+        smaller = replace(plate, share=MIN_SHARE)
+        gain = lambda f: plate.response(f) / smaller.response(f)  # noqa: E731
+        doubts.append(Doubt(ASSUMED_SHARE, gain, "share_assumed"))
+    if config.filter is None:
+        cutoff = ASSUMED_CUTOFF * min(map(_effective_rate, drops))
+        gain = RecorderFilter("bessel", ASSUMED_ORDER, cutoff).response
+        doubts.append(Doubt(ASSUMED_FILTER, gain, "filter_assumed"))
+    return doubts
 
 
-def _plate_note(
-    code: str, value: float, others: Mapping[str, float | str], unit: str = "%"
-) -> Note:
-    return Note(code, "force plate", float(value), unit=unit, others=others)
-
-
-def _check_low(plate: Plate) -> tuple[bool, Note]:
-    """Check the lowest frequency of a first-order high-pass."""
-    low, time_constant = FLAT[0], plate.time_constant or math.nan
-    loss = 1 - 1 / math.hypot(1, 1 / (2 * math.pi * low * time_constant))
-    needed = 1 / (2 * math.pi * low * math.sqrt((1 - TOLERANCE) ** -2 - 1))
-    others = {"frequency": low, "time_constant": time_constant, "needed": needed}
-    return loss <= TOLERANCE, _plate_note("plate_low", 100 * loss, others)
-
-
-def _check_high(plate: Plate) -> tuple[bool, Note]:
-    """Check the highest frequency by the deviation that remains after the correction."""
-    high = FLAT[1]
-    frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
-    response = np.abs(plate.response(frequency))
-    # Expanded uncertainty of the resonance, in both directions.
-    shift = NORMAL_FACTOR * (plate.f0_uncertainty or 0.0)
-    ratios = [np.abs(plate.response(frequency / (1 + sign * shift))) / response for sign in (-1, 1)]
-    deviation = max(float(np.abs(ratio - 1).max()) for ratio in ratios)
-    others = {"frequency": high, "f0": plate.f0, "shift": 100 * shift}
-    return deviation <= TOLERANCE, _plate_note("plate_high", 100 * deviation, others)
-
-
-def _check_range(plate: Plate) -> tuple[bool, Note]:
-    full_scale = plate.full_scale or math.nan
-    return full_scale >= RANGE, _plate_note("plate_range", full_scale, {"required": RANGE}, "N")
-
-
-def _check_linearity(plate: Plate) -> tuple[bool | None, Note]:
-    """Check the linearity by the relative deviation from the best line through zero."""
-    applied, indicated = np.array(plate.linearity).T
-    # Relative deviations give small forces as much weight as large ones.
-    slope = float(np.mean(indicated / applied))
-    deviations = np.abs(indicated / (slope * applied) - 1)
-    worst = int(np.argmax(deviations))
-    forces = {"first": applied.min(), "last": applied.max(), "worst": applied[worst]}
-    met = bool(deviations[worst] <= TOLERANCE)
-    is_known = not met or applied.max() >= RANGE
-    return met if is_known else None, _plate_note("plate_linear", 100 * deviations[worst], forces)
-
-
-def instrument_contributions(
+def instrument_uncertainties(
     drops: Sequence[Drop], config: Config, calibration: float | None, bands: BandSet = "octave"
-) -> list[list[Contribution]]:
-    """Return the contributions of the instruments to the uncertainty of levels, dB, by band.
+) -> dict[str, NDArray[np.float64]]:
+    """Return the standard uncertainties of the levels by the instruments, dB, shape (n_band,).
 
-    `calibration` is the relative standard uncertainty of the force.
+    They are by their names; `calibration` is the relative standard uncertainty of the force.
     """
-    size, divisor = {"calibration": calibration or 0.0}, dict.fromkeys(ASSUMED, RECTANGULAR)
-    count = len(get_bands(bands).nominal)
-    changes = {"calibration": np.full(count, AMPLITUDE_DECIBEL * size["calibration"])}
-    changes |= mean_level_changes(drops, _gains(drops, config), bands)
-    return [
-        [
-            Contribution(
-                name, abs(float(values[band])) / divisor.get(name, 1.0),
-                size=size.get(name, math.nan), divisor=divisor.get(name, 1.0),
-            )
-            for name, values in changes.items()
-            if values.any()
-        ]
-        for band in range(count)
-    ]  # fmt: skip
+    gains = {doubt.name: doubt.gain for doubt in find_doubts(drops, config)}
+    changes = mean_level_changes(drops, gains, bands)
+    stated = np.full(len(get_bands(bands).nominal), AMPLITUDE_DECIBEL * (calibration or 0.0))
+    return {CALIBRATION: stated} | {
+        name: np.abs(change) / (RECTANGULAR if name in ASSUMED else 1.0)
+        for name, change in changes.items()
+    }
 
 
 def mean_level_changes(
@@ -188,51 +145,20 @@ def mean_level_changes(
         return {name: 10 * np.log10(values / before) for name, values in after.items()}
 
 
-def with_assumptions(drop: Drop, config: Config) -> Drop:
-    """Return a drop whose peak has the uncertainty due to instruments that are not stated."""
+def peak_uncertainty(drop: Drop, config: Config) -> float:
+    """Return the standard uncertainty of a peak by instruments that are not stated, N."""
     from scipy.fft import next_fast_len
 
-    rate, force = drop.sample_rate, np.pad(drop.contact.gated, 2)
+    rate, force = drop.contact.sample_rate, np.pad(drop.contact.gated, 2)
     length = next_fast_len(2 * len(force), real=True)
     spectrum = np.fft.rfft(force, length)
     frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
     peaks = [
         low_pass(np.fft.irfft(spectrum * gain(frequency), length)[: len(force)], rate).max()
-        for name, gain in _gains([drop], config).items()
+        for name, gain, _ in find_doubts([drop], config)
         if name in ASSUMED
     ]
-    change = math.hypot(*(np.array(peaks) - low_pass(force, rate).max()))
-    return replace(drop, peak_force=drop.peak_force.widened(change / RECTANGULAR))
-
-
-def _gains(drops: Sequence[Drop], config: Config) -> dict[str, Gain]:
-    """Return the gains by which the force in drops may differ from the applied one, by name."""
-    plate, recorder = config.resonance, config.recorder_filter
-    seen = {drop.plate_recorded for drop in drops}
-    gains: dict[str, Gain] = {}
-    if plate:
-        higher = replace(plate, f0=plate.f0 * (1 + (plate.f0_uncertainty or 0.0)))
-        gains["plate"] = lambda f: higher.response(f) / plate.response(f)
-    if recorder:
-        cutoff = recorder.cutoff * (1 + (recorder.cutoff_uncertainty or 0.0))
-        shifted = replace(recorder, cutoff=cutoff)
-        gains["recorder filter"] = lambda f: shifted.response(f) / recorder.response(f)
-    if plate is None:
-        ringing = [(drop.ringing.frequency, drop.ringing.quality) for drop in drops if drop.ringing]
-        # Else a mass on a spring that is TOLERANCE off at the limit of its flat response.
-        flat = (config.plate and config.plate.flat_limit) or FLAT[1]
-        worst = [(flat * math.sqrt(1 + 1 / TOLERANCE), 100.0)]
-        gains[ASSUMED_PLATE] = Plate(*np.median(ringing or worst, axis=0)).response
-    elif False in seen and True not in seen:
-        gains[ASSUMED_PLATE] = plate.response
-    if plate and plate.share is None:
-        # A force that was corrected for the whole share is multiplied by it.
-        smaller = replace(plate, share=MIN_SHARE)
-        gains[ASSUMED_SHARE] = lambda f: plate.response(f) / smaller.response(f)
-    if config.filter is None:
-        cutoff = ASSUMED_CUTOFF * min(map(_effective_rate, drops))
-        gains[ASSUMED_FILTER] = RecorderFilter("bessel", ASSUMED_ORDER, cutoff).response
-    return gains
+    return math.hypot(*(np.array(peaks) - low_pass(force, rate).max())) / RECTANGULAR
 
 
 def _effective_rate(drop: Drop) -> float:
@@ -240,47 +166,30 @@ def _effective_rate(drop: Drop) -> float:
     return min(drop.sample_rate, 4 * CUTOFF_RATIO * drop.contact.noise_bandwidth)
 
 
-def check_assumptions(
-    drops: Sequence[Drop], config: Config, octaves: Sequence[Estimate]
-) -> list[Note]:
-    """Return a warning for each assumption on the instruments that matters.
-
-    `octaves` are the octave levels of the drops with their budgets.
-    """
-    plate, limit = config.resonance, config.plate.flat_limit if config.plate else None
-    seen = {drop.plate_recorded for drop in drops}
-    rings = any(drop.ringing for drop in drops)
-    assumed = {
-        "plate_estimated": (ASSUMED_PLATE, plate is None and rings),
-        "plate_assumed": (ASSUMED_PLATE, plate is None and limit is None and not rings),
-        "share_assumed": (ASSUMED_SHARE, plate is not None and plate.share is None),
-        "filter_assumed": (ASSUMED_FILTER, config.filter is None),
-        "plate_not_recorded": (ASSUMED_PLATE, bool(plate) and True not in seen and False in seen),
-    }
+def check_instruments(drops: Sequence[Drop], config: Config) -> list[Note]:
+    """Return a warning for each assumption on the instruments that matters."""
+    plate, nominal = config.resonance, get_bands("octave").nominal
+    uncertainties = instrument_uncertainties(drops, config, None)
     notes = []
-    for code, (name, is_assumed) in assumed.items():
-        if is_assumed:
-            # Half widths of the contribution, dB, shape (n_octave,).
-            sizes = np.array([
-                sum(part.uncertainty for part in level.contributions if part.name == name)
-                for level in octaves
-            ]) * RECTANGULAR  # fmt: skip
-            band = int(np.nanargmax(sizes))
+    for name, _, code in find_doubts(drops, config):
+        if code:
+            half_widths = RECTANGULAR * uncertainties[name]
+            band = int(np.nanargmax(half_widths))
             others = {
-                "band": float(get_bands("octave").nominal[band]),
+                "band": float(nominal[band]),
                 "percent": 100 * TOLERANCE,
                 "frequency": plate.f0 if plate else FLAT[1],
             }
-            notes.append(Note(code, value=float(sizes[band]), unit="dB", others=others))
+            notes.append(Note(code, value=float(half_widths[band]), unit="dB", others=others))
     slowest = min(drops, key=_effective_rate)
-    if config.filter is None and _effective_rate(slowest) < slowest.sample_rate:
-        bandwidth = _effective_rate(slowest) / (4 * CUTOFF_RATIO)
-        notes.append(Note("noise_ends", value=bandwidth, unit="Hz"))
+    if config.filter is None and _effective_rate(slowest) < slowest.contact.sample_rate:
+        notes.append(Note("noise_ends", value=_effective_rate(slowest) / 4, unit="Hz"))
+    limit = config.plate.flat_limit if config.plate else None
     if limit is not None and limit < FLAT[1]:
         notes.append(Note("plate_not_flat", value=limit, low=FLAT[1], unit="Hz"))
-    if plate is not None and seen == {None}:
-        changes = mean_level_changes(drops, {"plate": plate.response})["plate"]
-        change, others = float(np.nanmax(np.abs(changes))), {"frequency": plate.f0}
+    if plate and {drop.plate_recorded for drop in drops} == {None}:
+        change = np.nanmax(np.abs(mean_level_changes(drops, {"": plate.response})[""]))
         if change > MIN_WARNED:
-            notes.append(Note("plate_unclear", value=change, unit="dB", others=others))
+            others = {"frequency": plate.f0}
+            notes.append(Note("plate_unclear", value=float(change), unit="dB", others=others))
     return notes

@@ -21,9 +21,8 @@ from thud.recordings.background import remove_background
 from thud.recordings.checks import CHECKS
 from thud.recordings.contact import SAMPLE_ERROR, Contact, find_edge
 from thud.recordings.differences import robust_deviation
-from thud.recordings.recorded_levels import measure_levels
-from thud.recordings.repair import min_background
-from thud.recordings.restitution import (
+from thud.recordings.instruments import peak_uncertainty
+from thud.recordings.quantities import (
     BOUNCES,
     GRAVITY,
     IMPULSE,
@@ -31,6 +30,8 @@ from thud.recordings.restitution import (
     RESTITUTION,
     measure_rebound,
 )
+from thud.recordings.recorded_levels import measure_levels
+from thud.recordings.repair import min_background
 from thud.recordings.ringing import find_ringing, is_in_record
 from thud.recordings.stage import Stage
 
@@ -78,9 +79,8 @@ class Drop(Stage):
         Changes of ``"impulse"``, ``"bounces"``, ``"restitution"`` and ``"effective_mass"`` by one
         standard uncertainty of what all drops share, such as ``"calibration"``, by its name; the
         uncertainties above exclude them.
-    bounces : tuple of float
-        Times at which the measured bounces begin, s since first touch: one bounce if the drop
-        height is known, else up to two.
+    bounce : float or None
+        Time at which the first bounce begins, s since first touch; None if it is not recorded.
     notes : tuple of Note
         Processing of the signal, and possible faults.
     ringing : Ringing or None
@@ -100,7 +100,7 @@ class Drop(Stage):
     effective_mass: Estimate
     restitutions: dict[str, Estimate] = field(default_factory=dict)
     shared_effects: dict[str, dict[str, float]] = field(default_factory=dict)
-    bounces: tuple[float, ...] = ()
+    bounce: float | None = None
     notes: tuple[Note, ...] = ()
     ringing: Ringing | None = None
     plate_recorded: bool | None = None
@@ -137,13 +137,12 @@ class Drop(Stage):
         force = np.concatenate([self.force[:first], self.force[stop:]])
         return robust_deviation(force - np.median(force))
 
-    def levels(self, bands: BandSet = "octave", method: str = "exact") -> NDArray[np.float64]:
+    def levels(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
 
-        The arguments are those of `thud.recordings.recorded_levels.measure_levels`, which has their
-        uncertainties too.
+        Their uncertainties are in `thud.recordings.recorded_levels.measure_levels`.
         """
-        return np.array(measure_levels([self], bands, method).level[0])
+        return np.array(measure_levels([self], bands).level[0])
 
 
 def measure_drop(
@@ -160,7 +159,7 @@ def measure_drop(
     `calibration` is the relative standard uncertainty of the force. Raise InputError if the contact
     cannot be distinguished from the noise.
     """
-    contact_time = _between(contact.begin, contact.end)
+    contact_time = contact.end - contact.begin
     if not contact_time.value > MIN_CONTACT_RATIO * contact_time.uncertainty:
         refuse(
             f"{section.name}: the contact cannot be distinguished from the noise: "
@@ -183,70 +182,63 @@ def measure_drop(
     variance = contact.covariance_of(ones)[0, 0]
     impulse = Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
     peak_force = _peak(contact)
-    # The first flight gives the restitution; without the height two flights are compared.
-    landings = _landings(section, contact, 1 if config.height else 2)
-    if config.height and landings:
+    landing = _first_landing(section, contact)
+    if landing and config.height:
         # The force of a bounce follows its velocity, and so does the flight before it.
-        flight = _between(contact.release, landings[0][0]).value
-        bounce = section.bounces[0]
-        peak = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
-        ratio = peak / contact.background.peak
-        expected = GRAVITY * flight / (2 * math.sqrt(2 * GRAVITY * config.height))
+        flight, bounce = landing - contact.release, section.bounces[0]
+        ratio = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
+        ratio /= contact.background.peak
+        expected = GRAVITY * flight.value / (2 * math.sqrt(2 * GRAVITY * config.height))
         if not ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
-            landings, others = [], {"ratio": ratio, "height": config.height}
-            notes.append(Note("no_bounce", value=1e3 * flight, unit="ms", others=others))
-    ends = [contact.release, *(end for _, end in landings)]
-    flights = [_between(end, begin) for end, (begin, _) in zip(ends, landings, strict=False)]
+            others = {"ratio": ratio, "height": config.height}
+            notes.append(Note("no_bounce", value=1e3 * flight.value, unit="ms", others=others))
+            landing = None
     estimates, shared = measure_rebound(
-        impulse, _between(contact.touch, contact.release), flights[0] if flights else None, config,
-        calibration, contact.quantization_impulse,
+        impulse, contact.release - contact.touch, landing - contact.release if landing else None,
+        config, calibration, contact.quantization_impulse,
     )  # fmt: skip
     notes += (note for entry in CHECKS["contact"] for note in entry.check(section, contact))
-    if len(flights) > 1:
-        ratio = flights[1].value / flights[0].value
-        notes.append(Note("restitution_second", value=ratio))
     ringing, plate = find_ringing(contact, section.chain), config.resonance
     if ringing:
         notes.append(ringing.note)
         if not ringing.corrected:
             # A resonance spreads an edge over a quarter of its period.
             contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
-    return Drop(
+    drop = Drop(
         name=section.name,
         onset=(section.start + contact.start) / section.sample_rate + contact.touch.value,
         contact=contact,
         contact_time=contact_time,
-        restitution=estimates.get(RESTITUTION, Estimate.unknown()),
+        restitution=estimates[RESTITUTION],
         peak_force=peak_force,
         impulse=impulse,
-        effective_mass=estimates.get(MASS, Estimate.unknown()),
-        restitutions={name: estimates[name] for name in (IMPULSE, BOUNCES) if name in estimates},
+        effective_mass=estimates[MASS],
+        restitutions={
+            name: estimates[name]
+            for name in (IMPULSE, BOUNCES)
+            if math.isfinite(estimates[name].value)
+        },
         shared_effects=shared,
-        bounces=tuple(begin.value - contact.touch.value for begin, _ in landings),
+        bounce=landing.value - contact.touch.value if landing else None,
         notes=about(section.name, notes),
         ringing=ringing,
         plate_recorded=is_in_record(recorded, contact, plate) if recorded and plate else None,
     )
+    return replace(drop, peak_force=peak_force.widened(peak_uncertainty(drop, config)))
 
 
-def _between(start: Estimate, end: Estimate) -> Estimate:
-    return Estimate(end.value - start.value, math.hypot(end.uncertainty, start.uncertainty))
-
-
-def _landings(section: Section, contact: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
-    """Return first touch and release of each of the first bounces, in the time of a contact, s."""
-    landings = []
-    for bounce in section.bounces[:count]:
-        first, stop = bounce.contact
-        minimum = min_background(bounce.sample_rate)
-        if first < minimum or len(bounce.force) - stop < minimum:
-            break
-        force, background = remove_background(bounce, contact.background)
-        edges = (find_edge(bounce, force, background, side)[0] for side in (1, -1))
-        delay = (bounce.start - section.start - contact.start) / section.sample_rate
-        touch, release = (replace(edge, value=delay + edge.value) for edge in edges)
-        landings.append((touch, release))
-    return landings
+def _first_landing(section: Section, contact: Contact) -> Estimate | None:
+    """Return the first touch of the first bounce, in the time of a contact, s; None if unknown."""
+    if not section.bounces:
+        return None
+    bounce = section.bounces[0]
+    first, stop = bounce.contact
+    if min(first, len(bounce.force) - stop) < min_background(bounce.sample_rate):
+        return None
+    force, background = remove_background(bounce, contact.background)
+    touch = find_edge(bounce, force, background, side=1)[0]
+    delay = (bounce.start - section.start - contact.start) / section.sample_rate
+    return replace(touch, value=delay + touch.value)
 
 
 def _peak(contact: Contact) -> Estimate:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,18 +21,16 @@ from thud.recordings.checks import copies
 from thud.recordings.config import Config, read_config
 from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, choose, cut_section, find_drops, require_chosen
-from thud.recordings.instruments import with_assumptions
 from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
 from thud.recordings.signal import Signal, common_uncertainty
 from thud.recordings.signal_files import open_signals
-from thud.recordings.signs import orient
 from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from thud.recordings.force_units import Calibration
 
@@ -75,7 +73,6 @@ def measure_stages(section: Section, config: Config, calibration: float | None =
         allowed = "a background of noise, drift and hum"
         refuse(f"{section.name}: the background is not noise", allowed, error)
     drop = measure_drop(corrected, contact, config, calibration, repaired)
-    drop = with_assumptions(drop, config)
     # A copy without the cached factors of the background, which are no longer needed.
     contact = replace(contact, background=replace(contact.background))
     return Stages(section, repaired, corrected, replace(drop, contact=contact))
@@ -120,28 +117,29 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     if not isinstance(config, Config):
         config = Config() if config is None else read_config(config)
     config = config.updated(height=height, mass=mass, calibration=calibration)
+    items = [paths] if isinstance(paths, str | os.PathLike | Signal) else paths
+    require_kind("paths", items, Iterable)
     begin, end = config.begin or 0.0, config.end or math.inf
     origins: list[Origin] = []
-    measured: list[tuple[Drop, ...]] = []
+    measured: list[list[Drop]] = []
     uncertainties: list[float | None] = []
     stages: Stages | None = None
     count = 0
     # BLAS threads slow down the many small matrix products.
     with threadpool_limits(1, "blas"):
-        for signal in _open(paths, config):
-            found, ignored = find_drops(signal, begin, end, progress=progress)
-            chosen, left_out = choose(found, count + 1, signal.sample_rate, config)
-            count += len(found)
+        for signal in chain.from_iterable(open_signals(item, config) for item in items):
+            pulses, ignored = find_drops(signal, begin, end, progress=progress)
+            chosen, left_out = choose(pulses, count + 1, signal.sample_rate, config)
+            count += len(pulses)
             stated = config.calibration_uncertainty
             uncertainties.append(signal.calibration_uncertainty if stated is None else stated)
-            drops = []
+            measured.append([])
             for pulse in tqdm(
                 chosen, unit="drop", desc=signal.name, disable=not progress, leave=False
             ):
                 shown = measure_stages(cut_section(signal, pulse), config, uncertainties[-1])
                 stages = stages or shown
-                drops.append(shown.drop)
-            measured.append(tuple(drops))
+                measured[-1].append(shown.drop)
             notes = [*ignored, *left_out]
             length = signal.n_sample / signal.sample_rate
             if begin > 0 or end < length:
@@ -149,28 +147,13 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
                 notes.insert(0, note)
             origins.append(Origin(
                 signal.name, signal.path, signal.checksum, signal.date, signal.calibration,
-                signal.sample_rate, (*signal.notes, *about(signal.name, notes)), len(drops),
+                signal.sample_rate, (*signal.notes, *about(signal.name, notes)), len(measured[-1]),
             ))  # fmt: skip
     if not origins:
         refuse("there are no recordings", "one file or more")
-    require_chosen(count, sum(map(len, measured)), config)
+    drops = tuple(chain.from_iterable(measured))
+    require_chosen(count, len(drops), config)
     copies.check(origins, measured)
-    return Recording(
-        Path(origins[0].path or origins[0].name).stem,
-        tuple(itertools.chain.from_iterable(measured)),
-        tuple(origins),
-        config,
-        common_uncertainty(uncertainties),
-        stages,
-    )
-
-
-def _open(paths: Source | Iterable[Source], config: Config) -> Iterator[Signal]:
-    """Yield the signals of files, and signals themselves, whose peaks are checked."""
-    items = [paths] if isinstance(paths, str | os.PathLike | Signal) else paths
-    require_kind("paths", items, Iterable)
-    for item in items:
-        if not isinstance(item, Signal):
-            yield from open_signals(item, config)
-        else:
-            yield item if item.path else orient(item, "positive")
+    name = Path(origins[0].path or origins[0].name).stem
+    uncertainty = common_uncertainty(uncertainties)
+    return Recording(name, drops, tuple(origins), config, uncertainty, stages)

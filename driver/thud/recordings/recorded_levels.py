@@ -1,4 +1,4 @@
-"""Force exposure levels of recorded drops: background, uncertainty, average and outliers."""
+"""Force exposure levels of recorded drops, and their mean with its uncertainty budget."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import next_fast_len
 
-from thud.base.checks import require_choice
 from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Contribution, Estimate
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.contact import band_noise
 from thud.recordings.filters import filter_levels
+from thud.recordings.instruments import AMPLITUDE_DECIBEL, ASSUMED, CALIBRATION
 from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from thud.base.note import Note
     from thud.recordings.measured_drop import Drop
 
-METHODS = ("exact", "fft", "filter")
 # Levels above background, dB: below the first value a level is an upper bound, below the second the
 # standards require the correction (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
@@ -36,9 +35,6 @@ ENERGY_DECIBEL = 10 / math.log(10)
 # Length of a mean force in gates, and number of times that it is scaled to its levels: they then
 # differ by less than 0.01 dB.
 PADDING, N_SCALING = 4, 5
-# Contributions that drops share: half widths of rectangular distributions.
-METHOD = "method"
-DIVISORS = {METHOD: RECTANGULAR}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +45,8 @@ class DropLevels(Stage):
     ----------
     names : tuple of str, shape (n_drop,)
         Names of the drops.
-    bands, method : str
-        ``"octave"`` or ``"third"``, and method of measurement.
+    bands : str
+        ``"octave"`` or ``"third"``.
     level : ndarray, shape (n_drop, n_band)
         Force exposure levels, dB, corrected for the background.
     measured, background : ndarray, shape (n_drop, n_band)
@@ -60,13 +56,11 @@ class DropLevels(Stage):
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_drop, n_band)
-        Standard uncertainties, dB, by noise, method, and quantization if the background lies within
-        a step.
+        Standard uncertainties, dB, by noise and quantization.
     """
 
     names: tuple[str, ...]
     bands: BandSet
-    method: str
     level: NDArray[np.float64]
     measured: NDArray[np.float64]
     background: NDArray[np.float64]
@@ -109,91 +103,72 @@ class AverageLevels(Immutable):
     outliers: tuple[Note, ...]
 
 
-def measure_levels(
-    drops: Sequence[Drop], bands: BandSet = "octave", method: str = "exact"
-) -> DropLevels:
+def measure_levels(drops: Sequence[Drop], bands: BandSet = "octave") -> DropLevels:
     """Return the levels of drops, corrected for the background, with their uncertainty.
 
-    The force is set to zero outside the gate of each drop. ``"exact"`` is its band energy,
-    ``"fft"`` the sum over the 1 Hz bins of a window of 1 s, ``"filter"`` the energy after filters
-    of class 1. The expected energy of the noise is subtracted. Raise InputError if method or bands
-    are unknown.
+    They are the band energies of the force within the gate of each drop, less the expected energy
+    of the noise. Raise InputError if the bands are unknown.
     """
-    require_choice("method", method, METHODS)
     # Shape (3, n_drop, n_band).
     expected, deviation, quantized = np.moveaxis(band_noise(drops, get_bands(bands)), 2, 0)
-    exact = _levels(drops, bands, "exact")
-    measured = exact if method == "exact" else _levels(drops, bands, method)
+    contacts = [drop.contact for drop in drops]
+    measured = np.array([
+        force_exposure_levels(contact.gated, contact.sample_rate, bands) for contact in contacts
+    ])  # fmt: skip
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(expected)
-    level, flag = _corrected(measured, background)
+    level, flag = corrected(measured, background)
     contributions = {
         NOISE: ENERGY_DECIBEL * deviation / 10 ** (level / 10),
-        METHOD: np.abs(measured - exact) / RECTANGULAR,
+        "quantization": ENERGY_DECIBEL * quantized / 10 ** (level / 10),
     }
-    if quantized.any():
-        contributions["quantization"] = ENERGY_DECIBEL * quantized / 10 ** (level / 10)
     names = tuple(drop.name for drop in drops)
-    return DropLevels(names, bands, method, level, measured, background, flag, contributions)
-
-
-def compare_methods(
-    drops: Sequence[Drop], bands: BandSet = "octave"
-) -> dict[str, NDArray[np.float64]]:
-    """Return the levels of drops by each method, background included, dB, [n_drop, n_band]."""
-    return {method: _levels(drops, bands, method) for method in METHODS}
-
-
-def _levels(drops: Sequence[Drop], bands: BandSet, method: str) -> NDArray[np.float64]:
-    """Return levels by a method, dB, [n_drop, n_band]; NaN if a rate is too low for a band."""
-    contacts = [drop.contact for drop in drops]
-    return np.array([
-        filter_levels(contact.gated, contact.sample_rate, bands) if method == "filter"
-        else force_exposure_levels(
-            contact.gated, contact.sample_rate, bands, "fft" if method == "fft" else "exact"
-        )
-        for contact in contacts
-    ])  # fmt: skip
+    return DropLevels(names, bands, level, measured, background, flag, contributions)
 
 
 def average_levels(
     drops: DropLevels,
-    shared: Sequence[Sequence[Contribution]] = (),
-    not_stated: Sequence[str] = (),
+    instruments: Mapping[str, NDArray[np.float64]] | None = None,
+    not_stated: tuple[str, ...] = (),
 ) -> AverageLevels:
     """Return the energy average of the levels of drops, its budget, and outliers.
 
-    `shared` are contributions that all drops share, dB, by band; `not_stated` are uncertainties
-    that are not stated.
+    `instruments` are the standard uncertainties of `instrument_uncertainties`, and `not_stated` the
+    contributions whose size is not stated.
     """
-    count, energies = len(drops.names), 10 ** (drops.measured / 10)
+    energy = np.mean(10 ** (drops.measured / 10), axis=0)
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(np.mean(10 ** (drops.background / 10), axis=0))
-    level, flag = _corrected(10 * np.log10(energies.mean(axis=0)), background)
-    weights = 10 ** (drops.level / 10)
-    weights /= weights.sum(axis=0)
-    noise = np.sqrt(((weights * drops.contributions[NOISE]) ** 2).sum(axis=0))
-    common = {
-        name: (weights * values).sum(axis=0)
+    level, flag = corrected(10 * np.log10(energy), background)
+    # Energies relative to the mean: a drop adds to its uncertainty as much as to its energy.
+    relative = 10 ** ((drops.level - level) / 10)
+    samples = ENERGY_DECIBEL * 10 ** ((drops.measured - level) / 10)
+    noises = relative * drops.contributions[NOISE]
+    causes = {
+        name: (relative * values).mean(axis=0)
         for name, values in drops.contributions.items()
-        if name != NOISE and values.any()
+        if name != NOISE
     }
-    spread = scatter = np.full(level.shape, np.nan)
-    if count > 1:
-        spread = drops.level.std(axis=0, ddof=1)
-        scatter = energies.std(axis=0, ddof=1) / math.sqrt(count)
-        scatter = scatter * ENERGY_DECIBEL / 10 ** (level / 10)
+    causes |= instruments or {}
+    causes = {name: values for name, values in causes.items() if values.any()}
     estimates = tuple(
-        Estimate.of_mean(
-            float(level[band]), float(noise[band]), float(scatter[band]), count,
+        Estimate.of_drops(
+            float(level[band]), samples[:, band], noises[:, band],
             [
-                Contribution(name, float(values[band]), divisor=DIVISORS.get(name, 1.0))
-                for name, values in common.items()
-            ] + list(shared[band] if shared else ()),
-            upper_bound=flag[band] == "background", not_stated=tuple(not_stated),
+                Contribution(
+                    name, float(values[band]),
+                    size=values[band] / AMPLITUDE_DECIBEL if name == CALIBRATION else math.nan,
+                    divisor=RECTANGULAR if name in ASSUMED else 1.0,
+                )
+                for name, values in causes.items()
+            ],
+            upper_bound=flag[band] == "background", not_stated=not_stated,
         )
         for band in range(len(level))
     )  # fmt: skip
+    spread = np.full(level.shape, np.nan)
+    if len(drops.names) > 1:
+        spread = drops.level.std(axis=0, ddof=1)
     # At 5 % for all bands together (Bonferroni).
     nominal = get_bands(drops.bands).nominal
     outliers = tuple(
@@ -208,12 +183,26 @@ def average_levels(
     return AverageLevels(drops, level, background, flag, spread, estimates, outliers)
 
 
+def compare_methods(drops: Sequence[Drop]) -> dict[str, NDArray[np.float64]]:
+    """Return octave levels of drops by each method, with background, dB, shape (n_drop, 5).
+
+    ``"exact"`` is the band energy of the force in the gate, ``"fft"`` the sum over the 1 Hz bins of
+    a window of 1 s, ``"filter"`` the energy after filters of class 1; NaN if the rate is too low.
+    """
+    forces = [(drop.contact.gated, drop.contact.sample_rate) for drop in drops]
+    return {
+        "exact": np.array([force_exposure_levels(*force) for force in forces]),
+        "fft": np.array([force_exposure_levels(*force, method="fft") for force in forces]),
+        "filter": np.array([filter_levels(*force, "octave") for force in forces]),
+    }
+
+
 def mean_force(drop: Drop, level: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the force of a drop, scaled to a level in each one-third-octave band, N, shape (n,).
 
     The levels are in dB, shape (n_band,); a NaN changes nothing.
     """
-    force, rate, bands = drop.contact.gated, drop.sample_rate, get_bands("third")
+    force, rate, bands = drop.contact.gated, drop.contact.sample_rate, get_bands("third")
     count = next_fast_len(PADDING * len(force), real=True)
     frequency = np.fft.rfftfreq(count, 1 / rate)
     below, band = frequency < bands.upper[-1], np.searchsorted(bands.upper, frequency)
@@ -225,7 +214,7 @@ def mean_force(drop: Drop, level: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(force)
 
 
-def _corrected(
+def corrected(
     measured: NDArray[np.float64], background: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
     """Return levels corrected for the background, and flags.

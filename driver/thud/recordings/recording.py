@@ -9,20 +9,23 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
+from thud.base.checks import require_choice
 from thud.base.extras import data_frame
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import ImpactOrRecording, assess_levels
-from thud.recordings.budgets import check_restitution, drop_estimates, find_deviant
+from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config
-from thud.recordings.instruments import (
-    check_assumptions,
-    check_plate,
-    instrument_contributions,
-)
+from thud.recordings.instruments import CALIBRATION, check_instruments, instrument_uncertainties
 from thud.recordings.measured_drop import ESTIMATES
+from thud.recordings.quantities import (
+    GRAVITY,
+    IMPULSE,
+    check_estimates,
+    drop_estimates,
+    find_deviant,
+)
 from thud.recordings.recorded_levels import average_levels, mean_force, measure_levels
-from thud.recordings.restitution import GRAVITY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,6 +40,10 @@ if TYPE_CHECKING:
     from thud.recordings.measured_drop import Drop
     from thud.recordings.read_recording import Stages
     from thud.recordings.recorded_levels import AverageLevels
+
+
+# Quantities besides the levels that are assessed.
+ASSESSED = ("contact_time", "restitution", "peaks", "mass", "drop_height")
 
 
 @dataclass(frozen=True)
@@ -54,10 +61,6 @@ class Origin:
     sample_rate: float
     notes: tuple[Note, ...]
     drops: int
-
-
-# Uncertainties of levels that a laboratory may not have stated.
-LEVEL_CAUSES = ("calibration", "resonance of the plate", "cutoff of the filter")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +101,7 @@ class Recording(ImpactOrRecording):
     config: Config = field(default_factory=Config)
     calibration_uncertainty: float | None = None
     stages: Stages | None = field(default=None, repr=False, compare=False)
-    _averages: dict[tuple[str, str], AverageLevels] = field(
-        default_factory=dict, init=False, repr=False
-    )
+    _averages: dict[BandSet, AverageLevels] = field(default_factory=dict, init=False, repr=False)
 
     def __repr__(self) -> str:
         """Return the main numbers of the recording, without its samples."""
@@ -172,37 +173,40 @@ class Recording(ImpactOrRecording):
     @cached_property
     def own_notes(self) -> tuple[Note, ...]:
         """Possible faults of the recording as a whole, and its outliers."""
-        config, known = self.config, [d for d in self.drops if math.isfinite(d.restitution.value)]
-        notes: list[Note] = []
-        if math.isnan(self.estimates["peaks"].value):
-            notes.append(Note("peaks_unknown"))
-        if 0 < len(known) < len(self.drops):
-            code, high = "restitution_partly_known", len(self.drops)
-            notes.append(Note(code, value=len(known), high=high))
-        notes += check_restitution(self.drops, config, self.calibration_uncertainty)
-        if config.mass is None and math.isfinite(self.estimates["mass"].value):
-            notes.append(Note("effective_mass"))
-        notes += (check.note for check in check_plate(config.plate) if check.met is False)
-        notes += config.check_dates(origin.date for origin in self.origins)
-        notes += check_assumptions(self.drops, config, self.level_estimates())
-        if self.not_stated:
-            names = {"names": ", ".join(self.not_stated)}
-            notes.append(Note("uncertainty_not_stated", others=names))
+        config = self.config
+        notes = [
+            *check_estimates(self.drops, self.estimates, config),
+            *(check.note for check in check_plate(config.plate) if check.met is False),
+            *config.check_dates(origin.date for origin in self.origins),
+            *check_instruments(self.drops, config),
+        ]
+        lacking = dict.fromkeys(name for names in self.not_stated.values() for name in names)
+        if lacking:
+            notes.append(Note("uncertainty_not_stated", others={"names": ", ".join(lacking)}))
         return (*notes, *self.outliers)
 
     @property
-    def not_stated(self) -> tuple[str, ...]:
-        """What has an uncertainty that is not stated: what it affects is undecided."""
-        config = self.config
-        plate, stated = config.resonance, config.recorder_filter
-        missing = {
-            "calibration": self.calibration_uncertainty is None,
-            "resonance of the plate": plate is not None and not plate.f0_uncertainty,
-            "cutoff of the filter": stated is not None and not stated.cutoff_uncertainty,
-            "mass": config.mass is not None and config.mass_uncertainty is None,
-            "drop height": config.height is not None and config.height_uncertainty is None,
+    def not_stated(self) -> dict[str, tuple[str, ...]]:
+        """Contributions that are not stated, by the quantity that they leave undecided."""
+        config, plate, recorder = self.config, self.config.resonance, self.config.recorder_filter
+        is_stated = {
+            CALIBRATION: self.calibration_uncertainty is not None,
+            "resonance of the plate": plate is None or bool(plate.f0_uncertainty),
+            "cutoff of the filter": recorder is None or bool(recorder.cutoff_uncertainty),
+            "mass": config.mass is None or config.mass_uncertainty is not None,
+            "drop height": config.height is None or config.height_uncertainty is not None,
         }
-        return tuple(name for name in missing if missing[name])
+        by_impulse = any(IMPULSE in drop.restitutions for drop in self.drops)
+        affecting = {
+            "levels": (CALIBRATION, "resonance of the plate", "cutoff of the filter"),
+            "mass": ("mass",) if config.mass else (CALIBRATION, "drop height"),
+            "restitution": (*((CALIBRATION, "mass") if by_impulse else ()), "drop height"),
+            "drop_height": ("drop height",),
+        }
+        return {
+            quantity: tuple(name for name in names if not is_stated[name])
+            for quantity, names in affecting.items()
+        }
 
     def quantity(self, name: str) -> float:
         """Return a quantity, SI units, by its name, such as ``"contact_time"``; NaN if none."""
@@ -225,28 +229,30 @@ class Recording(ImpactOrRecording):
         """Return the mean maximum force, N."""
         return self.peak_force
 
-    def average(self, bands: BandSet = "octave", method: str = "exact") -> AverageLevels:
-        """Return the energy average of the levels by ``"exact"``, ``"fft"`` or ``"filter"``.
-
-        Its budget includes calibration and instruments.
-        """
-        if (bands, method) not in self._averages:
-            levels = measure_levels(self.drops, bands, method)
-            shared = instrument_contributions(
-                self.drops, self.config, self.calibration_uncertainty, bands
+    def average(self, bands: BandSet = "octave") -> AverageLevels:
+        """Return the energy average of the levels, whose budget includes the instruments."""
+        if bands not in self._averages:
+            self._averages[bands] = average_levels(
+                measure_levels(self.drops, bands),
+                instrument_uncertainties(
+                    self.drops, self.config, self.calibration_uncertainty, bands
+                ),
+                self.not_stated["levels"],
             )
-            lacking = [name for name in self.not_stated if name in LEVEL_CAUSES]
-            self._averages[bands, method] = average_levels(levels, shared, lacking)
-        return self._averages[bands, method]
+        return self._averages[bands]
 
     def levels(
         self,
         bands: BandSet = "octave",
-        method: str | None = None,
+        method: LevelsMethod | None = None,
         force: LevelsForce | None = None,  # noqa: ARG002 - as for impacts
     ) -> NDArray[np.float64]:
-        """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
-        return self.average(bands, method or self.level_method).level.copy()
+        """Return the force exposure levels, energy average of the drops, dB, shape (n_band,).
+
+        Raise InputError if the method is not ``"exact"``, the only one for recordings.
+        """
+        require_choice("method", method or self.level_method, [self.level_method])
+        return self.average(bands).level.copy()
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
@@ -277,7 +283,7 @@ class Recording(ImpactOrRecording):
             self.level_estimates(),
             source=source or self.config.source,
             limits=self.config.limits,
-            **self.estimates,
+            **{name: self.estimates[name] for name in ASSESSED},
         )
 
     def plot(self, kind: Literal["levels", "force"] = "levels") -> Figure:

@@ -34,13 +34,15 @@ MAX_SUM_DEVIATION = 0.1
 AXIS = re.compile(r"(?:^|[^a-z])f?(?P<axis>[xyz])\d*$")
 
 
-def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> list[Signal]:
+def open_signals(
+    path: str | os.PathLike[str] | Signal, config: Config | None = None
+) -> list[Signal]:
     """Open a recording; see docs/recordings_reading.md for the formats.
 
     Parameters
     ----------
     path
-        File; its content determines the format.
+        File, whose content determines the format, or a signal, of which peak and sign are checked.
     config
         What is stated on the file by `channel` or `channels`, `unit`, `calibration`, `polarity`
         and `sample_rate`.
@@ -56,6 +58,8 @@ def open_signals(path: str | os.PathLike[str], config: Config | None = None) -> 
         If the file is missing, damaged, too large or of unknown format, if channel, unit, rate,
         calibration or sign are unknown, or if the force is implausible.
     """
+    if isinstance(path, Signal):
+        return [path if path.path else orient(path, "positive")]
     config = config or Config()
     file = regular_file(path)
     channels = read_channels(file)

@@ -12,7 +12,7 @@ from thud.base.bridge import version
 from thud.level.assessment import get_criteria
 from thud.level.estimate import CONFIDENCE, NOISE, REPEATABILITY
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.recordings.instruments import check_plate
+from thud.recordings.checks.plate import check_plate
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import compare_methods
 from thud.recordings.words import read_date
@@ -226,7 +226,7 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     columns = ("background", "spread", "flag")
     return {
         "band": get_bands(bands).nominal.tolist(),
-        "method": average.drops.method,
+        "method": recording.level_method,
         "level": average.level.tolist(),
         "uncertainty": [estimate.uncertainty for estimate in average.estimates],
         "expanded_uncertainty": [estimate.expanded for estimate in average.estimates],
@@ -242,7 +242,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         **{name: _estimate(getattr(drop, name)) for name in ESTIMATES},
         "restitution_method": " and ".join(drop.restitutions),
         "restitutions": {method: _estimate(value) for method, value in drop.restitutions.items()},
-        "bounces": list(drop.bounces),
+        "bounce": drop.bounce,
         "noise": drop.noise,
         "notes": [_note(note) for note in drop.notes],
     }

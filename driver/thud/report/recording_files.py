@@ -12,7 +12,7 @@ from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
 from thud.base.tables import csv_text, marked
-from thud.level.estimate import Estimate
+from thud.level.estimate import UNKNOWN, Estimate
 from thud.level.levels import get_bands
 from thud.report import write
 from thud.report.contents import report_data
@@ -47,13 +47,12 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
     restitutions = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
     head = ("drop", "at, s", "contact, ms (± u)", *restitutions, "peak, N")
     rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
-    unknown = Estimate.unknown()
     rows += [
         (
             drop.name,
             f"{drop.onset:.3f}",
             _with_u(drop.contact_time, 1e-3, 2),
-            *(_with_u(drop.restitutions.get(m, unknown), 1.0, 3) for m in methods or [""]),
+            *(_with_u(drop.restitutions.get(m, UNKNOWN), 1.0, 3) for m in methods or [""]),
             f"{drop.peak_force.value:.0f}",
             *(f"{level:z.2f}" for level in levels[i]),
         )

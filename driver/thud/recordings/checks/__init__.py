@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.recordings import quantization, signs
-from thud.recordings.checks import aliasing, cells, clipping, copies, gaps, jumps, outliers
+from thud.recordings.checks import aliasing, cells, clipping, copies, gaps, jumps, outliers, plate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -50,6 +50,8 @@ CHECKS = {
               "one of four cells 2.5 dB"),
         Check(copies.check, "the same drop twice, and load cells that are averaged",
               "a scatter of zero, and for four cells 12 dB"),
+        Check(plate.check_plate, "a force plate that the standard does not allow",
+              "a resonance of 1.6 kHz that is not corrected 1.9 dB at 708 Hz"),
         Check(outliers.find_outliers, "drops that differ from the others by more than chance",
               "they are marked, not left out"),
     ),
