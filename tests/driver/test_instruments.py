@@ -272,3 +272,9 @@ def test_peak_has_the_uncertainty_of_instruments_that_are_not_stated() -> None:
     # flanks excite the resonance.
     change = 1500 * 0.02 * (25 / 200) ** 2 / np.sqrt(3)
     assert change < np.sqrt(doubted**2 - known**2) < 2 * change
+
+
+def test_noise_of_the_examples_ends_at_half_the_rate() -> None:
+    # With hum, drift and a plate that rings.
+    found = thud.read_recording(f"inputs/recordings/drop_{i}.csv" for i in (1, 2, 3))
+    assert "noise_ends" not in codes(found.notes)

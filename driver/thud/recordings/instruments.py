@@ -40,9 +40,6 @@ ASSUMED_CUTOFF = 0.25
 AMPLITUDE_DECIBEL = 20 / math.log(10)
 # Effect on an octave above which a correction that the record does not confirm is a warning, dB.
 MIN_WARNED = 0.1
-# Cutoff of a filter over the equivalent bandwidth of its noise: 0.89 of a mean, 0.96 of a Bessel
-# filter of order 4. White noise up to half the rate has more than a quarter of the rate.
-CUTOFF_RATIO = 0.9
 # Length of the spectrum of a pulse, in lengths of the pulse: the lowest band holds three lines.
 PADDING = 16
 # Contributions to the uncertainty; those of instruments that are not stated are half the width of
@@ -97,7 +94,7 @@ def find_doubts(drops: Sequence[Drop], config: Config) -> list[Doubt]:
         gain = lambda f: plate.response(f) / smaller.response(f)  # noqa: E731
         doubts.append(Doubt(ASSUMED_SHARE, gain, "share_assumed"))
     if config.filter is None:
-        cutoff = ASSUMED_CUTOFF * min(map(_effective_rate, drops))
+        cutoff = ASSUMED_CUTOFF * min(drop.effective_rate for drop in drops)
         gain = RecorderFilter("bessel", ASSUMED_ORDER, cutoff).response
         doubts.append(Doubt(ASSUMED_FILTER, gain, "filter_assumed"))
     return doubts
@@ -161,11 +158,6 @@ def peak_uncertainty(drop: Drop, config: Config) -> float:
     return math.hypot(*(np.array(peaks) - low_pass(force, rate).max())) / RECTANGULAR
 
 
-def _effective_rate(drop: Drop) -> float:
-    """Return the sample rate, Hz, or the one that the noise of the background would have."""
-    return min(drop.sample_rate, 4 * CUTOFF_RATIO * drop.contact.noise_bandwidth)
-
-
 def check_instruments(drops: Sequence[Drop], config: Config) -> list[Note]:
     """Return a warning for each assumption on the instruments that matters."""
     plate, nominal = config.resonance, get_bands("octave").nominal
@@ -181,9 +173,9 @@ def check_instruments(drops: Sequence[Drop], config: Config) -> list[Note]:
                 "frequency": plate.f0 if plate else FLAT[1],
             }
             notes.append(Note(code, value=float(half_widths[band]), unit="dB", others=others))
-    slowest = min(drops, key=_effective_rate)
-    if config.filter is None and _effective_rate(slowest) < slowest.contact.sample_rate:
-        notes.append(Note("noise_ends", value=_effective_rate(slowest) / 4, unit="Hz"))
+    rate, nominal_rate = min((drop.effective_rate, drop.contact.sample_rate) for drop in drops)
+    if config.filter is None and rate < nominal_rate:
+        notes.append(Note("noise_ends", value=rate / 4, unit="Hz"))
     limit = config.plate.flat_limit if config.plate else None
     if limit is not None and limit < FLAT[1]:
         notes.append(Note("plate_not_flat", value=limit, low=FLAT[1], unit="Hz"))

@@ -55,6 +55,9 @@ MIN_CONTACT_RATIO = 4.0
 # Maximum factor between the restitution by flight and the ratio of the peaks. Beyond it a pulse is
 # no bounce, because the force follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
+# Cutoff of a filter over the equivalent bandwidth of its noise: 0.89 of a mean, 0.96 of a Bessel
+# filter of order 4. White noise up to half the rate has more than a quarter of the rate.
+CUTOFF_RATIO = 0.9
 # Quantities of `QUANTITIES` that are estimated for each drop.
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
@@ -136,6 +139,11 @@ class Drop(Stage):
         first, stop = self.gate
         force = np.concatenate([self.force[:first], self.force[stop:]])
         return robust_deviation(force - np.median(force))
+
+    @property
+    def effective_rate(self) -> float:
+        """Sample rate, Hz, or the lower one that the noise of the background would have."""
+        return min(self.sample_rate, 4 * CUTOFF_RATIO * self.contact.noise_bandwidth)
 
     def levels(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
