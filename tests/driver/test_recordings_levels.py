@@ -19,12 +19,12 @@ import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
 from thud.recordings.background import Background, cell_means, uniform_cells
+from thud.recordings.checks import outliers
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
 from thud.recordings.instruments import instrument_uncertainties
-from thud.recordings.quantities import find_deviant
 from thud.recordings.recorded_levels import (
     AverageLevels,
     DropLevels,
@@ -36,6 +36,9 @@ from thud.recordings.response import Chain, Plate, correct_force
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from thud.base.note import Note
+    from thud.recordings.measured_drop import Drop
 
 # Half-sine of 1500 N and 20 ms: closed form of the band energies, dB.
 HALF_SINE = [38.3125, 30.6046, 19.2578, 8.9323, -0.4390]
@@ -261,15 +264,14 @@ def uncertainty(average: AverageLevels) -> np.ndarray:
 
 def test_drops_that_differ_are_marked_and_kept() -> None:
     drops = [make_drop(1.0, seed=i) for i in range(6)]
-    assert average_levels(measure_levels(drops)).outliers == ()
+    assert outliers.check(drops, measure_levels(drops)) == ()
     odd = make_drop(1.0, seed=6)
     odd = replace(with_force(odd, 1.05 * odd.force), name="odd")
-    average = average_levels(measure_levels([*drops, odd]))
-    assert {note.subject for note in average.outliers} == {"odd"}
-    assert average.drops.names[-1] == "odd"
+    found = outliers.check([*drops, odd], measure_levels([*drops, odd]))
+    assert {note.subject for note in found} == {"odd"}
     # Equal drops differ by rounding.
-    same = measure_levels([make_drop() for _ in range(5)])
-    assert average_levels(same).outliers == ()
+    same = [make_drop() for _ in range(5)]
+    assert outliers.check(same, measure_levels(same)) == ()
 
 
 def grubbs(count: int, significance: float) -> float:
@@ -319,10 +321,10 @@ def test_outliers_of_many_bands_share_the_probability(bands: Any) -> None:  # no
     drops = [with_force(drop, scale * drop.force) for drop, scale in zip(
         [make_drop(0.01, seed=i) for i in range(6)], [1.0, 1.01, 0.99, 1.005, 0.995, 1.3],
         strict=True)]  # fmt: skip
-    average = average_levels(measure_levels(drops, bands))
     count = len(thud.get_bands(bands).nominal)
-    assert len(average.outliers) == count
-    for found in average.outliers:
+    marked = outliers.check(drops, measure_levels(drops, bands))
+    assert len(marked) == count
+    for found in marked:
         assert found.others["critical"] == pytest.approx(grubbs(6, 0.05 / count))
 
 
@@ -334,18 +336,20 @@ def test_drops_that_differ_share_the_probability_among_three_quantities() -> Non
         )
         for i in range(6)
     ]  # fmt: skip
-    assert find_deviant(drops) == ()
+
+    def marked(drops: list[Drop]) -> tuple[Note, ...]:
+        return outliers.check(drops, measure_levels(drops))
+
+    assert marked(drops) == ()
     for change, value, unit in (
         ("contact_time", 0.03, 1e-3), ("restitution", 0.5, 1.0), ("peak_force", 3000.0, 1.0),
     ):  # fmt: skip
-        (found,) = find_deviant(
-            [*drops, replace(drops[0], name="odd", **{change: Estimate(value, 0)})]
-        )
+        (found,) = marked([*drops, replace(drops[0], name="odd", **{change: Estimate(value, 0)})])
         assert (found.subject, found.value) == ("odd", pytest.approx(value / unit))
         assert found.others["critical"] == pytest.approx(grubbs(7, 0.05 / 3))
         # A drop that is uncertain enough does not differ.
         doubtful = replace(drops[0], name="odd", **{change: Estimate(value, value)})
-        assert find_deviant([*drops, doubtful]) == ()
+        assert marked([*drops, doubtful]) == ()
 
 
 @pytest.mark.parametrize("count", [3, 5, 9, 15])

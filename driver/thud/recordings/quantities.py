@@ -17,7 +17,6 @@ from thud.base._schema import Drop as DropKeys
 from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR, UNKNOWN, Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
-from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -41,12 +40,6 @@ DISAGREEMENT = "impulse against bounces"
 # in standard deviations of the noise.
 PROMINENCE = 0.1
 MIN_PROMINENCE = 6.0
-# Quantities besides levels that are searched for outliers: attribute, title, size of the unit.
-SEARCHED = (
-    ("contact_time", "contact time, ms,", 1e-3),
-    ("restitution", "restitution", 1.0),
-    ("peak_force", "peak force, N,", 1.0),
-)
 
 
 def shared_causes(config: Config, calibration: float | None) -> dict[str, Contribution]:
@@ -235,22 +228,6 @@ def check_estimates(
     if config.mass is None and math.isfinite(estimates["mass"].value):
         notes.append(Note("effective_mass"))
     return notes
-
-
-def find_deviant(drops: Sequence[Drop]) -> tuple[Note, ...]:
-    """Return outliers in contact time, restitution or peak force, at 5 % for all three together."""
-    names = [drop.name for drop in drops]
-    outliers: list[Note] = []
-    for attribute, title, unit in SEARCHED:
-        estimates = [getattr(drop, attribute) for drop in drops]
-        outliers += find_outliers(
-            [estimate.value / unit for estimate in estimates],
-            names,
-            title,
-            [estimate.uncertainty / unit for estimate in estimates],
-            SIGNIFICANCE / len(SEARCHED),
-        )
-    return tuple(outliers)
 
 
 def _stated(value: float | None, uncertainty: float | None) -> Estimate:

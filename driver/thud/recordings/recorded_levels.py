@@ -12,7 +12,6 @@ from scipy.fft import next_fast_len
 from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Contribution, Estimate
 from thud.level.levels import force_exposure_levels, get_bands
-from thud.recordings.checks.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.contact import band_noise
 from thud.recordings.filters import filter_levels
 from thud.recordings.instruments import AMPLITUDE_DECIBEL, ASSUMED, CALIBRATION
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.base.note import Note
     from thud.recordings.measured_drop import Drop
 
 # Levels above background, dB: below the first value a level is an upper bound, below the second the
@@ -90,8 +88,6 @@ class AverageLevels(Immutable):
         Standard deviation of the drops' levels, dB; NaN for a single drop.
     estimates : tuple of Estimate, shape (n_band,)
         The levels with their uncertainty budgets.
-    outliers : tuple of Note
-        Drops that differ from the others.
     """
 
     drops: DropLevels
@@ -100,7 +96,6 @@ class AverageLevels(Immutable):
     flag: NDArray[np.str_]
     spread: NDArray[np.float64]
     estimates: tuple[Estimate, ...]
-    outliers: tuple[Note, ...]
 
 
 def measure_levels(drops: Sequence[Drop], bands: BandSet = "octave") -> DropLevels:
@@ -131,7 +126,7 @@ def average_levels(
     instruments: Mapping[str, NDArray[np.float64]] | None = None,
     not_stated: tuple[str, ...] = (),
 ) -> AverageLevels:
-    """Return the energy average of the levels of drops, its budget, and outliers.
+    """Return the energy average of the levels of drops, with its budget.
 
     `instruments` are the standard uncertainties of `instrument_uncertainties`, and `not_stated` the
     contributions whose size is not stated.
@@ -169,18 +164,7 @@ def average_levels(
     spread = np.full(level.shape, np.nan)
     if len(drops.names) > 1:
         spread = drops.level.std(axis=0, ddof=1)
-    # At 5 % for all bands together (Bonferroni).
-    nominal = get_bands(drops.bands).nominal
-    outliers = tuple(
-        outlier
-        for middle, levels, own in zip(
-            nominal, drops.level.T, drops.contributions[NOISE].T, strict=True
-        )
-        for outlier in find_outliers(
-            levels, drops.names, f"level at {middle:g} Hz, dB,", own, SIGNIFICANCE / len(nominal)
-        )
-    )
-    return AverageLevels(drops, level, background, flag, spread, estimates, outliers)
+    return AverageLevels(drops, level, background, flag, spread, estimates)
 
 
 def compare_methods(drops: Sequence[Drop]) -> dict[str, NDArray[np.float64]]:

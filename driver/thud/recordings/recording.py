@@ -14,6 +14,7 @@ from thud.base.extras import data_frame
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.level.assessment import ImpactOrRecording, assess_levels
+from thud.recordings.checks import outliers
 from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config
 from thud.recordings.instruments import CALIBRATION, check_instruments, instrument_uncertainties
@@ -23,7 +24,6 @@ from thud.recordings.quantities import (
     IMPULSE,
     check_estimates,
     drop_estimates,
-    find_deviant,
 )
 from thud.recordings.recorded_levels import average_levels, mean_force, measure_levels
 
@@ -263,11 +263,8 @@ class Recording(ImpactOrRecording):
 
     @cached_property
     def outliers(self) -> tuple[Note, ...]:
-        """Drops that differ in a level, the contact time, the restitution or the peak force.
-
-        They are not excluded. The significance is 5 % for all levels, and 5 % for all others.
-        """
-        return (*self.average().outliers, *find_deviant(self.drops))
+        """Drops that differ from the others; they are not excluded."""
+        return outliers.check(self.drops, self.average().drops)
 
     def level_estimates(self, bands: BandSet = "octave") -> tuple[Estimate, ...]:
         """Return the average levels with their uncertainty budgets, dB, shape (n_band,)."""

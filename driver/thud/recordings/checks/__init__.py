@@ -52,7 +52,7 @@ CHECKS = {
               "a scatter of zero, and for four cells 12 dB"),
         Check(plate.check_plate, "a force plate that the standard does not allow",
               "a resonance of 1.6 kHz that is not corrected 1.9 dB at 708 Hz"),
-        Check(outliers.find_outliers, "drops that differ from the others by more than chance",
+        Check(outliers.check, "drops that differ from the others by more than chance",
               "they are marked, not left out"),
     ),
 }  # fmt: skip

@@ -9,17 +9,44 @@ import numpy as np
 from scipy.special import stdtrit
 
 from thud.base.note import Note
-from thud.level.estimate import NORMAL_FACTOR
+from thud.level.estimate import NOISE, NORMAL_FACTOR
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from thud.recordings.measured_drop import Drop
+    from thud.recordings.recorded_levels import DropLevels
+
 # Probability that any drop is marked if all differ by chance only.
 SIGNIFICANCE = 0.05
+# Quantities besides levels that are searched for outliers: attribute, title, size of the unit.
+SEARCHED = (
+    ("contact_time", "contact time, ms,", 1e-3),
+    ("restitution", "restitution", 1.0),
+    ("peak_force", "peak force, N,", 1.0),
+)
 # Maximum deviation due to rounding, in the unit of the values.
 ROUNDING = 1e-9
+
+
+def check(drops: Sequence[Drop], levels: DropLevels) -> tuple[Note, ...]:
+    """Return a note on each drop that differs in a level, contact time, restitution or peak force.
+
+    At 5 % for the levels of all bands together (Bonferroni), and at 5 % for all other quantities.
+    """
+    nominal, noise = get_bands(levels.bands).nominal, levels.contributions[NOISE]
+    searched = [
+        (values, levels.names, f"level at {band:g} Hz, dB,", own, SIGNIFICANCE / len(nominal))
+        for band, values, own in zip(nominal, levels.level.T, noise.T, strict=True)
+    ]
+    for attribute, title, unit in SEARCHED:
+        estimates = [getattr(drop, attribute) for drop in drops]
+        values, own = np.array([(e.value, e.uncertainty) for e in estimates]).T / unit
+        searched.append((values, levels.names, title, own, SIGNIFICANCE / len(SEARCHED)))
+    return tuple(note for arguments in searched for note in find_outliers(*arguments))
 
 
 def find_outliers(
