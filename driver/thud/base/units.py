@@ -118,8 +118,9 @@ def powers_of(key_unit: str) -> dict[str, int]:
     >>> powers_of("s")
     {'s': 0, 'ms': -3, 'us': -6, 'ns': -9}
     """
-    powers = {unit: round(math.log10(size)) for unit, size in SIZES[key_unit].items()}
-    return {u: power for u, power in powers.items() if scaled(1.0, power) == SIZES[key_unit][u]}
+    sizes = SIZES.get(key_unit, {key_unit: 1.0})  # others have no multiples
+    powers = {unit: round(math.log10(size)) for unit, size in sizes.items()}
+    return {unit: power for unit, power in powers.items() if scaled(1.0, power) == sizes[unit]}
 
 
 def power_of(unit: object, key_unit: str, label: str) -> int:
