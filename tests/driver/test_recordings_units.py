@@ -40,8 +40,7 @@ TIME = np.arange(FORCE.size) / RATE
 POUND = 4.4482216152605
 # Newtons per unit; None of units that are no force.
 UNITS = {"": 1.0, "N": 1.0, "kN": 1e3, "lbf": POUND, "kgf": 9.80665, "V": None, "furlong": None}
-APPLIED = {"scale_factor": "add_offset"}
-FACTORS = ["", *APPLIED, "Scale Factor", "conversion", "scale", "scaling_factor", "gain",
+FACTORS = ["", "scale_factor", "Scale Factor", "conversion", "scale", "scaling_factor", "gain",
            "Gain [dB]", "amplifier_gain", "multiplier", "slope", "channel_conversion"]  # fmt: skip
 # Owners of an entry of a header: the array, its group, the file.
 Entry = tuple[str, str, Any]
@@ -128,7 +127,7 @@ def test_what_a_header_states_is_applied_or_refused(name: str, tmp_path: Path) -
         entries += [(owner, factor, value)] * bool(factor)
         chance.shuffle(entries)
         is_applied = name[0] == "a" and not name.endswith("tdms") and owner == "array"
-        is_known = not factor or value == 1.0 or (is_applied and factor in APPLIED)
+        is_known = not factor or value == 1.0 or (is_applied and factor == "scale_factor")
         is_divided = bool(factor) and (is_known or chance.random() < 0.5)
         stored = FORCE / (newtons or 1.0) / (value if is_divided else 1.0)
         path = tmp_path / f"{number}_{name}"
@@ -168,17 +167,16 @@ def test_sensitivity_without_a_unit_is_not_ignored(name: str, tmp_path: Path) ->
         opened(tmp_path / name)
 
 
-def test_offset_of_a_convention_is_added(tmp_path: Path) -> None:
-    for factor, offset in APPLIED.items():
-        path = tmp_path / "a.h5"
-        entries = [("array", "Fs", RATE), ("array", factor, 0.5), ("array", offset, -25.0)]
-        write_hdf5(path, (FORCE + 25) / 0.5, entries)
-        np.testing.assert_allclose(read(path), FORCE, atol=1e-9)
-        write_hdf5(path, FORCE - 25, [("array", "Fs", RATE), ("array", offset, 25.0)])
-        np.testing.assert_allclose(read(path), FORCE, atol=1e-9)
-        write_hdf5(path, FORCE - 25, [("array", "Fs", RATE), ("array", "offset", 25.0)])
-        with pytest.raises(InputError, match=naming("offset = 25.0")):
-            opened(path)
+def test_factor_and_offset_of_netcdf_are_applied(tmp_path: Path) -> None:
+    path, rate = tmp_path / "a.h5", ("array", "Fs", RATE)
+    scaled = [rate, ("array", "scale_factor", 0.25), ("array", "add_offset", -25.0)]
+    write_hdf5(path, np.rint((FORCE + 25) / 0.25).astype("i2"), scaled)
+    np.testing.assert_allclose(read(path), FORCE, atol=0.125)
+    write_hdf5(path, FORCE - 25, [rate, ("array", "add_offset", 25.0)])
+    np.testing.assert_allclose(read(path), FORCE, atol=1e-9)
+    write_hdf5(path, FORCE - 25, [rate, ("array", "offset", 25.0)])
+    with pytest.raises(InputError, match=naming("offset = 25.0")):
+        opened(path)
 
 
 def test_units_that_disagree_are_refused(tmp_path: Path) -> None:
