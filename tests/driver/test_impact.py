@@ -18,13 +18,7 @@ def test_arrays_share_one_clock() -> None:
     impact = thud.solve(sample_rate=48000.0, duration=0.03, model="hollow_sphere")
     assert impact.time.shape == (1440,)
     assert impact.time[1] == 1 / 48000
-    for array in (
-        impact.deflection,
-        impact.velocity,
-        *impact.components.values(),
-        impact.elastic_force,
-        impact.floor_force,
-    ):
+    for array in impact.histories().values():
         assert array.shape == impact.time.shape
         assert array.dtype == np.float64
 
@@ -57,24 +51,10 @@ def test_impulse_changes_the_momentum() -> None:
 def test_paper_s_ball_does_not_conform() -> None:
     verdict = thud.solve(model="hollow_sphere").assess()
     assert not verdict
-    met = {criterion.name: bool(criterion) for criterion in verdict.criteria}
-    assert met == {
-        "octave_31_5": True,
-        "octave_63": True,
-        "octave_125": False,
-        "octave_250": False,
-        "octave_500": False,
-        "contact_time": True,
-        "restitution": True,
-        "peak_count": True,
-        "mass": True,
-        "drop_height": True,
-    }
-
-
-def test_low_drop_is_not_the_standard_s() -> None:
-    verdict = thud.solve(drop=thud.Drop(0.1), model="hollow_sphere").assess()
-    assert not next(c for c in verdict.criteria if c.name == "drop_height")
+    missed = [criterion.name for criterion in verdict.criteria if not criterion]
+    assert missed == ["octave_125", "octave_250", "octave_500"]
+    assert verdict.criteria[-1].name == "drop_height"
+    assert not thud.solve(drop=thud.Drop(0.1), model="hollow_sphere").assess().criteria[-1]
 
 
 def test_threads_do_not_disturb_each_other() -> None:

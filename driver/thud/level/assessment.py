@@ -278,7 +278,9 @@ class Verdict(Outcome, Displayed):
         width = NUMERICAL_ERROR if self.criteria[0].is_computed else "uncertainty (95 %)"
         many = ("probability (95 %)", "main unknown") if self.counts else ()
         header = ("criterion", "value", "range" if many else width, "limits", *many, "result")
-        last = ("all criteria", "", "", "", *self._last_cells())
+        lacking = dict.fromkeys(name for c in self.criteria for name in c.estimate.not_stated)
+        legend = f"† lacks {', '.join(lacking)}" if lacking else ""
+        last = ("all criteria", "", legend, "", *self._last_cells())
         rows = [criterion.cells() for criterion in self.criteria]
         return [header, *rows, (*last, Result(self.conforms, self.conforms))]
 
