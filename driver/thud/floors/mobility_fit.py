@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import f90nml
 import numpy as np
 
 from thud.base._schema import MeasuredMobility
 from thud.base.bridge import ask
-from thud.base.checks import (
-    refuse,
-    refuse_value,
-    require_array,
-    require_choice,
-    require_whole,
-)
+from thud.base.checks import refuse, require_whole
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import data_frame
 from thud.base.note import Note
 from thud.base.tabulated import column_rows
 from thud.case.case import Case
-from thud.floors.mobility_table import POWERS, Quantity, read_mobility
+from thud.floors.mobility_table import Quantity, read_mobility
 from thud.impact.floor_impact import mobility
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
+    import os
+
     import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
@@ -191,29 +186,18 @@ def fit_mobility(
     InputError
         If the input is invalid; the message names the file, and the line, column or argument.
     """
-    if quantity is not None:
-        require_choice("quantity", quantity, get_args(Quantity))
-    if isinstance(table, tuple):
-        name = label = "measurement"
-        frequency, values = _checked(table)
-    elif not isinstance(table, str | os.PathLike):
-        refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
-    else:
-        name, label = Path(table).stem, f"{table}"
-        frequency, values, stated = read_mobility(Path(table))
-        if quantity and stated and quantity != stated:
-            refuse(f"{table}: quantity = {quantity!r}, but the file holds {stated!r}", repr(stated))
-        quantity = quantity or stated
-    # The value at 0 Hz has no phase.
-    frequency, values = frequency[frequency != 0], values[frequency != 0]
-    values = values * (2j * np.pi * frequency) ** POWERS[quantity or "mobility"]
-    if not (is_valid := np.isfinite(values) & (values != 0)).all():
-        first = is_valid.argmin()
-        problem = "not finite" if values[first] else "0"
-        refuse(f"{label}: the value at {frequency[first]:g} Hz is {problem}", "finite, not 0")
-    _require_octave(label, frequency)
+    label, frequency, values = read_mobility(table, quantity)
+    if len(frequency) <= 1:
+        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
+    if not _covered(frequency):
+        refuse(
+            f"{label}: {len(frequency)} frequencies from {frequency.min():g} to "
+            f"{frequency.max():g} Hz cover no octave from 31.5 to 500 Hz",
+            f"at least one octave, with {_MIN_POINTS} frequencies or more inside",
+        )
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
+    name = Path(label).stem
     try:
         if order is None:
             return _best_fit(name, frequency, values)
@@ -235,18 +219,6 @@ def _covered(frequency: Array) -> dict[float, NDArray[np.bool_]]:
     return result
 
 
-def _require_octave(label: str, frequency: Array) -> None:
-    """Raise InputError if frequencies, Hz, cover no octave."""
-    if len(frequency) <= 1:
-        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
-    if not _covered(frequency):
-        refuse(
-            f"{label}: {len(frequency)} frequencies from {frequency.min():g} to "
-            f"{frequency.max():g} Hz cover no octave from 31.5 to 500 Hz",
-            f"at least one octave, with {_MIN_POINTS} frequencies or more inside",
-        )
-
-
 def _unit_warnings(values: NDArray[np.complex128]) -> list[Note]:
     """Return a warning of mobilities, m/(N s), that no floor has; otherwise nothing."""
     mean = float(np.exp(np.mean(np.log(np.abs(values)))))
@@ -254,22 +226,6 @@ def _unit_warnings(values: NDArray[np.complex128]) -> list[Note]:
     is_plausible = low <= mean <= high
     note = Note("mobility_implausible", value=mean, low=low, high=high, unit="m/(N s)")
     return [] if is_plausible else [note]
-
-
-def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
-    """Return the frequencies and complex values of a tuple after a check."""
-    if len(table) != 2:  # noqa: PLR2004 - frequencies and values
-        refuse(f"table is a tuple of {len(table)}", "frequencies, Hz, and complex values")
-    frequency = require_array("frequency", table[0], (1,), "iuf")
-    values = require_array("values", table[1], (1,))
-    if values.size and values.dtype.kind not in "iufc":
-        refuse("values are not numbers", "complex numbers")
-    if frequency.shape != values.shape:
-        refuse(
-            f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
-            "one value for each frequency",
-        )
-    return frequency, values.astype(complex)
 
 
 def _best_fit(name: str, frequency: Array, values: NDArray[np.complex128]) -> MobilityFit:

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
-from typing import TYPE_CHECKING, Literal, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import numpy as np
 
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse, refuse_value, require_array, require_choice, shown
 from thud.base.units import UNITS, find_unit
 from thud.recordings.channel import guarded
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
 from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
 Quantity = Literal["mobility", "accelerance", "receptance"]
 # Power of i omega by which a quantity is multiplied to convert it to a mobility.
-POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
+_POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
 # Quantity by the data type of a response in universal files: displacement, velocity, acceleration.
 _RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _FREQUENCY_RESPONSE = 4
@@ -53,7 +53,54 @@ _UNITS = {"mobility": "m/(Ns)", "accelerance": "m/(Ns2)", "receptance": "m/N"}
 _FURTHER_UNITS = {"frequency": "Hz", "phase": "deg"}
 
 
-def read_mobility(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
+def read_mobility(
+    table: str | os.PathLike[str] | tuple[ArrayLike, ArrayLike], quantity: Quantity | None
+) -> tuple[str, Array, NDArray[np.complex128]]:
+    """Return name, frequencies above 0 Hz and mobilities, m/(N s), of a file or a tuple.
+
+    `quantity` is that of the table, by default what the file states, or mobility. Raise InputError
+    if the table is invalid; the message names the file, and the line, column or argument.
+    """
+    if quantity is not None:
+        require_choice("quantity", quantity, get_args(Quantity))
+    if isinstance(table, tuple):
+        label = "measurement"
+        frequency, values = _checked(table)
+    elif not isinstance(table, str | os.PathLike):
+        refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
+    else:
+        label = f"{table}"
+        frequency, values, stated = _read_file(Path(table))
+        if quantity and stated and quantity != stated:
+            refuse(f"{table}: quantity = {quantity!r}, but the file holds {stated!r}", repr(stated))
+        quantity = quantity or stated
+    # The value at 0 Hz has no phase.
+    frequency, values = frequency[frequency != 0], values[frequency != 0]
+    values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
+    if not (is_valid := np.isfinite(values) & (values != 0)).all():
+        first = is_valid.argmin()
+        problem = "not finite" if values[first] else "0"
+        refuse(f"{label}: the value at {frequency[first]:g} Hz is {problem}", "finite, not 0")
+    return label, frequency, values
+
+
+def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
+    """Return the frequencies and complex values of a tuple after a check."""
+    if len(table) != 2:  # noqa: PLR2004 - frequencies and values
+        refuse(f"table is a tuple of {len(table)}", "frequencies, Hz, and complex values")
+    frequency = require_array("frequency", table[0], (1,), "iuf")
+    values = require_array("values", table[1], (1,))
+    if values.size and values.dtype.kind not in "iufc":
+        refuse("values are not numbers", "complex numbers")
+    if frequency.shape != values.shape:
+        refuse(
+            f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
+            "one value for each frequency",
+        )
+    return frequency, values.astype(complex)
+
+
+def _read_file(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:
     """Return frequencies, values and quantity, which is None if the file does not state it."""
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
@@ -115,7 +162,7 @@ def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity
     sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
     quantity: Quantity = _RESPONSES[response]  # type: ignore[assignment]
     values = np.asarray(record["data"], dtype=complex)
-    values *= sign * _si_units(data_set, 1 - POWERS[quantity], path)
+    values *= sign * _si_units(data_set, 1 - _POWERS[quantity], path)
     return np.asarray(record["x"], dtype=float), values, quantity
 
 
