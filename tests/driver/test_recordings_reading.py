@@ -330,8 +330,10 @@ def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:
         ('"time","Force, kN"\n', "{t},{v}"),
     ],
 )
-@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize(
+    ("coding", "end"),
+    [("utf-8", "\n"), ("utf-8-sig", "\r\n"), ("utf-16", "\r"), ("latin-1", "\r\n")],
+)
 def test_headers_of_loggers(head: str, row: str, coding: str, end: str, tmp_path: Path) -> None:
     lines = [
         row.format(v=v, k=str(v).replace(".", ","), t=i / 8000, ms=i / 8).strip()
