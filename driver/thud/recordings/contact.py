@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -334,7 +334,7 @@ def _flanks(time: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
     return np.asarray((rise + JUMPS * jump) / (1 + JUMPS))
 
 
-_quadrature = cache(leggauss)
+_quadrature = lru_cache(maxsize=64)(leggauss)
 
 
 def band_functionals(count: int, rate: float, lower: float, upper: float) -> NDArray[np.float64]:
