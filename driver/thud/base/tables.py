@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 import textwrap
 from itertools import zip_longest
@@ -70,13 +71,24 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
     31.5    39
     """
     columns = list(zip(*rows, strict=True))
-    minima = [max(len(w.rstrip()) for c in column for w in _WORD.findall(c)) for column in columns]
-    minima = [min(width, _MAX_WORD) for width in minima]
-    tables = [[0]]
-    for i in range(1, len(columns)):
-        if len(tables[-1]) > 1 and _total([minima[k] for k in [*tables[-1], i]]) > WIDTH:
-            tables.append([0])
-        tables[-1].append(i)
+    words = [[w.rstrip() for cell in column for w in _WORD.findall(cell)] for column in columns]
+    minima = [min(max(map(len, column)), _MAX_WORD) for column in words]
+    natural = [max(map(len, column)) for column in columns]
+
+    def split(limit: float) -> list[list[int]]:
+        tables = [[0]]
+        for i in range(1, len(columns)):
+            longer = [*tables[-1], i]
+            is_wide = _total([natural[k] for k in longer]) > limit
+            is_wide |= _total([minima[k] for k in longer]) > WIDTH
+            if is_wide and len(tables[-1]) > 1:
+                tables.append([0])
+            tables[-1].append(i)
+        return tables
+
+    # As few tables as can be made narrow enough, of similar widths.
+    fewest = len(split(math.inf))
+    tables = next(parts for w in range(_total(natural) + 1) if len(parts := split(w)) == fewest)
     return "\n\n".join(
         _format_table([columns[i] for i in table], [minima[i] for i in table]) for table in tables
     )
