@@ -11,7 +11,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
-from thud.base.units import UNITS, find_unit, scaled
+from thud.base.units import scaled, size_of
 from thud.case.case import new_model
 from thud.explorer.answer import new_case
 from thud.explorer.form import fields_by_key
@@ -151,7 +151,7 @@ def _read_curve(
 
 def _find(columns: Sequence[Column], words: set[str], unit: str, kind: str) -> Column:
     """Return the column of a kind, by name and unit; raise InputError for none or several."""
-    by_unit = [c for c in columns if UNITS.get(find_unit(c.unit), ("",))[0] == unit]
+    by_unit = [c for c in columns if size_of(c.unit)[0] == unit]
     by_name = [column for column in columns if plain(column.name) in words]
     both = [column for column in by_name if column in by_unit]
     found = both or by_unit or by_name
@@ -169,14 +169,14 @@ def _factor(column: Column, unit: str, name: str, units: Mapping[str, str]) -> f
     field = next(item for item in PRESS_FIELDS if item.name == name)
     allowed = f"{', '.join(field.choices)} in its title, or under {field.quoted}"
     stated = units.get(name, "")
-    base, factor = UNITS.get(find_unit(column.unit) if column.unit else stated, ("", 0.0))
+    base, factor = size_of(column.unit or stated)
     problem = ""
     if not column.unit and not stated:
         problem = "its unit is not stated"
     elif base != unit:
         fault = "does not fit" if base else "is not known"
         problem = f"the unit {shown_text(column.unit)!r} {fault}"
-    elif column.unit and stated and UNITS[stated][1] != factor:
+    elif column.unit and stated and size_of(stated)[1] != factor:
         problem = f"{column.unit} by its title, {stated} under {field.quoted}"
         allowed = "one unit"
     if problem:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, shown
-from thud.base.units import UNITS, find_unit
+from thud.base.units import size_of
 from thud.recordings.channel import guarded
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
 from thud.recordings.table import read_table
@@ -110,11 +110,11 @@ def _read_file(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | No
     if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
         refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
     used = {kind: c for kind, c in zip(kinds, table.columns, strict=True) if kind}
-    units = {find_unit(c.unit) for kind, c in used.items() if kind not in _FURTHER_UNITS}
+    units = {size_of(c.unit)[0] for kind, c in used.items() if kind not in _FURTHER_UNITS}
     quantities = {
         name
         for name, unit in _UNITS.items()
-        if any(name in title for title in words) or any(UNITS[u][0] == unit for u in units if u)
+        if any(name in title for title in words) or unit in units
     }
     if len(quantities) > 1:
         refuse(f"{path}: titles and units state {' and '.join(sorted(quantities))}", "one quantity")
@@ -180,7 +180,7 @@ def _si_units(data_set: DataSet, seconds: int, path: Path) -> float:
         refuse(f"{path}: the response has the unit {shown(above)}", _RESPONSE_UNITS[seconds])
     length = _LENGTHS[match["length"]] if match else None
     ratio = match["force"] if match else None
-    forces = {UNITS.get(find_unit(text), ("", 1.0)) for text in (below, ratio) if text}
+    forces = {size_of(text) for text in (below, ratio) if text}
     if len(forces) > 1 or any(base != "N" for base, _ in forces):
         refuse(f"{path}: the force has the unit {shown(below or ratio)}", "N, kN, lbf")
     force = next((size for _, size in forces), None)
