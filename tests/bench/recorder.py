@@ -107,7 +107,7 @@ REFUSALS = {
     r"is too close to the bands": "a stated resonance below 1001 Hz",
     r"is clipped": "the force is clipped",
     r"the signal (begins|ends) within the pulse": "within the pulse or less than 1 ms from it",
-    r"dropouts of": "dropouts and spikes of more than 1 ms",
+    r"they are lost": "samples that are lost",
     r"is held, clipped": "a force that is held, clipped",
     r"cannot be distinguished from the noise|: no impact": "cannot be distinguished from the noise",
     r"the sign is not clear": "the sign is not clear",

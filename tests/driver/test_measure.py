@@ -233,15 +233,18 @@ def test_limits_of_the_configuration_are_those_of_the_verdict(tmp_path: Path) ->
     assert (row["lower"], row["upper"], row["limits_of_standard"]) == (20.0, 30.0, False)
 
 
-def test_dropout_does_not_ring_in_the_correction_of_a_plate(tmp_path: Path) -> None:
+def test_faults_of_the_samples_are_found_before_the_correction_of_a_plate(tmp_path: Path) -> None:
     values, rate = soundfile.read(FOLDER / "drop_1.wav")
-    place = int((DROPS[0]["onset"] + 0.006) * rate)
-    values[place : place + 6] = 0.0
-    soundfile.write(tmp_path / "lost.wav", values, rate, "PCM_24")
-    whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "lost.wav", tmp_path)
+    position = int((DROPS[0]["onset"] + 0.006) * rate)
+    values[position : position + 2] = 0.0
+    soundfile.write(tmp_path / "spike.wav", values, rate, "PCM_24")
+    whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "spike.wav", tmp_path)
     np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
-    assert noted(filled.notes, "dropouts").value == pytest.approx(0.125)
-    assert "dropouts" not in codes(whole.notes)
+    assert noted(filled.notes, "spikes").value == pytest.approx(2e3 / rate)
+    assert not {"spikes", "jump"} & {*codes(whole.notes)}
+    values[position : position + 96] = np.linspace(values[position - 1], values[position + 300], 96)
+    soundfile.write(tmp_path / "jump.wav", values, rate, "PCM_24")
+    assert "jump" in codes(example(tmp_path / "jump.wav", tmp_path).notes)
 
 
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])

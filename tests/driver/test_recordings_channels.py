@@ -201,9 +201,13 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     path, first = tmp_path / "cells.csv", cells()[0]
     lost = first.copy()
     lost[round(0.11 * RATE) : round(0.11 * RATE) + 8] = 0.0
-    found = summed(path, F1=lost)
-    dropouts = noted(found.notes, "dropouts")
-    assert (dropouts.others["part"], dropouts.value) == ("cells.csv, F1", pytest.approx(0.5))
+    with pytest.raises(InputError, match=naming("F1", "8 samples", "lost")):
+        summed(path, F1=lost)
+    spike = first.copy()
+    spike[round(0.11 * RATE)] = 0.0
+    found = summed(path, F1=spike)
+    spikes = noted(found.notes, "spikes")
+    assert (spikes.others["part"], spikes.value) == ("cells.csv, F1", pytest.approx(0.0625))
     np.testing.assert_allclose(found.levels(), summed(path).levels(), atol=0.02)
     for code, changed in (
         ("cell_sign", {"F1": -first}),

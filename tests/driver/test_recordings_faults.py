@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,13 +74,6 @@ def test_spikes_in_a_contact_are_filled(rate: float, size: float, count: int, af
     np.testing.assert_allclose(found.levels(), expected.levels(), rtol=0, atol=0.05)
 
 
-def test_spikes_of_more_than_a_millisecond_are_refused() -> None:
-    force = drop_force(8e3)
-    force[1606:1751:16] += 400.0
-    with pytest.raises(InputError, match=naming("10 spikes of 1.25 ms", "up to 1 ms")):
-        measured(force, 8e3)
-
-
 def ringing(rate: float, frequency: float, size: float) -> np.ndarray:
     """Return the ringing of a plate that the touch excites, N."""
     time = np.arange(round(0.6 * rate)) / rate - 0.2
@@ -105,7 +99,7 @@ def test_steep_noisy_and_ringing_forces_have_no_spikes(
     rate: float, fault: Callable[[float], np.ndarray]
 ) -> None:
     (drop,) = measured(fault(rate), rate).drops
-    assert not {"spikes", "dropouts"} & {*codes(drop.notes)}
+    assert "spikes" not in codes(drop.notes)
 
 
 @pytest.mark.parametrize("rate", [8e3, 51.2e3])
@@ -137,18 +131,18 @@ def test_smooth_tops_are_not_clipped(rate: float, noise: float, top: int | str) 
 
 @pytest.mark.parametrize("step", [0.0, 0.3, 0.5])
 @pytest.mark.parametrize("after", [0.0065, 0.0105])
-def test_held_samples_are_filled_where_noise_excludes_them(step: float, after: float) -> None:
-    whole = drop_force(48e3, noise=0.3)
-    whole = np.round(whole / step) * step if step else whole
-    force = whole.copy()
+@pytest.mark.parametrize("value", [None, 0.0])
+@pytest.mark.parametrize("count", [6, 40])
+def test_lost_samples_are_named(step: float, after: float, value: float | None, count: int) -> None:
+    force = drop_force(48e3, noise=0.3)
+    force = np.round(force / step) * step if step else force
     first = round((0.2 + after) * 48e3) - 20
-    force[first : first + 40] = force[first]
-    found, expected = measured(force, 48e3), measured(whole, 48e3)
-    (drop,) = found.drops
-    assert noted(drop.notes, "dropouts").value == pytest.approx(40 / 48)
-    # A line in place of 40 samples is too low by up to 2.6 N, as seen at 500 Hz.
-    np.testing.assert_allclose(found.levels()[:4], expected.levels()[:4], rtol=0, atol=0.1)
-    assert drop.peak_force.value == pytest.approx(1500, rel=0.005)
+    force[first : first + count] = force[first] if value is None else value
+    if value is None and count == 6:  # it jumps by less than 4 % of the peak
+        assert measured(force, 48e3).drops
+        return
+    with pytest.raises(InputError, match=naming(f"{count} samples", "leave_out")):
+        measured(force, 48e3)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 2.0])
@@ -156,15 +150,16 @@ def test_held_samples_are_filled_where_noise_excludes_them(step: float, after: f
 def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, repeats: int) -> None:
     force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
     (drop,) = measured(force, 48e3).drops
-    assert not {"spikes", "dropouts"} & {*codes(drop.notes)}
+    assert "spikes" not in codes(drop.notes)
 
 
-def test_each_check_is_listed_with_what_it_protects_from() -> None:
-    entries = [entry for entries in checks.CHECKS.values() for entry in entries]
-    modules = {entry.check.__module__ for entry in entries}
-    files = {file.stem for file in Path(checks.__file__).parent.glob("[!_]*.py")}
-    assert {f"{checks.__name__}.{file}" for file in files} <= modules
-    assert all(entry.protects and entry.effect for entry in entries)
+def test_each_check_of_a_drop_is_listed_and_says_what_it_protects_from() -> None:
+    listed = {*checks.CELL_CHECKS, *checks.SECTION_CHECKS, *checks.CONTACT_CHECKS}
+    for file in Path(checks.__file__).parent.glob("[!_]*.py"):
+        module = import_module(f"{checks.__name__}.{file.stem}")
+        named = {value for name, value in vars(module).items() if name.startswith("check")}
+        assert named <= listed or file.stem in {"cells", "copies", "outliers", "plate"}
+    assert all("dB" in str(check.__doc__) for check in listed)
 
 
 def later(force: np.ndarray, share: float) -> np.ndarray:
@@ -176,7 +171,7 @@ def later(force: np.ndarray, share: float) -> np.ndarray:
     ("change", "present", "absent"),
     [
         (lambda f: median_filter(f, 25), "noise of the background ends", "clipped"),
-        (lambda f: np.repeat(f[::24], 24)[: len(f)], "dropouts", "clipped"),
+        (lambda f: np.repeat(f[::24], 24)[: len(f)], "samples at the contact are equal", "clipped"),
         (lambda f: f / 150, "unit = 'kN'", "probably wrong"),
         (np.maximum.accumulate, "does not return", "unit"),
         (lambda f: np.minimum(f, 1200), "clipped", "equal"),

@@ -61,8 +61,6 @@ WARNINGS = {
     "cell_sign": "the peak is {value:.4g} {unit} in a sum of {total:.4g} {unit}; the sign of this "
     "load cell may be wrong",
     # Faults of the force.
-    "dropouts": "dropouts ({count:g}) of {value:.3g} {unit} in all were filled by linear "
-    "interpolation",
     "spikes": "spikes ({count:g}) of {value:.3g} {unit} in all were filled by linear interpolation",
     "constant_background": "the background is constant for {value:.3g} {unit} while the force in "
     "the contact is noisy: small forces are missing, as behind a gate, or samples are lost; "

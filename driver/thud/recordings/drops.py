@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,6 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.recordings.config import parse_numbers
-from thud.recordings.differences import robust_deviation
 from thud.recordings.quantization import Quantization
 from thud.recordings.stage import Stage
 
@@ -67,8 +67,13 @@ MAX_FLIGHT = 1.3
 BEFORE = 0.25
 AFTER = 0.5
 GUARD = 2e-3
+# Minimum length of the background on either side of a contact, s and samples.
+MIN_BACKGROUND = 1e-3
+MIN_SAMPLES = 4
 # Minimum rate, Hz: twice the upper edge of the octave of 500 Hz, with a margin for a filter.
 MIN_RATE = 2_000.0
+# Deviation of a sample from the cubic through the samples 2 and 3 away from it, as a weighted sum.
+FROM_CUBIC = np.array([0.4, -0.9, 0.0, 1.0, 0.0, -0.9, 0.4])
 
 
 @dataclass(frozen=True)
@@ -148,9 +153,26 @@ class Section(Stage):
     notes: tuple[Note, ...] = ()
 
     @property
-    def background(self) -> NDArray[np.float64]:
-        """Force before and after the contact, N."""
-        return np.concatenate([self.force[: self.contact[0]], self.force[self.contact[1] :]])
+    def offset(self) -> float:
+        """Median of the force before and after the contact, N."""
+        return float(np.median(np.delete(self.force, slice(*self.contact))))
+
+    @property
+    def has_background(self) -> bool:
+        """Whether 1 ms and four samples of background or more are on both sides of the contact."""
+        shortest = min(self.contact[0], len(self.force) - self.contact[1])
+        return shortest >= max(MIN_BACKGROUND * self.sample_rate, MIN_SAMPLES)
+
+    @cached_property
+    def roughness(self) -> NDArray[np.float64]:
+        """Deviation of each sample from a cubic through samples on both sides, N, shape (n,)."""
+        return np.convolve(np.pad(self.force, 3, mode="edge"), FROM_CUBIC, mode="valid")
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the white noise of a sample in the contact, N."""
+        deviation = robust_deviation(self.roughness[slice(*self.contact)])
+        return deviation / math.sqrt(float(FROM_CUBIC @ FROM_CUBIC))
 
 
 def find_drops(
@@ -235,6 +257,11 @@ def _holds(text: str, number: int) -> bool:
     return any(number in numbers for numbers in parse_numbers(text, "drops"))
 
 
+def robust_deviation(values: NDArray[np.float64]) -> float:
+    """Return the standard deviation of normal values about zero, by their median magnitude."""
+    return 1.4826 * float(np.median(np.abs(values)))
+
+
 def require_chosen(count: int, chosen: int, config: Config) -> None:
     """Raise InputError if a number exceeds that of the drops, or none of the drops is chosen."""
     for key, text in (("leave_out", ",".join(config.leave_out)), ("drops", config.drops)):
@@ -257,22 +284,16 @@ def _cell_means(signal: Signal, first: int, stop: int, *, progress: bool) -> NDA
     return np.concatenate(means)
 
 
-def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force between the pulses, N, from medians, or a low quantile of few cells."""
-    count = max(len(cells) // SEGMENT, 1)
-    size = len(cells) // count
-    # Half of the cells outside a contact.
-    fraction = max(0.5 * (size - CONTACT) / size, 0.08) if count == 1 else 0.5
-    segments = cells[: count * size].reshape(count, size)
-    middle = (np.arange(count) + 0.5) * size
-    return np.interp(np.arange(len(cells)), middle, np.quantile(segments, fraction, axis=1))
-
-
 def _find_pulses(cells: NDArray[np.float64], first: int, stop: int, rate: float) -> list[Pulse]:
     """Return the pulses in the cells of a signal from a first to before a stop sample."""
     # The median removes spikes, which are shorter than contacts.
     level = uniform_filter1d(median_filter(cells, 3, mode="nearest"), 3, mode="nearest")
-    level -= _baseline(cells)
+    # The baseline is the median of segments; of a single one, that of the cells without a contact.
+    count = max(len(cells) // SEGMENT, 1)
+    size = len(cells) // count
+    fraction = max(0.5 * (size - CONTACT) / size, 0.08) if count == 1 else 0.5
+    medians = np.quantile(cells[: count * size].reshape(count, size), fraction, axis=1)
+    level -= np.interp(np.arange(len(cells)), (np.arange(count) + 0.5) * size, medians)
     below = -level[level < 0]
     deviation = robust_deviation(below) if below.size else 0.0
     highest = float(level.max())

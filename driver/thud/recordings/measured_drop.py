@@ -18,9 +18,9 @@ from thud.base.note import Note, about
 from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
-from thud.recordings.checks import CHECKS
+from thud.recordings.checks import CONTACT_CHECKS
 from thud.recordings.contact import SAMPLE_ERROR, Contact, find_edge
-from thud.recordings.differences import robust_deviation
+from thud.recordings.drops import robust_deviation
 from thud.recordings.instruments import peak_uncertainty
 from thud.recordings.quantities import (
     BOUNCES,
@@ -31,7 +31,6 @@ from thud.recordings.quantities import (
     measure_rebound,
 )
 from thud.recordings.recorded_levels import measure_levels
-from thud.recordings.repair import min_background
 from thud.recordings.ringing import find_ringing, is_in_record
 from thud.recordings.stage import Stage
 
@@ -194,7 +193,7 @@ def measure_drop(
     if landing and config.height:
         # The force of a bounce follows its velocity, and so does the flight before it.
         flight, bounce = landing - contact.release, section.bounces[0]
-        ratio = float(bounce.force[slice(*bounce.contact)].max() - np.median(bounce.background))
+        ratio = float(bounce.force[slice(*bounce.contact)].max()) - bounce.offset
         ratio /= contact.background.peak
         expected = GRAVITY * flight.value / (2 * math.sqrt(2 * GRAVITY * config.height))
         if not ratio / MAX_BOUNCE_RATIO < expected < ratio * MAX_BOUNCE_RATIO:
@@ -205,7 +204,7 @@ def measure_drop(
         impulse, contact.release - contact.touch, landing - contact.release if landing else None,
         config, calibration, contact.quantization_impulse,
     )  # fmt: skip
-    notes += (note for entry in CHECKS["contact"] for note in entry.check(section, contact))
+    notes += (note for check in CONTACT_CHECKS for note in check(section, contact))
     ringing, plate = find_ringing(contact, section.chain), config.resonance
     if ringing:
         notes.append(ringing.note)
@@ -237,12 +236,9 @@ def measure_drop(
 
 def _first_landing(section: Section, contact: Contact) -> Estimate | None:
     """Return the first touch of the first bounce, in the time of a contact, s; None if unknown."""
-    if not section.bounces:
+    if not section.bounces or not section.bounces[0].has_background:
         return None
     bounce = section.bounces[0]
-    first, stop = bounce.contact
-    if min(first, len(bounce.force) - stop) < min_background(bounce.sample_rate):
-        return None
     force, background = remove_background(bounce, contact.background)
     touch = find_edge(bounce, force, background, side=1)[0]
     delay = (bounce.start - section.start - contact.start) / section.sample_rate

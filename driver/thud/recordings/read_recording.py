@@ -46,7 +46,7 @@ class Stages(Stage):
     section : Section
         As recorded.
     repaired : Section
-        With dropouts and spikes filled.
+        With spikes filled.
     corrected : Section
         After the correction of the instruments.
     drop : Drop
@@ -153,7 +153,8 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
         refuse("there are no recordings", "one file or more")
     drops = tuple(chain.from_iterable(measured))
     require_chosen(count, len(drops), config)
-    copies.check(origins, measured)
+    if len(origins) > 1:
+        copies.check(origins, measured)
     name = Path(origins[0].path or origins[0].name).stem
     uncertainty = common_uncertainty(uncertainties)
     return Recording(name, drops, tuple(origins), config, uncertainty, stages)

@@ -235,7 +235,7 @@ def correct_force(
 def correct(section: Section, chain: Chain | None) -> Section:
     """Return a section of the applied force, and of its bounces, with notes on the instruments.
 
-    Faults must be repaired before: a dropout would ring in the correction.
+    Faults must be repaired before: a spike would ring in the correction.
     """
     if chain is None:
         return section

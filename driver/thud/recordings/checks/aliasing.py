@@ -23,8 +23,9 @@ MAX_ERROR = 0.1
 def check(section: Section, contact: Contact) -> tuple[Note, ...]:
     """Return a warning if content may alias into the octave of 500 Hz.
 
-    This is content above half the rate. The amplitude of a pulse with kinks is assumed to fall as
-    1/f**2 there; stated instruments reduce it further.
+    This is content above half the rate, where no filter precedes sampling; from 0.1 dB on, the
+    warning states what it adds. The amplitude of a pulse with kinks is assumed to fall as 1/f**2
+    there; stated instruments reduce it further.
     """
     rate, bands = contact.sample_rate, get_bands()
     lower, upper = bands.lower[-1], bands.upper[-1]

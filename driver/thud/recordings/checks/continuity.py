@@ -1,0 +1,130 @@
+"""Samples that are lost, held, gated or exchanged: by the noise, and by jumps of the force."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+from thud.base.checks import refuse
+from thud.base.note import Note
+
+if TYPE_CHECKING:
+    from thud.recordings.drops import Section
+
+# Minimum number of equal samples that are lost, and minimum jump into or out of them, as a fraction
+# of the peak: no flank rises as much between two samples at 20 kHz. Minimum of any jump in
+# quantization steps.
+MIN_LOST = 3
+MIN_LOSS = 0.04
+MIN_STEPS = 3.5
+# Samples deviate from a cubic for MIN_GAP, s, by less than this fraction of the noise: one of
+# 10 000 does so by chance. The noise exceeds this fraction of the peak and a quantization step.
+MIN_GAP = 1e-3
+MIN_GAP_SAMPLES = 7
+MAX_QUIET = 1e-4
+MIN_NOISE = 4e-5
+# Fraction of the background outside the contact from which constant samples are a gate, not a loss.
+MAX_CONSTANT = 0.5
+# Value and slope are compared between the lines through the samples of this time, s, or four at
+# least, on either side. Its curvature changes the slope of a force of 600 Hz by less than that of
+# a kink, which is a jump by MIN_RATIO times the largest change around it. First touch and
+# release, where forces have kinks and jumps up to FLANK of the peak and more, are at least
+# JUMP_MARGIN, s, away.
+JUMP_TIME = 2.5e-4
+FLANK = 0.1
+JUMP_MARGIN = 5e-4
+MIN_RATIO = 3.0
+# The same for the quieter side alone, of values: packets that change places jump three times, and
+# hide each other on the sides between them. The slope may change on one side only.
+MIN_SIDE_RATIO = 6.0
+# Minimum jump as a fraction of the peak.
+MIN_JUMP = 0.005
+
+
+def check_lost(section: Section) -> tuple[Note, ...]:
+    """Raise InputError if samples are lost: equal, with jumps before and after them.
+
+    One jump is enough but next to the background, which may be constant beside a steep flank.
+    Zeros of 0.2 to 0.9 ms in a contact change 250 and 500 Hz by up to 20 dB.
+    """
+    force = section.force[slice(*section.contact)] - section.offset
+    bounds = np.flatnonzero(np.diff(force, prepend=np.nan, append=np.nan) != 0)
+    limit = max(MIN_LOSS * float(force.max()), MIN_STEPS * section.quantization.step)
+    is_jump = np.abs(np.diff(force, prepend=force[0], append=force[-1]))[bounds] > limit
+    jumps = is_jump[:-1].astype(int) + is_jump[1:]
+    least = 1 + (np.abs(force[bounds[:-1]]) < limit / 2)
+    lengths = np.diff(bounds)[(np.diff(bounds) >= MIN_LOST) & (jumps >= least)]
+    if lengths.size:
+        refuse(
+            f"{section.name}: {lengths.sum()} samples at the contact are equal, with jumps of "
+            f"{limit:.3g} N or more beside them: they are lost",
+            "a recording without lost samples; --leave-out (leave_out) with the number of this "
+            "drop",
+        )
+    return ()
+
+
+def check_noise(section: Section) -> tuple[Note, ...]:
+    """Return a warning if the background is constant, at least in part, and the contact noisy.
+
+    Raise InputError if the force is held over first touch or release. 3 ms of the touch change 500
+    Hz by 16 dB, a gate of 40 N by 1 dB; a converter without the bit of 32 N changes 250 Hz by 0.4
+    dB.
+    """
+    rate, force, (first, stop) = section.sample_rate, section.force, section.contact
+    noise = section.noise
+    if noise <= max(section.quantization.step, MIN_NOISE * float(np.ptp(force[first:stop]))):
+        return ()
+    is_quiet = np.abs(section.roughness) <= MAX_QUIET * noise
+    edges = np.flatnonzero(np.diff(is_quiet.astype(int), prepend=0, append=0))
+    starts, stops = edges[::2], edges[1::2]
+    is_gap = stops - starts > max(MIN_GAP * rate, MIN_GAP_SAMPLES)
+    if not is_gap.any():
+        return ()
+    starts, stops = starts[is_gap], stops[is_gap]
+    total = 1e3 * int((stops - starts).sum()) / rate
+    outside = 1e3 * (len(force) - (stop - first)) / rate
+    if ((stops > first) & (starts < stop)).any() and total < MAX_CONSTANT * outside:
+        refuse(
+            f"{section.name}: the force is held, clipped or filled by a line for {total:.3g} ms at "
+            "the contact while the samples around it are noisy",
+            "a recording without lost samples",
+        )
+    return (Note("constant_background", value=total, unit="ms"),)
+
+
+def check_slope(section: Section) -> tuple[Note, ...]:
+    """Return a warning if the force or its slope jumps within a contact, away from its ends.
+
+    A jump is the distance between the lines through the samples before and after it, at the middle
+    or, by their slopes, at their length from it. Packets of 2 ms that are lost or exchanged change
+    250 and 500 Hz by 12 dB.
+    """
+    rate, force = section.sample_rate, section.force[slice(*section.contact)] - section.offset
+    peak, count = float(force.max()), max(4, round(JUMP_TIME * rate))
+    center = (np.arange(count) - (count - 1) / 2) / count
+    slope = center / (center @ center)
+    line = 1 / count + slope / 2
+    # The jump at an index is between the samples half the kernel behind it.
+    flanks = np.flatnonzero(force > FLANK * peak)[[0, -1]] - count
+    margin = int(JUMP_MARGIN * rate) + 3 * count
+    inside = slice(flanks[0] + margin, max(flanks[1] - margin, flanks[0] + margin))
+    least = max(MIN_JUMP * peak, MIN_STEPS * section.quantization.step)
+    distance = np.arange(-3 * count, 3 * count + 1)
+    for what, before, after in (
+        ("force", line, line[::-1]), ("slope of the force", slope, slope),
+    ):  # fmt: skip
+        jump = np.abs(np.correlate(force, np.concatenate([before, -after]), mode="valid"))
+        sides = [
+            maximum_filter(jump, footprint=side * distance > count, mode="nearest")
+            for side in (-1, 1)
+        ]
+        limit = MIN_RATIO * np.maximum(*sides)
+        if what == "force":
+            limit = np.minimum(limit, MIN_SIDE_RATIO * np.minimum(*sides))
+        jumps = jump[inside][jump[inside] > np.maximum(limit, least)[inside]]
+        if jumps.size:
+            return (Note("jump", value=float(jumps.max()), unit="N", others={"what": what}),)
+    return ()
