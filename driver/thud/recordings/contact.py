@@ -193,13 +193,6 @@ class Contact(Stage):
         errors = (np.rint(force + phases) - force) * is_contact
         return np.asarray(math.sqrt(12) * quantization.offset * errors)
 
-    @property
-    def quantization_impulse(self) -> float:
-        """Standard deviation of the impulse by quantization, N s."""
-        impulses = self.quantization_errors.sum(axis=1) / self.sample_rate
-        offset = self.background.quantization.offset * (self.end.value - self.begin.value)
-        return max(float(impulses.std()), offset) if impulses.size else 0.0
-
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance, [k, k], of the errors of weighted sums of the force in the gate.
 

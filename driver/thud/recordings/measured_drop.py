@@ -202,7 +202,7 @@ def measure_drop(
             landing = None
     estimates, shared = measure_rebound(
         impulse, contact.release - contact.touch, landing - contact.release if landing else None,
-        config, calibration, contact.quantization_impulse,
+        config, calibration, contact.background.quantization.offset * contact_time.value,
     )  # fmt: skip
     notes += (note for check in CONTACT_CHECKS for note in check(section, contact))
     ringing, plate = find_ringing(contact, section.chain), config.resonance
