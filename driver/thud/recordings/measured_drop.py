@@ -207,8 +207,10 @@ def measure_drop(
     notes += (note for check in CONTACT_CHECKS for note in check(section, contact))
     ringing, plate = find_ringing(contact, section.chain), config.resonance
     if ringing:
-        notes.append(ringing.note)
-        if not ringing.corrected:
+        code = "plate_rings_differently" if section.chain else "plate_rings"
+        others = {"frequency": ringing.frequency, "quality": ringing.quality}
+        notes.append(Note(code, value=ringing.amplitude, unit="N", others=others))
+        if not section.chain:
             # A resonance spreads an edge over a quarter of its period.
             contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
     drop = Drop(

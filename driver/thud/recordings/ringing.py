@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.fft import next_fast_len
 from scipy.optimize import least_squares
 
-from thud.base.note import Note
 from thud.recordings.background import MAINS
 
 if TYPE_CHECKING:
@@ -58,25 +57,12 @@ MIN_SIGNAL = 4.0
 CLEAR = 0.9
 
 
-@dataclass(frozen=True)
-class Ringing:
-    """A free oscillation of the plate after a contact.
-
-    Attributes are its frequency, Hz, its quality factor, its amplitude, N, and whether the response
-    of a stated plate was corrected.
-    """
+class Ringing(NamedTuple):
+    """A free oscillation of the plate after a contact: resonance, Hz, quality, and amplitude, N."""
 
     frequency: float
     quality: float
     amplitude: float
-    corrected: bool
-
-    @property
-    def note(self) -> Note:
-        """Warning, whose effect is in the uncertainty."""
-        code = "plate_rings_differently" if self.corrected else "plate_rings"
-        others = {"frequency": self.frequency, "quality": self.quality}
-        return Note(code, value=self.amplitude, unit="N", others=others)
 
 
 def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None:
@@ -117,7 +103,7 @@ def find_ringing(contact: Contact, chain: Chain | None = None) -> Ringing | None
     ((fitted, log_rate),), _ = fit_oscillations(ringing, start, rate)
     if abs(fitted / frequency - 1) < MAX_SHIFT:  # else it is another oscillation
         frequency, decay = fitted, math.exp(-log_rate)
-    return Ringing(*resonance(frequency, decay), amplitude, chain is not None)
+    return Ringing(*resonance(frequency, decay), amplitude)
 
 
 def is_in_record(recorded: Section, contact: Contact, plate: Plate) -> bool | None:
