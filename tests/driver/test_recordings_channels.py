@@ -19,7 +19,7 @@ import thud
 from thud import cli
 from thud.base.errors import InputError
 from thud.level.estimate import Estimate
-from thud.recordings.config import Config, read_config, require_channels
+from thud.recordings.config import Config, read_config, to_channels
 from thud.recordings.force_units import Calibration
 from thud.recordings.recorded_levels import average_levels, measure_levels
 from thud.recordings.signal import Signal, add_signals
@@ -135,7 +135,7 @@ def test_command_line_selects_and_calibrates_channels(
 @pytest.mark.parametrize("channels", ["", "F1", "F1+F1", [], ["F1"], 3, [1, True], ["F1", ""]])
 def test_senseless_channels_are_refused(channels: object) -> None:
     with pytest.raises(InputError, match=naming("channels", "is not allowed")):
-        require_channels(channels)
+        to_channels("channels", channels)
 
 
 def test_channels_to_be_added_must_be_forces(tmp_path: Path) -> None:

@@ -64,11 +64,12 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         refuse_value(name, value, f"an object of {expected}")
 
 
-def require_choice(name: str, value: object, allowed: Collection[str]) -> None:
-    """Raise InputError if a value is not one of the allowed words."""
+def require_choice(name: str, value: object, allowed: Collection[str]) -> str:
+    """Return a word; raise InputError if it is not one of the allowed words."""
     if not isinstance(value, str) or value not in allowed:
         unknown = f"= {shown(value)} is not known{suggestion(value, allowed)}"
         refuse(unknown, ", ".join(map(repr, allowed)), name=name)
+    return str(value)
 
 
 def require_mapping(name: str, value: object, entries: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_choice, require_number
@@ -13,6 +14,8 @@ from thud.base.files import read_input
 if TYPE_CHECKING:
     from pathlib import Path
 
+# Returns the value of a key, by its name, or raises InputError.
+Check = Callable[[str, Any], Any]
 MAX_TEXT = 500
 
 
@@ -33,60 +36,46 @@ def read_toml(path: Path) -> tuple[dict[str, Any], str]:
         refuse(f"{path}: {error}", "TOML", error)
 
 
-@dataclass(frozen=True)
-class Number:
-    """Check of a number between two limits in a unit; empty for a pure number."""
-
-    low: float
-    high: float
-    unit: str = ""
-
-    def __call__(self, value: object, name: str) -> float:
-        """Return the number; raise InputError if it is none or out of range."""
-        return require_number(name, value, self.low, self.high, self.unit)
+def between(low: float, high: float, unit: str = "") -> Check:
+    """Return the check of a number between two limits in a unit; empty for a pure number."""
+    return partial(require_number, low=low, high=high, unit=unit)
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Check of one of several words."""
-
-    words: Collection[str]
-
-    def __call__(self, value: object, name: str) -> str:
-        """Return the word; raise InputError if it is not known."""
-        require_choice(name, value, self.words)
-        return str(value)
+def one_of(words: Collection[str]) -> Check:
+    """Return the check of one of several words."""
+    return partial(require_choice, allowed=words)
 
 
-def to_line(value: object, name: str) -> str:
+def to_line(name: str, value: object) -> str:
     """Return a line of text; raise InputError if a value is none."""
     if not isinstance(value, str) or len(value) > MAX_TEXT or not value.isprintable():
         refuse_value(name, value, f"a line of up to {MAX_TEXT} characters")
     return value
 
 
-def to_text(value: object, name: str) -> str:
+def to_text(name: str, value: object) -> str:
     """Return a line of text that is not blank; raise InputError if a value is none."""
-    if not to_line(value, name).strip():
+    if not to_line(name, value).strip():
         refuse_value(name, value, "a text in one line")
     return str(value)
 
 
-def to_pair(value: object, name: str, ends: str, number: Number) -> tuple[float, float]:
-    """Return two numbers, which have these names; raise InputError if a value is none."""
+def to_pair(name: str, value: object, ends: str, low: float, high: float) -> tuple[float, float]:
+    """Return two numbers from low to high; raise InputError if a value is not `ends`."""
     if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
         refuse_value(name, value, ends)
-    return number(value[0], name), number(value[1], name)
+    first, last = (require_number(name, entry, low, high) for entry in value)
+    return first, last
 
 
-def require_table(value: object, name: str) -> Mapping[str, Any]:
+def require_table(name: str, value: object) -> Mapping[str, Any]:
     """Return a table; raise InputError if a value is none."""
     if not isinstance(value, Mapping):
         refuse_value(name, value, "a table")
     return value
 
 
-def key(check: Callable[[Any, str], object], meaning: str, default: object = None) -> Any:  # noqa: ANN401 - a field of any type
+def key(check: Check, meaning: str, default: object = None) -> Any:  # noqa: ANN401 - a field of any type
     """Declare a key: its check, which returns the value or raises InputError, and its meaning."""
     metadata = {"check": check, "meaning": meaning}
     if default == {}:
@@ -107,14 +96,14 @@ class TomlTable:
         """Replace each stated value by that of its check, or raise InputError."""
         for name in self.stated:
             check = self.__dataclass_fields__[name].metadata["check"]
-            object.__setattr__(self, name, check(getattr(self, name), f"{self.title}{name}"))
+            object.__setattr__(self, name, check(f"{self.title}{name}", getattr(self, name)))
 
     @classmethod
-    def read(cls, value: object, name: str) -> Self:
+    def read(cls, name: str, value: object) -> Self:
         """Return a table from that of a file; raise InputError if a key is unknown."""
         if isinstance(value, cls):
             return value
-        table = require_table(value, name)
+        table = require_table(name, value)
         refuse_unknown(name, table, [entry.name for entry in fields(cls)])
         return cls(**table)
 

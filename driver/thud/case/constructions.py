@@ -23,10 +23,10 @@ from thud.base.display import Displayed
 from thud.base.errors import InputError
 from thud.base.files import inputs_folder
 from thud.base.toml_tables import (
-    Choice,
-    Number,
     TomlTable,
+    between,
     key,
+    one_of,
     read_toml,
     require_table,
     to_line,
@@ -50,10 +50,10 @@ class Layer(TomlTable):
     """A layer of a floor, with width and spacing of members such as joists; 0: none."""
 
     material: str = key(to_text, "name of the material", "")
-    thickness: float = key(Number(1e-5, 10.0, "m"), "thickness", 0.0)
-    density: float = key(Number(0.1, 1e5, "kg/m3"), "mean density", 0.0)
-    width: float = key(Number(1e-3, 10.0, "m"), "width of members such as joists", 0.0)
-    spacing: float = key(Number(1e-2, 10.0, "m"), "distance between their axes", 0.0)
+    thickness: float = key(between(1e-5, 10.0, "m"), "thickness", 0.0)
+    density: float = key(between(0.1, 1e5, "kg/m3"), "mean density", 0.0)
+    width: float = key(between(1e-3, 10.0, "m"), "width of members such as joists", 0.0)
+    spacing: float = key(between(1e-2, 10.0, "m"), "distance between their axes", 0.0)
 
     def __post_init__(self) -> None:
         """Raise InputError if a value is not allowed or missing."""
@@ -279,7 +279,7 @@ def _sides(case: Case) -> tuple[float, float] | None:
 
 @dataclass(frozen=True)
 class _Sourced(TomlTable):
-    value: Any = key(lambda value, _: value, "value of a key")
+    value: Any = key(lambda _, value: value, "value of a key")
     source: str = key(to_text, "its source", "")
 
     def __post_init__(self) -> None:
@@ -292,20 +292,20 @@ def _read_each(kind: type[Table], tables: Mapping[str, object]) -> list[Table]:
     result = []
     for label, table in tables.items():
         try:
-            result.append(kind.read(table, "the table"))
+            result.append(kind.read("the table", table))
         except InputError as error:
             raise error.within(label) from error
     return result
 
 
-def _to_sourced(value: object, name: str) -> dict[str, _Sourced]:
+def _to_sourced(name: str, value: object) -> dict[str, _Sourced]:
     """Return value and source of each key in a table."""
-    table = require_table(value, name)
+    table = require_table(name, value)
     entries = _read_each(_Sourced, {f"[{name}] {word}": table[word] for word in table})
     return dict(zip(table, entries, strict=True))
 
 
-def _to_layers(value: object, name: str) -> tuple[Layer, ...]:
+def _to_layers(name: str, value: object) -> tuple[Layer, ...]:
     """Return the layers in a list of tables."""
     if not isinstance(value, list) or not value:
         refuse_value(name, value, "a list of tables with material, thickness and density")
@@ -318,7 +318,7 @@ class _File(TomlTable):
 
     name: str = key(to_text, "name of the construction", "")
     kind: str = key(to_text, "kind, such as timber joists", "")
-    floor: str = key(Choice(FLOORS), "name of the floor", "")
+    floor: str = key(one_of(FLOORS), "name of the floor", "")
     layers: tuple[Layer, ...] = key(_to_layers, "layers from top to bottom", ())
     keys: dict[str, _Sourced] = key(_to_sourced, "keys of the floor", {})
     room: dict[str, _Sourced] = key(_to_sourced, "keys of the suspended ceiling", {})
@@ -338,7 +338,7 @@ def read_construction(path: Path) -> Construction:
     """
     content, _ = read_toml(path)
     try:
-        file = _File.read(content, "the construction")
+        file = _File.read("the construction", content)
         room = {name: entry.value for name, entry in file.room.items()}
         floor = {name: entry.value for name, entry in file.keys.items()}
         case = Case.from_namelist({"floor": {"name": file.floor}, file.floor: floor, "room": room})

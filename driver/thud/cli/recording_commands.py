@@ -10,7 +10,6 @@ from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
-from thud.base.toml_tables import Choice, Number
 from thud.cli.command import (
     NO_FIGURES,
     NOT_CONFORMING,
@@ -106,13 +105,14 @@ FLAGS = {"begin": "--from", "end": "--to"}
 def _option(name: str) -> Argument:
     """Return the option of a key of the configuration."""
     entry = Config.__dataclass_fields__[name].metadata
-    check = entry["check"]
+    # Of the check of a number or a choice.
+    limits = getattr(entry["check"], "keywords", {})
     settings: dict[str, Any] = {"dest": name, "help": entry["meaning"]}
-    if isinstance(check, Choice):
-        settings["choices"] = tuple(check.words)
+    if "allowed" in limits:
+        settings["choices"] = tuple(limits["allowed"])
     else:
         settings["metavar"] = OF_THE_CONFIGURATION[name]
-    if isinstance(check, Number):
+    if "low" in limits:
         settings["type"] = number
     if name == "calibration":
         settings["action"] = "append"

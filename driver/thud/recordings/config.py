@@ -13,10 +13,10 @@ from thud.base.checks import refuse_unknown, refuse_value, require_number, requi
 from thud.base.errors import InputError
 from thud.base.note import Note
 from thud.base.toml_tables import (
-    Choice,
-    Number,
     TomlTable,
+    between,
     key,
+    one_of,
     read_toml,
     require_table,
     to_line,
@@ -47,25 +47,30 @@ MAX_FACTOR = 1e30
 EXAMPLES = '"sum", "F1+F2+F3+F4" or a list of names or numbers'
 
 
-def to_date(value: object, name: str) -> str:
+def to_date(name: str, value: object) -> str:
     """Return a date as text in ISO 8601; empty if not stated."""
-    text = value.isoformat() if isinstance(value, date) else to_line(value, name)
+    text = value.isoformat() if isinstance(value, date) else to_line(name, value)
     day = read_date(text) if text else None
     if text and day is None:
         refuse_value(name, value, 'a date, such as "2024-05-03"')
     return day.date().isoformat() if day else ""
 
 
-def to_channel(value: object, name: str) -> int | str:
+def to_channel(name: str, value: object) -> int | str:
     """Return the number or the name of a channel."""
     is_number = isinstance(value, Integral)
-    return require_whole(name, value, 1, MAX_CHANNEL) if is_number else to_line(value, name)
+    return require_whole(name, value, 1, MAX_CHANNEL) if is_number else to_line(name, value)
 
 
-def require_channels(value: object, name: str = "channels") -> str | tuple[int | str, ...]:
+def to_unit(name: str, value: object) -> str:
+    """Return the unit of recorded values that a text names."""
+    return require_unit(value, name)
+
+
+def to_channels(name: str, value: object) -> str | tuple[int | str, ...]:
     """Return ``"sum"`` or names and numbers of channels; raise InputError if they are neither.
 
-    >>> require_channels("F1 + F2 + 3")
+    >>> to_channels("channels", "F1 + F2 + 3")
     ('F1', 'F2', 3)
     """
     cells: Any = value if isinstance(value, list | tuple) else ()
@@ -80,15 +85,15 @@ def require_channels(value: object, name: str = "channels") -> str | tuple[int |
     return tuple(cells)
 
 
-def to_calibrations(value: Any, name: str) -> Any:  # noqa: ANN401 - of a user; one, or a tuple
+def to_calibrations(name: str, value: Any) -> Any:  # noqa: ANN401 - of a user; one, or a tuple
     """Return a calibration, also that of a list of one, or one for each channel.
 
     Each is a number, a chain of factors or a `Calibration`.
     """
     if isinstance(value, list | tuple):
         if len(value) == 1:
-            return to_calibrations(value[0], name)
-        return tuple(to_calibrations(v, f"{name}, entry {i}") for i, v in enumerate(value, 1))
+            return to_calibrations(name, value[0])
+        return tuple(to_calibrations(f"{name}, entry {i}", v) for i, v in enumerate(value, 1))
     try:
         value = float(value) if isinstance(value, str) else value
     except ValueError:
@@ -110,30 +115,30 @@ def parse_numbers(text: str, name: str) -> list[range]:
     return ranges
 
 
-def to_numbers(value: object, name: str) -> str:
+def to_numbers(name: str, value: object) -> str:
     """Return the text of numbers of drops."""
-    text = to_line(value, name)
+    text = to_line(name, value)
     parse_numbers(text, name)
     return text
 
 
-def to_reasons(value: object, name: str) -> dict[str, str]:
+def to_reasons(name: str, value: object) -> dict[str, str]:
     """Return reasons by numbers of drops."""
-    table = require_table(value, name)
+    table = require_table(name, value)
     return {
-        to_numbers(str(drops), name): to_text(reason, f"{name}: reason of {drops}")
+        to_numbers(name, str(drops)): to_text(f"{name}: reason of {drops}", reason)
         for drops, reason in table.items()
     }
 
 
-def to_limits(value: object, name: str) -> dict[str, tuple[float, float]]:
+def to_limits(name: str, value: object) -> dict[str, tuple[float, float]]:
     """Return minimum and maximum by criterion."""
-    table = require_table(value, name)
+    table = require_table(name, value)
     refuse_unknown(name, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
     limits = {}
     for criterion, span in table.items():
         label = f"{name}: {criterion}"
-        low, high = to_pair(span, label, "[minimum, maximum]", Number(-1e6, 1e6))
+        low, high = to_pair(label, span, "[minimum, maximum]", -1e6, 1e6)
         if not low < high:
             refuse_value(label, span, "minimum < maximum")
         limits[criterion] = (low, high)
@@ -152,18 +157,18 @@ class Instrument(TomlTable):
     due: str = key(to_date, "date of the next calibration", "")
 
 
-def to_instruments(value: object, name: str) -> tuple[Instrument, ...]:
+def to_instruments(name: str, value: object) -> tuple[Instrument, ...]:
     """Return instruments from a list of names or tables, or from one of them."""
     return tuple(
-        Instrument(entry) if isinstance(entry, str) else Instrument.read(entry, name)
+        Instrument(entry) if isinstance(entry, str) else Instrument.read(name, entry)
         for entry in (value if isinstance(value, list | tuple) else [value])
     )
 
 
-def to_lines(value: object, name: str) -> tuple[str, ...]:
+def to_lines(name: str, value: object) -> tuple[str, ...]:
     """Return the lines of a list, or a single line."""
     lines = value if isinstance(value, list | tuple) else [value]
-    return tuple(to_line(line, name) for line in lines)
+    return tuple(to_line(name, line) for line in lines)
 
 
 @dataclass(frozen=True)
@@ -183,8 +188,8 @@ class ReportConfig(TomlTable):
     deviations: str = key(to_line, "deviations from the procedure", "")
     traceability: str = key(to_line, "metrological traceability of the results", "")
     # Below 1 % it is likely to be a fraction.
-    humidity: float | None = key(Number(1.0, 100.0, "%"), "relative humidity of the air")
-    pressure: float | None = key(Number(5e4, 1.2e5, "Pa"), "static pressure of the air")
+    humidity: float | None = key(between(1.0, 100.0, "%"), "relative humidity of the air")
+    pressure: float | None = key(between(5e4, 1.2e5, "Pa"), "static pressure of the air")
     accreditation: str = key(to_line, "text on the accreditation", "")
     accreditation_mark: str = key(to_line, "file of the accreditation mark: SVG, PNG or JPEG", "")
     authorized_by: str = key(to_line, "person who authorizes the report", "")
@@ -195,12 +200,12 @@ class Properties(TomlTable):
     """Properties of the ball that are stated, not assessed (ISO 10140-5, annex F)."""
 
     title = "properties: "
-    diameter: float | None = key(Number(0.01, 10.0, "m"), "outer diameter")
-    wall_thickness: float | None = key(Number(1e-4, 1.0, "m"), "wall thickness")
+    diameter: float | None = key(between(0.01, 10.0, "m"), "outer diameter")
+    wall_thickness: float | None = key(between(1e-4, 1.0, "m"), "wall thickness")
     hardness: str = key(to_line, "hardness with its scale", "")
     surface: str = key(to_line, "condition of the surface", "")
     temperature: float | None = key(
-        Number(-273.15, 200.0, "degC"), "temperature of the ball, if not that of the air"
+        between(-273.15, 200.0, "degC"), "temperature of the ball, if not that of the air"
     )
 
 
@@ -212,36 +217,34 @@ class Config(TomlTable):
     ball: str = key(to_line, "name of the ball", "")
     serial: str = key(to_line, "serial number of the ball", "")
     date: str = key(to_date, "date of the measurement; by default that of the files", "")
-    source: LimitsSource = key(Choice(SOURCES), "source whose limits apply", SOURCES[0])
-    temperature: float | None = key(Number(-273.15, 200.0, "degC"), "temperature of ball and air")
+    source: LimitsSource = key(one_of(SOURCES), "source whose limits apply", SOURCES[0])
+    temperature: float | None = key(between(-273.15, 200.0, "degC"), "temperature of ball and air")
     instruments: tuple[Instrument, ...] = key(
         to_instruments, "names of instruments, or tables with their certificates", ()
     )
     channel: int | str | None = key(to_channel, "channel of the force, by number or name")
     channels: str | tuple[int | str, ...] | None = key(
-        require_channels, "load cells whose forces are added: sum for all channels of force"
+        to_channels, "load cells whose forces are added: sum for all channels of force"
     )
-    unit: str | None = key(
-        require_unit, "unit of the recorded values, if the file does not state it"
-    )
+    unit: str | None = key(to_unit, "unit of the recorded values, if the file does not state it")
     calibration: Calibration | float | tuple[Calibration | float, ...] | None = key(
         to_calibrations, 'factors such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"'
     )
     calibration_uncertainty: float | None = key(
-        Number(0.0, 0.5), "relative standard uncertainty of the calibration, such as 0.005"
+        between(0.0, 0.5), "relative standard uncertainty of the calibration, such as 0.005"
     )
-    polarity: str | None = key(Choice(POLARITIES), "sign of a compression in the file")
+    polarity: str | None = key(one_of(POLARITIES), "sign of a compression in the file")
     sample_rate: float | None = key(
-        Number(1.0, 1e9, "Hz"), "sample rate, if the file does not state it"
+        between(1.0, 1e9, "Hz"), "sample rate, if the file does not state it"
     )
-    mass: float | None = key(Number(0.01, 1000.0, "kg"), "mass of the source")
+    mass: float | None = key(between(0.01, 1000.0, "kg"), "mass of the source")
     # Above 10 m it is likely to be stated in cm.
-    height: float | None = key(Number(0.001, 10.0, "m"), "drop height")
+    height: float | None = key(between(0.001, 10.0, "m"), "drop height")
     mass_uncertainty: float | None = key(
-        Number(0.0, 100.0, "kg"), "standard uncertainty of the mass"
+        between(0.0, 100.0, "kg"), "standard uncertainty of the mass"
     )
     height_uncertainty: float | None = key(
-        Number(0.0, 1.0, "m"), "standard uncertainty of the height"
+        between(0.0, 1.0, "m"), "standard uncertainty of the height"
     )
     plate: Plate | None = key(Plate.read, "the force plate")
     filter: RecorderFilter | None = key(RecorderFilter.read, "the low-pass filter of the recorder")
@@ -251,8 +254,8 @@ class Config(TomlTable):
     leave_out: Mapping[str, str] = key(
         to_reasons, 'drops to be left out, with the reason: {"3": "touched"}', {}
     )
-    begin: float | None = key(Number(0.0, 1e9, "s"), "begin of the searched section of each file")
-    end: float | None = key(Number(0.0, 1e9, "s"), "end of the searched section of each file")
+    begin: float | None = key(between(0.0, 1e9, "s"), "begin of the searched section of each file")
+    end: float | None = key(between(0.0, 1e9, "s"), "end of the searched section of each file")
     limits: Mapping[str, tuple[float, float]] = key(
         to_limits, "minimum and maximum by criterion, which replace those of the standards", {}
     )

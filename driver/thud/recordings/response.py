@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_whole
 from thud.base.note import Note
-from thud.base.toml_tables import Choice, Number, TomlTable, key, to_pair
+from thud.base.toml_tables import TomlTable, between, key, one_of, to_pair
 from thud.base.units import frequency_text
 from thud.level.levels import get_bands
 
@@ -35,15 +35,15 @@ MAX_ORDER = 12
 LOWEST_RESPONSE = 1 / 3
 
 
-def _to_linearity(value: object, name: str) -> tuple[tuple[float, float], ...]:
+def _to_linearity(name: str, value: object) -> tuple[tuple[float, float], ...]:
     """Return pairs of an applied and an indicated force, N."""
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
         refuse_value(name, value, "two or more pairs [applied, indicated], N")
-    return tuple(to_pair(pair, name, "[applied, indicated]", Number(1e-3, 1e9)) for pair in pairs)
+    return tuple(to_pair(name, pair, "[applied, indicated]", 1e-3, 1e9) for pair in pairs)
 
 
-def _to_order(value: object, name: str) -> int:
+def _to_order(name: str, value: object) -> int:
     return require_whole(name, value, 1, MAX_ORDER)
 
 
@@ -52,21 +52,21 @@ class Plate(TomlTable):
     """A force plate; the force on it excites its first mode of vibration, which is corrected."""
 
     title = "plate: "
-    f0: float = key(Number(1.0, 1e6, "Hz"), "frequency of the first resonance", math.nan)
-    Q: float = key(Number(0.5, 1e6), "quality factor of the first resonance", math.nan)
+    f0: float = key(between(1.0, 1e6, "Hz"), "frequency of the first resonance", math.nan)
+    Q: float = key(between(0.5, 1e6), "quality factor of the first resonance", math.nan)
     f0_uncertainty: float | None = key(
-        Number(0.0, 0.5), "relative standard uncertainty of the resonance"
+        between(0.0, 0.5), "relative standard uncertainty of the resonance"
     )
     share: float | None = key(
-        Number(0.001, 1.0), "share of this mode in the static response, 1 for a mass on a spring"
+        between(0.001, 1.0), "share of this mode in the static response, 1 for a mass on a spring"
     )
     flat_limit: float | None = key(
-        Number(100.0, 1e6, "Hz"),
+        between(100.0, 1e6, "Hz"),
         "frequency up to which the response is flat within 2 %, if no resonance is stated",
     )
-    time_constant: float | None = key(Number(1e-3, 1e9, "s"), "time constant of the amplifier")
+    time_constant: float | None = key(between(1e-3, 1e9, "s"), "time constant of the amplifier")
     full_scale: float | None = key(
-        Number(1.0, 1e9, "N"), "largest force that plate and recorder can measure"
+        between(1.0, 1e9, "N"), "largest force that plate and recorder can measure"
     )
     linearity: tuple[tuple[float, float], ...] = key(
         _to_linearity, "pairs of a force applied and the force indicated, N", ()
@@ -117,12 +117,12 @@ class RecorderFilter(TomlTable):
 
     title = "filter: "
     kind: str = key(
-        Choice((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
+        one_of((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
     )
     order: int | None = key(_to_order, "order")
-    cutoff: float = key(Number(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
+    cutoff: float = key(between(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
     cutoff_uncertainty: float | None = key(
-        Number(0.0, 0.5), "relative standard uncertainty of the cutoff"
+        between(0.0, 0.5), "relative standard uncertainty of the cutoff"
     )
 
     def __post_init__(self) -> None:
