@@ -370,6 +370,7 @@ def test_two_outliers_do_not_hide_each_other_and_noise_marks_none() -> None:
     ]
     assert find_outliers(values, NAMES, "level", uncertainty=[20.0] * 15) == ()
     assert find_outliers([1.0, np.nan, 2.0], NAMES, "level") == ()
+    assert find_outliers([np.nan] * 3, NAMES, "level") == ()
 
 
 def through_plate(

@@ -69,11 +69,12 @@ def find_outliers(
     remaining = np.flatnonzero(np.isfinite(data))
     tested: list[Note] = []
     last = 0
-    for step in range(max(1, len(remaining) // 5)):
-        count, mean = len(remaining), data[remaining].mean()
-        distances = np.abs(data[remaining] - mean)
-        # Two values are equally far from their mean.
-        if count < 3 or distances.max() <= ROUNDING:  # noqa: PLR2004
+    # Two values are equally far from their mean.
+    steps = max(1, len(remaining) // 5) if len(remaining) > 2 else 0  # noqa: PLR2004
+    for step in range(steps):
+        count = len(remaining)
+        distances = np.abs(data[remaining] - data[remaining].mean())
+        if distances.max() <= ROUNDING:
             break
         worst = int(remaining[np.argmax(distances)])
         score = float(distances.max() / data[remaining].std(ddof=1))
