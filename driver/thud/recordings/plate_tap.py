@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.signal import peak_widths
+from scipy.signal import find_peaks
 from scipy.special import chdtrc, fdtrc, stdtrit
 
 from thud.base.checks import refuse
@@ -52,12 +53,11 @@ TINY = 1e-300
 # Maximum number of samples of a record, and minimum sample rate, Hz.
 MAX_SAMPLES = 2**24
 MIN_RATE = 2000.0
-# Cells, s, in which taps are searched. The range of the level in a tap exceeds MIN_RISE times the
-# usual one, and MIN_HEIGHT of the largest; between two taps it does not for QUIET, s.
-CELL = 1e-3
-MIN_RISE = 4.0
+# Minimum height of a tap in medians of the magnitude of the level (7 standard deviations of noise),
+# and as a fraction of the largest; minimum time between taps, s, within which a plate rings.
+MIN_RISE = 10.0
 MIN_HEIGHT = 0.1
-QUIET = 0.03
+APART = 0.1
 # Longest time, s, from the peak of a tap to the end of the contact and to that of its section, and
 # of its noise before it.
 CONTACT = 6e-3
@@ -182,44 +182,37 @@ def calibrate_tap(
         )
     fits = [modes for modes in fits if not _misfit(modes)] or fits
     # Weaker taps may show another resonance first.
-    strongest = max((mode for modes in fits for mode in modes), key=_static_response).frequency
-    nearest = [
-        (min(modes, key=lambda mode: abs(mode.frequency - strongest)), modes) for modes in fits
-    ]
-    same = [pair for pair in nearest if abs(pair[0].frequency / strongest - 1) < SAME]
-    firsts = [mode for mode, _ in same]
-    frequency, u_frequency = _mean(
-        [mode.frequency for mode in firsts], [mode.frequency_uncertainty for mode in firsts]
-    )
-    quality, u_quality = _mean(
-        [mode.quality for mode in firsts], [mode.quality_uncertainty for mode in firsts]
-    )
+    strongest = max(itertools.chain(*fits), key=lambda mode: mode.amplitude / mode.frequency)
+
+    def shift(mode: Mode) -> float:
+        return abs(mode.frequency / strongest.frequency - 1)
+
+    fits = [modes for modes in fits if shift(min(modes, key=shift)) < SAME]
+    firsts = [min(modes, key=shift) for modes in fits]
+    frequency, u_frequency = _mean([(m.frequency, m.frequency_uncertainty) for m in firsts])
+    quality, u_quality = _mean([(m.quality, m.quality_uncertainty) for m in firsts])
     if not u_frequency <= MAX_UNCERTAINTY:
         refuse(
-            f"{name}: the resonance near {strongest:.4g} Hz is known to {100 * u_frequency:.2g} % "
+            f"{name}: the resonance near {frequency:.4g} Hz is known to {100 * u_frequency:.2g} % "
             "only",
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
-    others = max((modes for _, modes in same), key=len)
-    misfit = max(mode.misfit for mode in firsts)
+    misfit = _misfit(firsts)
     return TappedPlate(
         frequency,
         quality,
         math.hypot(u_frequency, CLOCK),
         u_quality,
         len(firsts),
-        tuple(m.frequency for m in others if abs(m.frequency / strongest - 1) >= SAME),
+        tuple(mode.frequency for mode in max(fits, key=len) if shift(mode) >= SAME),
         name,
         (Note("tap_misfit", name, misfit),) if misfit > MIN_MISFIT else (),
     )
 
 
-def _static_response(mode: Mode) -> float:
-    return mode.amplitude / mode.frequency
-
-
-def _mean(values: list[float], deviations: list[float]) -> tuple[float, float]:
+def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
     """Return the geometric mean of values with relative uncertainties, and its uncertainty."""
+    values, deviations = np.transpose(estimates)
     value, weight = np.log(values), 1 / np.maximum(deviations, MIN_UNCERTAINTY) ** 2
     mean, count = float(weight @ value / weight.sum()), len(values)
     if count == 1 or chdtrc(count - 1, weight @ (value - mean) ** 2) >= SIGNIFICANT:
@@ -237,78 +230,62 @@ class _Tap(NamedTuple):
 
 def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]:
     """Return the taps of a record; raise InputError if there is none."""
-    width = round(CELL * rate)
-    count = len(level) // width
-    height = np.ptp(level[: count * width].reshape(count, width), axis=1)
-    noise, highest = (float(np.median(height)), float(height.max())) if count else (0.0, 0.0)
-    above = np.flatnonzero(height > max(MIN_RISE * noise, MIN_HEIGHT * highest))
-    if not above.size:
+    # Zeros on both sides end a pulse that is cut off.
+    pulses = np.pad(np.abs(level - np.median(level)), 1) if level.size else np.zeros(2)
+    height = max(MIN_RISE * float(np.median(pulses)), MIN_HEIGHT * float(pulses.max()))
+    peaks, found = find_peaks(pulses, prominence=height, distance=round(APART * rate), width=0)
+    if not peaks.size:
         refuse(f"{name}: no tap", "a record in which a hammer taps the plate")
-    # The last cell of the tap before, and the first of each.
-    previous = np.append(-1, above[:-1])
-    firsts = above - previous > round(QUIET / CELL)
-    firsts[0] = True
-    begins = width * above[firsts]
-    stops = [*(begins[1:] - width), len(level)]
-    taps = []
-    for begin, stop, quiet in zip(begins, stops, width * (previous[firsts] + 1), strict=True):
-        before = level[max(quiet, begin - round(BEFORE * rate)) : max(begin - width, 0)]
-        offset = float(np.median(before)) if before.size else 0.0
-        # Zeros on both sides end a pulse that is cut off.
-        pulse = np.pad(np.abs(level[begin : begin + 3 * round(CONTACT * rate)] - offset), 1)
-        peak = int(np.argmax(pulse))
-        if peak_widths(pulse, [peak])[0][0] <= CONTACT * rate:
-            top = begin + peak - 1
-            taps.append(_Tap(level[top : min(stop, top + round(AFTER * rate))], before))
-    if not taps:
+    tops = peaks[found["widths"] <= CONTACT * rate] - 1
+    if not tops.size:
         refuse(
             f"{name}: no tap, but the plate is pressed for more than {1e3 * CONTACT:g} ms, as by a "
             "drop",
             "a record in which a hard hammer taps the plate",
         )
-    return taps
+    contact, before, after = (round(length * rate) for length in (CONTACT, BEFORE, AFTER))
+    ends = [*(tops[1:] - contact), len(level)]
+    # The second half of what lies between two taps is quiet.
+    quiet = [0, *(tops[1:] + tops[:-1]) // 2]
+    return [
+        _Tap(level[top : min(end, top + after)], level[max(start, top - before) : top - contact])
+        for top, start, end in zip(tops, quiet, ends, strict=True)
+    ]
 
 
-def _fit_tap(tap: _Tap, rate: float) -> list[Mode] | None:
-    """Return the modes that ring after a tap; None if no resonance stands out.
+def _fit_tap(tap: _Tap, rate: float) -> list[Mode]:
+    """Return the modes that ring after a tap, with amplitudes at its peak.
 
     If what remains is noise after each contact has ended, the fit begins as early as it is.
     """
-    late = _fit_from(CONTACT, tap, rate)
-    if len(tap.before) < MIN_LENGTH or (late and _misfit(late)):
-        return late
-    for start in STARTS:
-        modes = _fit_from(start, tap, rate)
-        if modes and not _misfit(modes):
+    late: list[Mode] = []
+    for start in (CONTACT, *STARTS):
+        modes = [
+            mode._replace(amplitude=mode.amplitude * math.exp(math.pi * start * f / mode.quality))
+            for mode in fit_modes(tap.after[round(start * rate) :], rate, tap.before)
+            if (f := mode.frequency)
+        ]
+        if start == CONTACT:
+            late = modes
+            if len(tap.before) < MIN_LENGTH or _misfit(late):
+                break
+        elif modes and not _misfit(modes):
             return modes
     return late
 
 
-def _fit_from(start: float, tap: _Tap, rate: float) -> list[Mode] | None:
-    """Return the modes that ring from a time after the peak on, s, with amplitudes at the peak."""
-    modes = fit_modes(tap.after[round(start * rate) :], rate, tap.before)
-    return modes and [
-        mode._replace(
-            amplitude=mode.amplitude * math.exp(math.pi * start * mode.frequency / mode.quality)
-        )
-        for mode in modes
-    ]
-
-
 def _misfit(modes: list[Mode]) -> float:
-    return max(mode.misfit for mode in modes)
+    return max((mode.misfit for mode in modes), default=0.0)
 
 
-def fit_modes(
-    level: NDArray[np.float64], rate: float, quiet: NDArray[np.float64]
-) -> list[Mode] | None:
-    """Fit decaying oscillations to a level sampled at a rate, Hz.
+def fit_modes(level: NDArray[np.float64], rate: float, quiet: NDArray[np.float64]) -> list[Mode]:
+    """Return decaying oscillations fitted to a level sampled at a rate, Hz, if any stands out.
 
     `quiet` is the level before they begin; what remains of the fit is compared with its noise.
-    Return None if no resonance stands out.
     """
     noise = quiet - closest(quiet, np.zeros((0, 2)), rate)[0] if quiet.size else quiet
-    modes, parameters, used = None, np.zeros((0, 2)), level
+    modes: list[Mode] = []
+    parameters, used = np.zeros((0, 2)), level
     while len(parameters) < MAX_MODES and len(used) >= MIN_LENGTH:
         trial = _strongest(used - closest(used, parameters, rate)[0], rate)
         if trial is None or (np.abs(parameters[:, 0] / trial[0] - 1) < SAME).any():
