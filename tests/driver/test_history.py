@@ -31,7 +31,6 @@ from thud.report.ball_history import (
 )
 from thud.report.ball_history_figure import draw_history
 from thud.report.contents import FORMAT
-from thud.report.rows import criterion_style
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -196,8 +195,7 @@ def test_values_beyond_a_warning_limit_count_on_each_side(
         {**report["criteria"][0], "value": 39.0 + distance}
         for report, distance in zip(found.reports, distances, strict=True)
     ]
-    style = criterion_style(entries[0])
-    warnings = found._control_warnings(style, entries, ControlLimits(39.0, 1.0))  # noqa: SLF001
+    warnings = found._control_warnings("level", entries, ControlLimits(39.0, 1.0))  # noqa: SLF001
     assert len(warnings) == named
 
 

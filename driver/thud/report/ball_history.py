@@ -18,13 +18,15 @@ from thud.base.files import read_input
 from thud.base.immutable import Immutable
 from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
-from thud.report.rows import NOT_KNOWN, Style, criterion_style, limits_of, number, value_text
+from thud.report.rows import NOT_KNOWN, capital, number, quantity_of, value_text
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Iterable
 
     from numpy.typing import NDArray
+
+    from thud.base.key import Quantity
 
 YEAR = timedelta(days=365.25)
 # Probability that a trend is reported in any criterion of a ball that does not change.
@@ -133,8 +135,9 @@ class History:
         """Return the trend of each criterion; None with fewer than three dates, or equal values."""
         series = [(entries, self._known(entries)) for entries in self.criteria()]
         fitted = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
+        share = SIGNIFICANCE / max(sum(fitted), 1)
         return [
-            _trend(*columns, limits_of(entries[-1]), SIGNIFICANCE / sum(fitted))
+            _trend(*columns, (entries[-1]["lower"], entries[-1]["upper"]), share)
             if is_fitted
             else None
             for (entries, columns), is_fitted in zip(series, fitted, strict=True)
@@ -182,11 +185,12 @@ class History:
     def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: values by date, change per year and date of the limit."""
         criteria, last = self.criteria(), len(self.dates) - 1
-        styles = [criterion_style(entries[0]) for entries in criteria]
+        quantities = [quantity_of(entries[0]) for entries in criteria]
         temperatures = [_degrees(value) for value in self.temperatures()]
         balls = self.balls
         head = ("Ball",) if balls else ()
-        columns = [("", *head, *(style.title for style in styles), "Temperature, °C", "verdict")]
+        titles = [capital(quantity.label) for quantity in quantities]
+        columns = [("", *head, *titles, "Temperature, °C", "verdict")]
         for i in range(last + 1):
             if 0 < i <= last + 1 - MAX_COLUMNS:
                 continue
@@ -196,7 +200,7 @@ class History:
             ball = balls[i : i + 1]
             columns.append((day, *ball, *cells, temperatures[i], self.reports[i]["verdict"]))
         trends = self.trends()
-        slopes = (_slope(style, trend) for style, trend in zip(styles, trends, strict=True))
+        slopes = map(_slope, quantities, trends)
         none = ("",) * len(head)
         columns.append(("per year", *none, *slopes, "", ""))
         columns.append(("limit on", *none, *(self._limit(trend) for trend in trends), "", ""))
@@ -222,10 +226,11 @@ class History:
         for entries, trend, limits in zip(
             self.criteria(), self.trends(), self.control_limits(), strict=True
         ):
-            style = criterion_style(entries[0])
+            quantity = quantity_of(entries[0])
+            title = capital(quantity.label)
             if trend is not None and trend.significant:
-                slope = _slope(style, trend).removesuffix(SIGNIFICANT)
-                text = f"{style.title}: changes by {slope} per year{temperature}"
+                slope = _slope(quantity, trend).removesuffix(SIGNIFICANT)
+                text = f"{title}: changes by {slope} per year{temperature}"
                 date = self._date_text(trend.reached)
                 if date:
                     start = self._date_text(trend.earliest) or "before the first report"
@@ -233,11 +238,11 @@ class History:
                     text += f"; reached a limit on {date} (95 %: {start} to {end})"
                 warnings.append(text)
             if limits is not None:
-                warnings += self._control_warnings(style, entries, limits)
+                warnings += self._control_warnings(title, entries, limits)
         return warnings
 
     def _control_warnings(
-        self, style: Style, entries: list[dict[str, Any]], limits: ControlLimits
+        self, title: str, entries: list[dict[str, Any]], limits: ControlLimits
     ) -> list[str]:
         years, values, _ = self._known(entries)
         beyond = zip(years, limits.beyond(values, ACTION), strict=True)
@@ -245,12 +250,12 @@ class History:
         warnings = []
         if dates:
             warnings.append(
-                f"{style.title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
+                f"{title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
             )
         sides = limits.beyond(values[-3:], WARNING).tolist()
         if max(sides.count(1.0), sides.count(-1.0)) > 1:
             warnings.append(
-                f"{style.title}: two of the last three values lie beyond one warning limit "
+                f"{title}: two of the last three values lie beyond one warning limit "
                 f"({WARNING:g} σ)"
             )
         return warnings
@@ -446,12 +451,12 @@ def _crossing(
     return distance / slope, low, high
 
 
-def _slope(style: Style, trend: Trend | None) -> str:
+def _slope(quantity: Quantity, trend: Trend | None) -> str:
     """Return a slope with its expanded uncertainty as text, marked if it is significant."""
     if trend is None:
         return "–"
-    slope, expanded = trend.slope / style.unit, trend.expanded / style.unit
-    decimals = style.decimals + 1
+    slope, expanded = (width * quantity.display_scale for width in (trend.slope, trend.expanded))
+    decimals = quantity.decimals + 1
     sign = "+" if round(slope, decimals) > 0 else ""
     mark = SIGNIFICANT if trend.significant else ""
     return f"{sign}{number(slope, decimals)} ± {number(expanded, decimals)}{mark}"

@@ -20,7 +20,7 @@ from thud.plot.style import (
     own_style,
 )
 from thud.report.ball_history import ACTION, WARNING
-from thud.report.rows import NOT_KNOWN, criterion_style, limits_of
+from thud.report.rows import NOT_KNOWN, capital, quantity_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,10 +64,10 @@ def draw_history(history: History) -> Figure:
     for axes, entries, trend, limits in zip(panels, criteria, trends, control, strict=False):
         _draw_criterion(axes, history, entries, trend)
         if limits is not None:
-            unit = criterion_style(entries[0]).unit
+            scale = quantity_of(entries[0]).display_scale
             for factor, line in CONTROL.items():
                 for sign in (-1, 1):
-                    y = (limits.mean + sign * factor * limits.deviation) / unit
+                    y = (limits.mean + sign * factor * limits.deviation) * scale
                     axes.axhline(y, **line)
     if has_temperature:
         _draw_temperature(panels[len(criteria)], history)
@@ -91,8 +91,9 @@ def draw_history(history: History) -> Figure:
 def _draw_criterion(
     axes: Axes, history: History, entries: list[dict[str, Any]], trend: Trend | None
 ) -> None:
-    style = criterion_style(entries[0])
-    bounds = np.array([limits_of(entry) for entry in entries]) / style.unit
+    quantity = quantity_of(entries[0])
+    scale = quantity.display_scale
+    bounds = np.array([(entry["lower"], entry["upper"]) for entry in entries]) * scale
     # A count has a single allowed value: its area gets a height.
     is_count = bounds[0, 0] == bounds[0, 1]
     bounds += is_count * np.array([-0.4, 0.4])
@@ -106,26 +107,26 @@ def _draw_criterion(
         if entry["value"] is None:
             continue
         marker, color = MARKS.get(entry["verdict"], ("D", "white"))
-        bar = (entry["expanded_uncertainty"] or 0.0) / style.unit
+        bar = (entry["expanded_uncertainty"] or 0.0) * scale
         axes.errorbar(
-            date, entry["value"] / style.unit, yerr=bar,  # type: ignore[arg-type]
+            date, entry["value"] * scale, yerr=bar,  # type: ignore[arg-type]
             marker=marker, markersize=4.5, markerfacecolor=color, color="black", capsize=2,
             elinewidth=0.8, markeredgewidth=0.7,
         )  # fmt: skip
         if numbers:
             axes.annotate(
-                str(numbers[history.balls[i]]), (date, entry["value"] / style.unit),
+                str(numbers[history.balls[i]]), (date, entry["value"] * scale),
                 (3, 4), textcoords="offset points", fontsize="x-small",
             )  # fmt: skip
     if all(entry["value"] is None for entry in entries):
         axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
     if trend is not None and trend.significant:
         dates = np.array([history.date(year) for year in trend.time])
-        axes.plot(dates, trend.value / style.unit, color=COLORS[0], linewidth=1, linestyle="--")
+        axes.plot(dates, trend.value * scale, color=COLORS[0], linewidth=1, linestyle="--")
     axes.margins(y=0.15)
     if is_count:
         axes.yaxis.set_major_locator(MultipleLocator(1))
-    axes.set_ylabel(style.title.replace(", ", ",\n"))
+    axes.set_ylabel(capital(quantity.label).replace(", ", ",\n"))
 
 
 def _draw_temperature(axes: Axes, history: History) -> None:

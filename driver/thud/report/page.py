@@ -19,13 +19,13 @@ from thud.report.rows import (
     HEAD,
     INCOMPLETE,
     NOT_KNOWN,
+    capital,
     criterion_row,
-    criterion_style,
     excluded_text,
     expanded_text,
     freedom_text,
-    limits_of,
     number,
+    quantity_of,
     value_text,
     width_text,
 )
@@ -100,7 +100,7 @@ def report_page(
         budget_head=BUDGET_HEAD,
         budgets=[_budget(criterion) for criterion in criteria if _has_budget(criterion)],
         without_budget=", ".join(
-            criterion_style(criterion).quantity.title
+            quantity_of(criterion).title
             for criterion in criteria
             if criterion["name"] != COUNT and not criterion["uncertainty"]
         ),
@@ -127,7 +127,7 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     parts = []
     for verdict in VERDICTS[1:]:
         matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
-        if names := [criterion_style(criterion).quantity.title for criterion in matching]:
+        if names := [quantity_of(criterion).title for criterion in matching]:
             parts.append(f"{verdict}: {', '.join(names)}")
     parts = parts or ["all criteria are met"]
     if any(criterion["excluded"] for criterion in criteria):
@@ -226,16 +226,17 @@ def _has_budget(criterion: dict[str, Any]) -> bool:
 def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
     """Return summary and contributions of the uncertainty budget of a criterion."""
     combined = criterion["uncertainty"]
-    style = criterion_style(criterion)
-    unit = style.quantity.display_unit
+    quantity = quantity_of(criterion)
+    unit, scale = quantity.display_unit, quantity.display_scale
 
     def with_unit(value: float, unit: str) -> str:
         return f"{width_text(value)} {unit}".rstrip()
 
+    result = f"{value_text(criterion)} ± {expanded_text(criterion)} {unit}".rstrip()
     summary = "; ".join(
         [
-            f"{style.name}: {value_text(criterion)} ± {expanded_text(criterion)} {unit}".rstrip(),
-            f"u = {with_unit(combined / style.unit, unit)}",
+            f"{capital(quantity.title)}: {result}",
+            f"u = {with_unit(combined * scale, unit)}",
             f"degrees of freedom {freedom_text(criterion['freedom'])}",
             f"k = {number(criterion['coverage_factor'], 2)}",
         ]
@@ -245,14 +246,14 @@ def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
         if not part["uncertainty"]:
             continue
         share = f"{100 * (part['uncertainty'] / combined) ** 2:.1f} %"
-        size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] / style.unit, unit), "1"
+        size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] * scale, unit), "1"
         if part["size"] is not None:
             size = with_unit(part["size"], part["unit"])
             per = f"/{part['unit']}" if part["unit"] else ""
-            sensitivity = with_unit(part["sensitivity"] / style.unit, f"{unit}{per}")
+            sensitivity = with_unit(part["sensitivity"] * scale, f"{unit}{per}")
         rows.append((
             part["name"], part["kind"], size, f"{part['divisor']:.4g}", sensitivity,
-            with_unit(part["uncertainty"] / style.unit, unit), freedom_text(part["freedom"]),
+            with_unit(part["uncertainty"] * scale, unit), freedom_text(part["freedom"]),
             share if part["counted"] else "included",
         ))  # fmt: skip
     return summary, rows
@@ -260,7 +261,7 @@ def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
 
 def _range_picture(criterion: dict[str, Any]) -> Markup:
     """Return the limits of a criterion, its value and its expanded uncertainty as SVG."""
-    (lower, upper), value = limits_of(criterion), criterion["value"]
+    lower, upper, value = (criterion[name] for name in ("lower", "upper", "value"))
     span = UPPER_LIMIT_X - LOWER_LIMIT_X
     box = f'<rect x="{LOWER_LIMIT_X}" y="1" width="{span}" height="8" fill="#ccc"/>'
     if value is None or lower == upper:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from thud.base.tables import Result
 from thud.level.assessment import criterion_quantity
@@ -31,36 +31,14 @@ SCATTER = "scatter between drops"
 INCOMPLETE = "†"
 
 
-class Style(NamedTuple):
-    """Format of a criterion: its quantity, and decimals."""
-
-    quantity: Quantity
-    decimals: int
-
-    @property
-    def name(self) -> str:
-        """Title without unit, with a capital."""
-        return self.quantity.title[:1].upper() + self.quantity.title[1:]
-
-    @property
-    def title(self) -> str:
-        """Title with unit, with a capital."""
-        return self.name + self.quantity.label.removeprefix(self.quantity.title)
-
-    @property
-    def unit(self) -> float:
-        """Size of the unit in SI units."""
-        return 1 / self.quantity.display_scale
-
-    def text(self, value: float | None, unknown: str = NOT_KNOWN) -> str:
-        """Return a value in the unit of the criterion as text."""
-        return unknown if value is None else number(value / self.unit, self.decimals)
+def quantity_of(criterion: dict[str, Any]) -> Quantity:
+    """Return the quantity of a criterion of a report."""
+    return criterion_quantity(criterion["name"])
 
 
-def criterion_style(criterion: dict[str, Any]) -> Style:
-    """Return the format of a criterion of a report."""
-    quantity = criterion_quantity(criterion["name"])
-    return Style(quantity, quantity.decimals)
+def capital(text: str) -> str:
+    """Return a text with a capital."""
+    return text[:1].upper() + text[1:]
 
 
 def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
@@ -69,28 +47,37 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     Value and margin have the decimals of U with two significant digits (JCGM 100, 7.2.6). A U that
     lacks contributions is marked; `excluded_text` names them.
     """
-    style, expanded = rounded_style(criterion), expanded_text(criterion)
-    ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
+    quantity, expanded = quantity_of(criterion), expanded_text(criterion)
+    scale, decimals = quantity.display_scale, _decimals_of(criterion)
+    ends = [f"{criterion[end] * scale:g}".replace("-", "−") for end in ("lower", "upper")]
     mark = "" if criterion["limits_of_standard"] else " *"
     spread = criterion["spread"]
     has_budget = expanded[-1].isdigit()
     return (
-        style.title,
+        capital(quantity.label),
         value_text(criterion),
         f"{expanded} {INCOMPLETE}" if criterion["excluded"] else expanded,
         " to ".join(dict.fromkeys(ends)) + mark,
-        style.text(criterion["margin"], "–"),
+        _text(criterion["margin"], scale, decimals),
         risk_text(criterion["probability"]) if has_budget else "–",
-        "–" if spread is None else width_text(spread / style.unit),
-        criterion_style(criterion).text(criterion["background"], "–"),
+        "–" if spread is None else width_text(spread * scale),
+        _text(criterion["background"], scale, quantity.decimals),
         Result(criterion["verdict"], criterion["verdict"]),
     )
 
 
 def value_text(criterion: dict[str, Any]) -> str:
     """Return the value of a criterion with the decimals of its expanded uncertainty, as text."""
-    is_bound = criterion["upper_bound"] and criterion["value"] is not None
-    return "at most " * is_bound + rounded_style(criterion).text(criterion["value"])
+    value, scale = criterion["value"], quantity_of(criterion).display_scale
+    if value is None:
+        return NOT_KNOWN
+    text = _text(value, scale, _decimals_of(criterion))
+    return f"at most {text}" if criterion["upper_bound"] else text
+
+
+def _text(value: float | None, scale: float, decimals: int) -> str:
+    """Return a value in another unit as text; a dash if there is none."""
+    return "–" if value is None else number(value * scale, decimals)
 
 
 def risk_text(probability: float | None) -> str:
@@ -130,17 +117,12 @@ def _allowance_text(criterion: dict[str, Any]) -> str:
     lacking = [name for name in criterion["excluded"] if name != SCATTER]
     if not lacking or not criterion["allowance"]:
         return ""
-    style = criterion_style(criterion)
-    size = f"{criterion['allowance'] / style.unit:.2g} {style.quantity.display_unit}".rstrip()
+    quantity = quantity_of(criterion)
+    size = f"{criterion['allowance'] * quantity.display_scale:.2g} {quantity.display_unit}".rstrip()
     if lacking == ["calibration"] and criterion["band"] is not None:
         percent = 100 * criterion["allowance"] / AMPLITUDE_DECIBEL
         size = f"{percent:.2g} % of calibration (U {NORMAL_FACTOR * percent:.2g} %)"
-    return f"{style.quantity.title} {criterion['verdict_if_stated']} up to {size}"
-
-
-def limits_of(criterion: dict[str, Any]) -> tuple[float, float]:
-    """Return minimum and maximum of a criterion."""
-    return criterion["lower"], criterion["upper"]
+    return f"{quantity.title} {criterion['verdict_if_stated']} up to {size}"
 
 
 def expanded_text(criterion: dict[str, Any]) -> str:
@@ -150,14 +132,16 @@ def expanded_text(criterion: dict[str, Any]) -> str:
     if not criterion["contributions"]:
         return "not stated"
     expanded = criterion["expanded_uncertainty"]
-    return NOT_KNOWN if expanded is None else width_text(expanded / criterion_style(criterion).unit)
+    if expanded is None:
+        return NOT_KNOWN
+    return width_text(expanded * quantity_of(criterion).display_scale)
 
 
-def rounded_style(criterion: dict[str, Any]) -> Style:
-    """Return the format of a criterion with the decimals of its expanded uncertainty."""
-    style = criterion_style(criterion)
-    expanded = (criterion["expanded_uncertainty"] or 0.0) / style.unit
-    return style._replace(decimals=_decimals(expanded)) if expanded > MIN_WIDTH else style
+def _decimals_of(criterion: dict[str, Any]) -> int:
+    """Return the decimals of the expanded uncertainty of a criterion, or those of its quantity."""
+    quantity = quantity_of(criterion)
+    expanded = (criterion["expanded_uncertainty"] or 0.0) * quantity.display_scale
+    return _decimals(expanded) if expanded > MIN_WIDTH else quantity.decimals
 
 
 def width_text(width: float) -> str:
