@@ -143,7 +143,8 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
     if len(entries) <= (not title):
         return
     handles, names = zip(*entries, strict=True)
-    size = "medium" if any(map(_has_formula, (*names, title))) else "small"
+    has_formula = any("$" in text.replace(r"\$", "") for text in (*names, title))
+    size = "medium" if has_formula else "small"
     rows = 0
     while True:
         rows += 1
@@ -157,10 +158,6 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
             figure.set_size_inches(width, height + box.height / figure.dpi)
             return
         legend.remove()
-
-
-def _has_formula(label: str) -> bool:
-    return "$" in label.replace(r"\$", "")
 
 
 def escape_label(label: str) -> str:
