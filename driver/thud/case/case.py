@@ -154,30 +154,33 @@ class Case(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         entries = self.resolved().entries()
-        rows = [(key.owner or key.group, key.name, str(value), key.unit) for key, value in entries]
+        rows = [
+            (key.owner or key.group, key.name, str(value), key.unit) for key, value, _ in entries
+        ]
         return [("group", "key", "value", "unit"), *rows]
 
-    def entries(self) -> Iterator[tuple[Key, object]]:
-        """Yield each key that the case has, but its name, with the value."""
+    def entries(self) -> Iterator[tuple[Key, object, float | None]]:
+        """Yield each key that the case has, but its name, with the value.
+
+        If that is None, the value of the standard ball by the model follows, else None.
+        """
+        model = self.model.name if self.model else ""
         for key, attribute in _ATTRIBUTES:
             options = getattr(self, attribute, None)
             is_used = self.model or attribute not in GROUPS or attribute == "ball"
             if options and is_used and key.owner in {"", attribute, getattr(options, "name", "")}:
-                yield key, getattr(options, key.name)
+                value = getattr(options, key.name)
+                is_open = value is None and key.owner in {"", model}
+                yield key, value, STANDARD_BALL.get((model, key.name)) if is_open else None
 
     def resolved(self) -> Self:
         """Return the case with the values of the standard ball by its model where keys are None."""
         values: dict[str, dict[str, object]] = {}
-        for key, value in self.entries():
-            if value is None and (standard := self._standard_value(key)) is not None:
+        for key, _, standard in self.entries():
+            if standard is not None:
                 values.setdefault(attribute_of(key), {})[key.name] = standard
         changed = {name: replace(getattr(self, name), **new) for name, new in values.items()}
         return replace(self, **changed)
-
-    def _standard_value(self, key: Key) -> float | None:
-        """Return the value of a key of the standard ball by the model; None if there is none."""
-        model = self.model.name if self.model else ""
-        return STANDARD_BALL.get((model, key.name)) if key.owner in {"", model} else None
 
     def to_namelist(self) -> Namelist:
         """Return the case as a namelist, which prints as the text of a file.
@@ -188,12 +191,20 @@ class Case(Displayed):
         numbers.
         """
         groups: dict[str, dict[str, object]] = {}
-        for key, value in ((KEYS[0], self.name), *self.entries()):
-            if value is None and self._standard_value(key) is not None:
+        for key, value, standard in ((KEYS[0], self.name, None), *self.entries()):
+            if standard is not None:
                 continue
             is_list = isinstance(value, tuple)
             entries = list(value) if isinstance(value, tuple) else [value]
-            if not all(map(_is_plain, entries)) or is_list is not (key.kind in {"list", "texts"}):
+            # What f90nml can write.
+            are_plain = all(
+                entry.isprintable()
+                if isinstance(entry, str)
+                else isinstance(entry, float)
+                or (isinstance(entry, int) and abs(entry) <= MAX_NUMBER)
+                for entry in entries
+            )
+            if not are_plain or is_list is not (key.kind in {"list", "texts"}):
                 refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
             group = groups.setdefault(key.group, {})
             if entries:
@@ -235,13 +246,6 @@ class Case(Displayed):
             stated = {k: content[g][k] for k, g in keys.items() if k in content.get(g, {})}
             attributes[attribute] = kind(**stated)
         return cls(**attributes)
-
-
-def _is_plain(value: object) -> bool:
-    """Whether f90nml can write a value."""
-    if isinstance(value, str):
-        return value.isprintable()
-    return isinstance(value, float) or (isinstance(value, int) and abs(value) <= MAX_NUMBER)
 
 
 def case_text(case: Case) -> bytes:
