@@ -15,7 +15,7 @@ import numpy as np
 from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR
 from thud.level.levels import get_bands, low_pass
-from thud.recordings.response import Plate, RecorderFilter
+from thud.recordings.response import Plate, RecorderFilter, filtered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -144,14 +144,9 @@ def mean_level_changes(
 
 def peak_uncertainty(drop: Drop, config: Config) -> float:
     """Return the standard uncertainty of a peak by instruments that are not stated, N."""
-    from scipy.fft import next_fast_len
-
     rate, force = drop.contact.sample_rate, np.pad(drop.contact.gated, 2)
-    length = next_fast_len(2 * len(force), real=True)
-    spectrum = np.fft.rfft(force, length)
-    frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)
     peaks = [
-        low_pass(np.fft.irfft(spectrum * gain(frequency), length)[: len(force)], rate).max()
+        low_pass(filtered(force, rate, gain, len(force)), rate).max()
         for name, gain, _ in find_doubts([drop], config)
         if name in ASSUMED
     ]
