@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.fft import next_fast_len
+from threadpoolctl import threadpool_limits
 
 from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Contribution, Estimate
@@ -104,8 +105,10 @@ def measure_levels(drops: Sequence[Drop], bands: BandSet = "octave") -> DropLeve
     They are the band energies of the force within the gate of each drop, less the expected energy
     of the noise. Raise InputError if the bands are unknown.
     """
-    # Shape (3, n_drop, n_band).
-    expected, deviation, quantized = np.moveaxis(band_noise(drops, get_bands(bands)), 2, 0)
+    # BLAS threads slow down the many small matrix products.
+    with threadpool_limits(1, "blas"):
+        energies = band_noise(drops, get_bands(bands))
+    expected, deviation, quantized = np.moveaxis(energies, 2, 0)
     contacts = [drop.contact for drop in drops]
     measured = np.array([
         force_exposure_levels(contact.gated, contact.sample_rate, bands) for contact in contacts
