@@ -65,7 +65,7 @@ def calls(folder: Path) -> list[tuple[Callable[..., Any], dict[str, Any]]]:
         (thud.modal_room, {"source": on_floor, "max_frequency": 60.0}),
         (thud.compress, {"points": 5}),
         (thud.assess_levels, {"levels": impact.levels().tolist(), "mass": 2.5, "peaks": 1}),
-        (thud.solve_many, {"parameters": {"height": [1.0]}, "sample_rate": 44100.0}),
+        (thud.solve_many, {"parameters": {"height": [1.0]}}),
         (thud.fit, {"target": impact, "parameters": ["height"], "max_steps": 1, "unknowns": ()}),
         (thud.predict_level, {"source": on_floor}),
     ]
