@@ -14,10 +14,12 @@ if TYPE_CHECKING:
     from thud.recordings.drops import Section
 
 # Minimum number of equal samples that are lost, and minimum jump into or out of them, as a fraction
-# of the peak: no flank rises as much between two samples at 20 kHz. Minimum of any jump in
+# of the peak: no flank rises as much between two samples at 20 kHz. It is at least MIN_SCORE
+# standard deviations of the noise, which may repeat coarse codes. Minimum of any jump in
 # quantization steps.
 MIN_LOST = 3
 MIN_LOSS = 0.04
+MIN_SCORE = 8.0
 MIN_STEPS = 3.5
 # Samples deviate from a cubic for MIN_GAP, s, by less than this fraction of the noise: one of
 # 10 000 does so by chance. The noise exceeds this fraction of the peak and a quantization step.
@@ -51,7 +53,8 @@ def check_lost(section: Section) -> tuple[Note, ...]:
     """
     force = section.force[slice(*section.contact)] - section.offset
     bounds = np.flatnonzero(np.diff(force, prepend=np.nan, append=np.nan) != 0)
-    limit = max(MIN_LOSS * float(force.max()), MIN_STEPS * section.quantization.step)
+    step, noise = section.quantization.step, section.noise
+    limit = max(MIN_LOSS * float(force.max()), MIN_STEPS * step, MIN_SCORE * noise)
     is_jump = np.abs(np.diff(force, prepend=force[0], append=force[-1]))[bounds] > limit
     jumps = is_jump[:-1].astype(int) + is_jump[1:]
     least = 1 + (np.abs(force[bounds[:-1]]) < limit / 2)
