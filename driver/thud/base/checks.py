@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # Maximum length of a value in a message; of longer values the message shows the type.
 MAX_SHOWN = 80
+# The same of a text or a path, which is cut.
+MAX_TEXT = 200
 # Maximum magnitude of all numbers; Python does not print much larger integers.
 MAX_NUMBER = 10**300
 # Maximum seed of the libraries that draw random samples.
@@ -162,6 +164,17 @@ def shown(value: object) -> str:
     if isinstance(value, str):
         return f"a text of {len(value)} characters"
     return f"an object of {type(value).__name__}"
+
+
+def shown_text(text: object) -> str:
+    """Return text of a file or a library, or a path, for a message: printable, in one line.
+
+    Of long texts both ends are shown.
+    """
+    line = " ".join(str(text).split())
+    if len(line) > MAX_TEXT:
+        line = f"{line[: MAX_TEXT // 2]} ... {line[-MAX_TEXT // 2 :]}"
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 def refuse_unknown(label: str, words: Iterable[str], known: Iterable[str]) -> None:

@@ -14,11 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
 
 from thud.base.bridge import ask
-from thud.base.checks import refuse
+from thud.base.checks import refuse, require_kind, shown_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
+# Maximum size of files that are read as a whole, bytes.
+MAX_IN_MEMORY = 2**27
+MIB = 2**20
 # Errors of a path that leads to no regular file.
 _NO_FILE = (
     errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR
@@ -185,6 +188,29 @@ def require_regular(path: Path) -> None:
     """Raise OSError if a file is missing or is not a regular one: opening others may block."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
+
+
+def regular_file(path: str | os.PathLike[str]) -> Path:
+    """Return a path; raise InputError if it is no readable regular file (a pipe could block)."""
+    require_kind("path", path, str | os.PathLike)
+    file = Path(path)
+    try:
+        require_regular(file)
+        file.open("rb").close()
+    except (OSError, ValueError) as error:  # a zero byte
+        reason = getattr(error, "strerror", "no path")
+        refuse(f"{shown_text(file)}: cannot be read ({reason})", "a file that can be read", error)
+    return file
+
+
+def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
+    """Raise InputError if a file that is read as a whole is too large."""
+    size = path.stat().st_size
+    if size > limit:
+        refuse(
+            f"{shown_text(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
+            f"up to {limit // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
+        )
 
 
 def content_of(path: Path) -> bytes | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.errors import ThudError
 from thud.base.units import scaled, size_of
 from thud.case.case import new_model
@@ -17,7 +17,6 @@ from thud.explorer.answer import new_case
 from thud.explorer.form import fields_by_key
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.recording_fields import PRESS_FIELDS
-from thud.recordings.channel import shown_text
 from thud.recordings.table import read_table
 from thud.recordings.words import plain
 from thud.studies.compression_fit import fit_compression

@@ -12,7 +12,7 @@ import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, shown
 from thud.base.units import size_of
-from thud.recordings.channel import guarded
+from thud.recordings.formats import guarded
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
 from thud.recordings.table import read_table
 

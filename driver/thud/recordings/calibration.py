@@ -9,10 +9,10 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import fdtrc
 
-from thud.base.checks import refuse, require_number
+from thud.base.checks import refuse, require_number, shown_text
+from thud.base.files import regular_file
 from thud.base.note import Note
 from thud.base.units import find_unit
-from thud.recordings.channel import regular_file, shown_text
 from thud.recordings.config import Config
 from thud.recordings.force_units import ALLOWED, Calibration, require_unit
 from thud.recordings.formats import read_channels

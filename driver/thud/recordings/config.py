@@ -9,8 +9,9 @@ from datetime import date
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse_unknown, refuse_value, require_number, require_whole
+from thud.base.checks import refuse_unknown, refuse_value, require_number, require_whole, shown_text
 from thud.base.errors import InputError
+from thud.base.files import regular_file
 from thud.base.note import Note
 from thud.base.toml_tables import (
     TomlTable,
@@ -25,7 +26,6 @@ from thud.base.toml_tables import (
 )
 from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
-from thud.recordings.channel import regular_file, shown_text
 from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.response import Chain, Plate, RecorderFilter
 from thud.recordings.signs import POLARITIES

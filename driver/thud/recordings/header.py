@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.units import UNITS, find_unit
-from thud.recordings.channel import shown_text
 from thud.recordings.words import (
     DATE,
     DATE_TIME,

@@ -6,14 +6,14 @@ import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse, shown, shown_text
 from thud.base.errors import InputError
+from thud.base.files import regular_file
 from thud.base.note import Note
 from thud.base.units import find_unit
-from thud.recordings.channel import MIN_SAMPLES, regular_file, shown_text
 from thud.recordings.config import SUM, Config
 from thud.recordings.force_units import ALLOWED, RECORDED, Calibration, newtons_per_unit
-from thud.recordings.formats import read_channels
+from thud.recordings.formats import MIN_SAMPLES, read_channels
 from thud.recordings.signal import Signal, add_signals
 from thud.recordings.signs import HINT, POLARITIES, find_peaks, orient
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from thud.recordings.channel import Channel
+    from thud.recordings.formats import Channel
 
 # Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and room for a filter.
 RATES = (2500.0, 1e8)

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.errors import InputError
+from thud.base.files import regular_file, require_small
 from thud.base.units import factor_to, size_of
 from thud.base.workbooks import read_workbook
-from thud.recordings.channel import regular_file, require_small, shown_text
 from thud.recordings.header import Layout, read_header
 from thud.recordings.words import (
     COMMENT,

@@ -9,11 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, require_kind
+from thud.base.checks import refuse, require_kind, shown_text
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, content_of
-from thud.recordings.channel import shown_text
 
 if TYPE_CHECKING:
     import os

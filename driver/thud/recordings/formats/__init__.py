@@ -1,19 +1,94 @@
-"""Formats of recordings: one module for each, and a table that identifies them."""
+"""Formats of recordings: the channels that they read, and a table that identifies them.
+
+Each is a module of this package.
+"""
 
 from __future__ import annotations
 
 import importlib
 import re
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from thud.base.checks import refuse
-from thud.recordings.channel import Channel, guarded, shown_text
+import numpy as np
+
+from thud.base.checks import refuse, shown_text
+from thud.base.errors import InputError
+from thud.base.note import Note
+from thud.base.units import size_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
 # Number of bytes from which the format is identified.
 HEAD = 4096
+# Minimum number of samples of a recording.
+MIN_SAMPLES = 8
+# Minimum and maximum sampling interval, s.
+STEPS = (1e-9, 1e3)
+# Deviations of times from a uniform grid, as fractions of the sampling interval: from the first on
+# they are noted, and above the second one they are an error. Where a sample is missing, a time
+# deviates by half an interval or more.
+NOTED = 1e-3
+TOLERANCE = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One channel of a file.
+
+    Attributes
+    ----------
+    name : str
+        Name in the file; empty if it has none.
+    number : int
+        Number of the channel, or of the column, from 1.
+    n_sample : int
+        Number of samples.
+    samples : callable
+        Returns the values in the file from index start to before stop, shape (stop - start,).
+    unit : str
+        Unit of the values; ``"FS"`` for fractions of full scale, empty if unknown.
+    sample_rate : float or None
+        Samples per second, Hz; None if unknown.
+    counts : float or None
+        Counts at full scale if the values are integers, else None.
+    date : str
+        Date of the measurement, or empty.
+    notes : tuple of Note
+        Processing when the file was read.
+    may_be_fractions : bool
+        Whether values without a unit may be fractions of full scale, as those of float audio.
+    unapplied : str
+        Factor or offset in the file, such as ``"gain = 10"``, of which it is not known whether the
+        values were multiplied by it; empty if there is none.
+    """
+
+    name: str
+    number: int
+    n_sample: int
+    samples: Callable[[int, int], NDArray[np.float64]]
+    unit: str = ""
+    sample_rate: float | None = None
+    counts: float | None = None
+    date: str = ""
+    notes: tuple[Note, ...] = ()
+    may_be_fractions: bool = False
+    unapplied: str = ""
+
+    @property
+    def is_force(self) -> bool:
+        """Whether its values are in a unit of force."""
+        return size_of(self.unit)[0] == "N"
+
+    @property
+    def title(self) -> str:
+        """Name for messages, or the number if it has none."""
+        return shown_text(self.name) or f"channel {self.number}"
 
 
 class Format(NamedTuple):
@@ -73,3 +148,59 @@ def read_channels(path: Path) -> list[Channel]:
     with guarded(path, actual.name):
         channels: list[Channel] = module.read_channels(path)
         return channels
+
+
+@contextmanager
+def guarded(path: Path, kind: str) -> Iterator[None]:
+    """Convert any error of a library to InputError."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # noqa: BLE001 - libraries raise anything on damaged files
+        # soundfile repeats the path.
+        reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__
+        refuse(
+            f"{shown_text(path)}: cannot be read as {kind} ({reason})",
+            f"a complete, undamaged {kind} file",
+            error,
+        )
+
+
+def rise_uniformly(values: NDArray[np.float64]) -> bool:
+    """Whether values may be times: steps are positive, and differ by a factor of 2 at most."""
+    with np.errstate(invalid="ignore"):  # infinite numbers
+        rise = np.diff(values)
+    return bool((rise > 0).all() and rise.max() <= 2.01 * rise.min())
+
+
+def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[Note, ...]]:
+    """Return start and step, s, of the uniform grid that fits times best, and notes.
+
+    Times, s, shape (n_sample,), may be rounded to a quarter of the step: at 44.1 kHz, the fifth
+    decimal is half a step. Raise InputError if a time is off the grid, or the step is not allowed.
+    """
+    if not np.isfinite(time).all():
+        refuse(f"{name}: a time is not finite", "real numbers, s")
+    index = np.arange(len(time)) - (len(time) - 1) / 2
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = float(index @ time / (index @ index))
+    minimum, maximum = STEPS
+    if not minimum <= step <= maximum:
+        refuse(
+            f"{name}: the times rise by {step:.4g} s from row to row",
+            f"{minimum:g} to {maximum:g} s",
+        )
+    deviation = np.abs(time - time.mean() - index * step) / step
+    worst = int(np.argmax(deviation))
+    if deviation[worst] > TOLERANCE:
+        refuse(
+            f"{name}: the times are not uniformly spaced: row {worst + 1}, {time[worst]:.9g} s, is "
+            f"{deviation[worst]:.2g} steps of {step:.4g} s off a uniform grid",
+            f"a constant step, within {TOLERANCE:g} steps",
+        )
+    begin = float(time.mean() + index[0] * step)
+    if deviation[worst] <= NOTED:
+        return begin, step, ()
+    size = float(deviation[worst]) * step
+    return begin, step, (Note("times_rounded", name, size, unit="s", others={"rate": 1 / step}),)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.extras import library
-from thud.recordings.channel import Channel, guarded, shown_text
-from thud.recordings.variables import (
+from thud.recordings.formats import Channel, guarded
+from thud.recordings.formats.variables import (
     Header,
     Vector,
     channels_of_vectors,

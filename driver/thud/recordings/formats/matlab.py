@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.io
 
-from thud.base.checks import refuse
-from thud.recordings.channel import MAX_IN_MEMORY, MIB, require_small, shown_text
-from thud.recordings.variables import (
+from thud.base.checks import refuse, shown_text
+from thud.base.files import MAX_IN_MEMORY, MIB, require_small
+from thud.recordings.formats.variables import (
     Vector,
     channels_of_vectors,
     header_entry,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.channel import Channel
+    from thud.recordings.formats import Channel
 
 
 def read_channels(path: Path) -> list[Channel]:

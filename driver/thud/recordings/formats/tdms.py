@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.extras import library
-from thud.recordings.channel import Channel, guarded, shown_text
+from thud.recordings.formats import Channel, guarded
 from thud.recordings.words import (
     DATE,
     UNIT,

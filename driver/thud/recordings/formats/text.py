@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MIN_SAMPLES, Channel, rise_uniformly, uniform_grid
+from thud.recordings.formats import MIN_SAMPLES, Channel, rise_uniformly, uniform_grid
 from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
 from thud.recordings.words import DATE, find_rate, find_word

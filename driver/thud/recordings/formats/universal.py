@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.extras import library
+from thud.base.files import require_small
 from thud.base.note import Note
 from thud.base.units import factor_to, size_of
-from thud.recordings.channel import Channel, require_small, shown_text, uniform_grid
+from thud.recordings.formats import Channel, uniform_grid
 from thud.recordings.signal import read_array
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MIN_SAMPLES, uniform_grid
+from thud.recordings.formats import MIN_SAMPLES, uniform_grid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,7 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_numbe
 from thud.base.immutable import Immutable
 from thud.impact.impact import Impact
 from thud.level.levels import FORCES, RECORDED_BAND
-from thud.recordings.channel import MIN_SAMPLES
+from thud.recordings.formats import MIN_SAMPLES
 from thud.recordings.recording import Recording
 from thud.studies.fitting.force_misfit import ForceMisfit
 from thud.studies.fitting.force_record import Record, read_record

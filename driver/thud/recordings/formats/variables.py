@@ -10,15 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.base.files import MAX_IN_MEMORY
 from thud.base.units import factor_to, find_unit
-from thud.recordings.channel import (
-    MAX_COLUMNS,
-    MAX_IN_MEMORY,
-    MIN_SAMPLES,
-    Channel,
-    rise_uniformly,
-    uniform_grid,
-)
+from thud.recordings.formats import MIN_SAMPLES, Channel, rise_uniformly, uniform_grid
 from thud.recordings.words import (
     DATE,
     TIME,
@@ -38,6 +32,8 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
 
+# Maximum number of columns of a matrix of channels.
+MAX_COLUMNS = 256
 # Maximum number of times that are read.
 MAX_TIMES = MAX_IN_MEMORY // 8
 
