@@ -39,8 +39,7 @@ from thud.recordings.config import Config, Instrument, Properties, ReportConfig,
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
 from thud.recordings.response import Plate, RecorderFilter
-from thud.recordings.signal import Signal
-from thud.recordings.signs import find_peaks, orient
+from thud.recordings.signal import Signal, find_peaks, orient
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -56,11 +56,6 @@ class Note:
         return sentence([self])
 
 
-def about(subject: str, notes: Iterable[Note]) -> tuple[Note, ...]:
-    """Return notes with a subject in place of none."""
-    return tuple(note if note.subject else replace(note, subject=subject) for note in notes)
-
-
 def of_part(part: str, notes: Iterable[Note]) -> list[Note]:
     """Return notes about a part of their subject, such as a load cell."""
     return [replace(note, others={**note.others, "part": part}) for note in notes]

@@ -28,7 +28,7 @@ from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.response import Chain, Plate, RecorderFilter
-from thud.recordings.signs import POLARITIES
+from thud.recordings.signal import POLARITIES
 from thud.recordings.words import read_date
 
 if TYPE_CHECKING:

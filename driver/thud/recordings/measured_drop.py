@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import resample
 
 from thud.base.checks import refuse
-from thud.base.note import Note, about
+from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
@@ -229,7 +229,7 @@ def measure_drop(
         },
         shared_effects=shared,
         bounce=landing.value - contact.touch.value if landing else None,
-        notes=about(section.name, notes),
+        notes=tuple(replace(note, subject=note.subject or section.name) for note in notes),
         ringing=ringing,
         plate_recorded=is_in_record(recorded, contact, plate) if recorded and plate else None,
     )

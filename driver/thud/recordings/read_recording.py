@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.base.checks import refuse, require_kind
-from thud.base.note import Note, about
+from thud.base.note import Note
 from thud.recordings.background import remove_background
 from thud.recordings.checks import copies
 from thud.recordings.config import Config, read_config
@@ -25,7 +25,7 @@ from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
-from thud.recordings.signal import Signal, common_uncertainty
+from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
 from thud.recordings.stage import Stage
 
@@ -140,14 +140,15 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
                 shown = measure_stages(cut_section(signal, pulse), config, uncertainties[-1])
                 stages = stages or shown
                 measured[-1].append(shown.drop)
-            notes = [*ignored, *left_out]
+            notes = [*signal.notes]
             length = signal.n_sample / signal.sample_rate
             if begin > 0 or end < length:
-                note = Note("section_searched", low=begin, high=min(end, length), unit="s")
-                notes.insert(0, note)
+                last = min(end, length)
+                notes.append(Note("section_searched", signal.name, low=begin, high=last, unit="s"))
+            notes += (replace(note, subject=signal.name) for note in (*ignored, *left_out))
             origins.append(Origin(
                 signal.name, signal.path, signal.checksum, signal.date, signal.calibration,
-                signal.sample_rate, (*signal.notes, *about(signal.name, notes)), len(measured[-1]),
+                signal.sample_rate, tuple(notes), len(measured[-1]),
             ))  # fmt: skip
     if not origins:
         refuse("there are no recordings", "one file or more")
@@ -156,5 +157,5 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     if len(origins) > 1:
         copies.check(origins, measured)
     name = Path(origins[0].path or origins[0].name).stem
-    uncertainty = common_uncertainty(uncertainties)
+    uncertainty = None if None in uncertainties else max(value or 0.0 for value in uncertainties)
     return Recording(name, drops, tuple(origins), config, uncertainty, stages)

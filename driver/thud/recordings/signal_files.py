@@ -14,8 +14,7 @@ from thud.base.units import find_unit
 from thud.recordings.config import SUM, Config
 from thud.recordings.force_units import ALLOWED, RECORDED, Calibration, newtons_per_unit
 from thud.recordings.formats import MIN_SAMPLES, read_channels
-from thud.recordings.signal import Signal, add_signals
-from thud.recordings.signs import HINT, POLARITIES, find_peaks, orient
+from thud.recordings.signal import HINT, POLARITIES, Signal, add_signals, find_peaks, orient
 
 if TYPE_CHECKING:
     import os

@@ -8,7 +8,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.recordings.signs import MIN_OPPOSITE
+from thud.recordings.signal import MIN_OPPOSITE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.recordings.drops import FROM_CUBIC
-from thud.recordings.signs import HINT
+from thud.recordings.signal import HINT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
