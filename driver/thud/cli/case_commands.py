@@ -189,7 +189,7 @@ def compare_cases(options: argparse.Namespace) -> int:
 
 # Help of the options that choose formats.
 KINDS = {
-    "wav": "32-bit floats, with their scale in a text file beside it",
+    "wav": "32-bit floats, with their scale in the comment",
     "csv": "table of time and force",
     "uff": "universal file, data set 58",
     "mat": "MATLAB file of time, force and spectrum",
@@ -207,10 +207,8 @@ def run_export(options: argparse.Namespace) -> int:
     source = _read_source(options.source, options.config)
     print_notes(source.warnings)
     force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
-    contents: dict[str, bytes] = {}
-    for kind in chosen:
-        ending, make = force_files.EXPORTS[kind]
-        contents |= make(force, f"{force.name}{ending}")
+    formats = (force_files.EXPORTS[kind] for kind in chosen)
+    contents = {f"{force.name}{ending}": make(force) for ending, make in formats}
     inputs = options.source, options.config
     results = results_of(options, f"{force.name}_export", inputs, force.name)
     paths = results.write(contents)

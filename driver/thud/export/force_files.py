@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-import os
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -24,9 +23,10 @@ from thud.base.checks import (
     require_whole,
 )
 from thud.base.extras import library
-from thud.base.files import content_of, refuse_foreign, replace_file
+from thud.base.files import content_of, replace_file
 from thud.base.immutable import Immutable
 from thud.base.note import Note
+from thud.base.tables import csv_text
 from thud.case.case import case_text
 from thud.export.wav import wav_file
 from thud.level.assessment import ImpactOrRecording
@@ -34,7 +34,7 @@ from thud.level.levels import RECORDED_BAND
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    import os
 
     from numpy.typing import NDArray
 
@@ -52,8 +52,6 @@ RATES = (2500.0, 1e6)
 MAX_RATIO = 1000
 # Half the length of the filter of scipy.signal.resample_poly, in samples of the lower rate.
 HALF_LENGTH = 10
-# Start of the last line of a header, by which files of thud are recognized.
-SIGNATURE = "Written by thud "
 # Maximum lengths of lines and names in a universal file.
 UFF_LINE = 80
 UFF_NAME = 10
@@ -122,14 +120,14 @@ class BlockedForce(Immutable):
             f"Origin: {self.origin}",
             f"SHA-256: {self.checksum}",
             *map(str, self.notes),
-            f"{SIGNATURE}{version()}",
+            f"Written by thud {version()}",
         )
         # Names of files may not be UTF-8, and notes of a laboratory may have several lines.
         texts = (line.encode("utf-8", "replace").decode() for line in lines)
         return tuple(" ".join(text.split()) for text in texts)
 
-    def save(self, path: str | os.PathLike[str], kind: str = "csv") -> list[Path]:
-        """Write the force to a file, replacing an existing file, and return the paths.
+    def save(self, path: str | os.PathLike[str], kind: str = "csv") -> None:
+        """Write the force to a file, replacing an existing file.
 
         Parameters
         ----------
@@ -141,22 +139,15 @@ class BlockedForce(Immutable):
         Raises
         ------
         InputError
-            If the format cannot represent the force, `path` is the recording of the force, or the
-            text file next to a WAV file exists and was not written by thud.
+            If the format cannot represent the force, or `path` is the recording of the force.
         OSError
-            If a file cannot be written.
+            If the file cannot be written.
         """
         require_choice("kind", kind, EXPORTS)
-        contents = EXPORTS[kind][1](self, os.fspath(path))
-        for file in map(Path, contents):
-            existing = content_of(file.resolve())
-            if existing is not None and hashlib.sha256(existing).hexdigest() == self.checksum:
-                refuse(f"{file} is the recording of the force", "another path")
-            if existing is not None and file != Path(path) and SIGNATURE.encode() not in existing:
-                refuse_foreign(file)
-        for name, content in contents.items():
-            replace_file(name, content)
-        return [Path(name) for name in contents]
+        existing = content_of(Path(path).resolve())
+        if existing is not None and hashlib.sha256(existing).hexdigest() == self.checksum:
+            refuse(f"{path} is the recording of the force", "another path")
+        replace_file(path, EXPORTS[kind][1](self))
 
 
 def blocked_force(
@@ -254,33 +245,30 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
     return replace(result, notes=(*original.notes, note))
 
 
-def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
-    """Return a WAV file of 32-bit floats, and a text file with the header.
+def _wav(force: BlockedForce) -> bytes:
+    """Return a WAV file of 32-bit floats, fractions of full scale, with the header as its comment.
 
-    The samples are fractions of full scale, which is a power of two in newtons, so that scaling is
-    exact. The comment of the WAV file and the text state it. Raise InputError if the sample rate is
-    not a whole number.
+    Full scale is a power of two in newtons, so that scaling is exact; the comment states it. Raise
+    InputError if the sample rate is not a whole number.
     """
     rate = round(force.sample_rate)
     if rate != force.sample_rate:
         refuse(
-            f"{path}: WAV cannot hold a sample rate of {force.sample_rate!r} Hz",
+            f"{force.name}: WAV cannot hold a sample rate of {force.sample_rate!r} Hz",
             "whole numbers of Hz; rate = a whole number resamples the force",
         )
     peak = float(np.abs(force.force).max())
     scale = 2.0 ** math.ceil(math.log2(peak)) if peak > 0 else 1.0
-    lines = (f"Scale: {scale:g} N per full scale (calibration = {scale:g})", *force.header_lines())
-    content = wav_file(force.force / scale, rate, "; ".join(lines))
-    return {path: content, f"{path}.txt": _lines(lines)}
+    first = f"Scale: {scale:g} N per full scale (calibration = {scale:g})"
+    return wav_file(force.force / scale, rate, "; ".join((first, *force.header_lines())))
 
 
-def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+def _csv(force: BlockedForce) -> bytes:
     """Return a table of time, s, and force, N, in full precision."""
-    columns = {"time_s": force.time, "force_N": force.force}
-    return {path: _table(force.header_lines(), columns)}
+    return _table(force.header_lines(), {"time_s": force.time, "force_N": force.force})
 
 
-def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+def _uff(force: BlockedForce) -> bytes:
     """Return a universal file with a text data set 58: time history of an excitation force, N.
 
     The format has 12 digits for the force and 6 digits for the time step.
@@ -314,10 +302,10 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     with TemporaryDirectory() as folder:
         file = Path(folder, "force.uff")
         pyuff.UFF(str(file)).write_sets([data_set], "overwrite")
-        return {path: file.read_bytes()}
+        return file.read_bytes()
 
 
-def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+def _mat(force: BlockedForce) -> bytes:
     """Return a MATLAB file, version 5: time, force, spectrum and their description."""
     import scipy.io
 
@@ -335,10 +323,10 @@ def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
         },
         oned_as="column",
     )
-    return {path: content.getvalue()}
+    return content.getvalue()
 
 
-def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+def _spectrum(force: BlockedForce) -> bytes:
     """Return a table of the complex spectrum; see `BlockedForce.spectrum`."""
     frequency, spectrum = force.spectrum()
     columns = {
@@ -348,30 +336,24 @@ def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
         "magnitude_Ns": np.abs(spectrum),
         "phase_rad": np.angle(spectrum),
     }
-    return {path: _table((*force.header_lines(), f"Spectrum: {CONVENTION}"), columns)}
+    return _table((*force.header_lines(), f"Spectrum: {CONVENTION}"), columns)
 
 
-# End of the file name, and function that returns the contents, by the option of the command.
+# End of the file name, and function that returns the content, by the option of the command.
 EXPORTS = {
-    "wav": (".wav", wav_files),
-    "csv": (".csv", csv_files),
-    "uff": (".uff", uff_files),
-    "mat": (".mat", mat_files),
-    "spectrum": ("_spectrum.csv", spectrum_files),
+    "wav": (".wav", _wav),
+    "csv": (".csv", _csv),
+    "uff": (".uff", _uff),
+    "mat": (".mat", _mat),
+    "spectrum": ("_spectrum.csv", _spectrum),
 }
 
 
 def _table(comments: tuple[str, ...], columns: dict[str, NDArray[np.float64]]) -> bytes:
     """Return comments, titles and columns as a table, in full precision."""
     rows = np.column_stack(list(columns.values())).tolist()
-    return _lines(
-        [*(f"# {line}" for line in comments), ",".join(columns)]
-        + [",".join(map(repr, row)) for row in rows]
-    )
-
-
-def _lines(lines: Iterable[str]) -> bytes:
-    return "".join(f"{line}\n" for line in lines).encode("utf-8", "replace")
+    header = "".join(f"# {line}\n" for line in comments)
+    return (header + csv_text([[*columns], *rows])).encode()
 
 
 def _plain(text: str) -> str:
