@@ -260,9 +260,9 @@ def test_bands_that_cannot_be_reached_are_said(found: thud.RoomSound) -> None:
         ({"position": (0, 1)}, naming("ball", 0, 1, 5)),
         ({"position": (1, 6)}, naming("microphone", 6, 1, 5)),
         ({"position": 3}, naming("position", 3)),
-        ({"predictions": []}, naming("predictions", "RoomPrediction")),
-        ({"predictions": [1]}, naming("floor 1", 1, "RoomPrediction")),
-        ({"predictions": 1}, naming("predictions", 1, "RoomPrediction")),
+        ({"predictions": {}}, naming("predictions", "RoomPrediction")),
+        ({"predictions": {"slab": 1}}, naming("slab", 1, "RoomPrediction")),
+        ({"predictions": [1]}, naming("predictions", "RoomPrediction")),
     ],
 )
 def test_wrong_arguments_get_a_sentence(

@@ -16,7 +16,6 @@ import numpy as np
 from thud.base.bridge import version
 from thud.base.checks import (
     refuse,
-    refuse_value,
     require_choice,
     require_kind,
     require_number,
@@ -219,9 +218,7 @@ def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
     """Return a force resampled at a rate, band-limited to half the lower rate."""
     from scipy.signal import resample_poly
 
-    require_number("rate", rate)
-    if not RATES[0] <= rate <= RATES[1]:
-        refuse_value("rate", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    require_number("rate", rate, *RATES, "Hz")
     ratio = Fraction(float(rate) / original.sample_rate).limit_denominator(MAX_RATIO)
     up, down = ratio.numerator, ratio.denominator
     if up > MAX_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:

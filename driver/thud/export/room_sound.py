@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, refuse_value, require_kind, require_number, require_whole
+from thud.base.checks import (
+    refuse,
+    require_kind,
+    require_mapping,
+    require_number,
+    require_whole,
+)
 from thud.base.display import Displayed
 from thud.base.files import replace_file
 from thud.export.floor_sound import REFERENCE_PRESSURE, SAMPLE_RATE, FloorSound, new_floor_sound
@@ -19,7 +24,7 @@ from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -111,7 +116,7 @@ class RoomSound(Displayed):
 
 
 def listen(
-    predictions: RoomPrediction | Sequence[RoomPrediction] | Mapping[str, RoomPrediction],
+    predictions: RoomPrediction | Mapping[str, RoomPrediction],
     *,
     position: tuple[int, int] | None = None,
     pause: float = 1.0,
@@ -128,7 +133,7 @@ def listen(
     Parameters
     ----------
     predictions
-        A prediction, several, or predictions by the names of their floors.
+        A prediction, or predictions by the names of their floors.
     position
         Numbers of the positions of ball and microphone, from 1, as in `modal_room`; by default
         those whose levels in the modal bands are nearest to the mean of all positions.
@@ -144,12 +149,14 @@ def listen(
     InputError
         If an argument is out of range, or the file would last longer than 600 s.
     """
-    require_number("pause", pause)
-    if not 0 <= pause <= MAX_PAUSE:
-        refuse_value("pause", pause, f"0 to {MAX_PAUSE:g} s")
+    require_number("pause", pause, 0.0, MAX_PAUSE, "s")
     require_whole("repeat", repeat, 1, MAX_REPEAT)
     require_whole("seed", seed, 0, 2**32 - 1)
-    sounds = [new_floor_sound(*item, position, seed) for item in _named(predictions).items()]
+    named = {"floor": predictions} if isinstance(predictions, RoomPrediction) else predictions
+    require_mapping("predictions", named, "objects of RoomPrediction")
+    for name, prediction in named.items():
+        require_kind(name, prediction, RoomPrediction)
+    sounds = [new_floor_sound(*item, position, seed) for item in named.items()]
     gap = round(pause * SAMPLE_RATE)
     ordered = sounds * repeat
     lengths = [len(sound.pressure) + gap for sound in ordered]
@@ -166,18 +173,6 @@ def listen(
         starts=np.cumsum([0, *lengths[:-1]]) / SAMPLE_RATE,
         order=tuple(sound.name for sound in ordered),
     )
-
-
-def _named(predictions: object) -> dict[str, RoomPrediction]:
-    """Return predictions by name; unnamed ones are numbered."""
-    named = [predictions] if isinstance(predictions, RoomPrediction) else predictions
-    if isinstance(named, list | tuple):
-        named = {f"floor {i}": entry for i, entry in enumerate(named, start=1)}
-    if not isinstance(named, Mapping) or not named:
-        refuse_value("predictions", predictions, "one or more objects of RoomPrediction")
-    for name, entry in named.items():
-        require_kind(name, entry, RoomPrediction)
-    return dict(named)
 
 
 def _full_scale(peak: float) -> float:
