@@ -6,6 +6,7 @@ import argparse
 import copy
 import json
 import re
+from dataclasses import replace
 from datetime import date, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from scipy.stats import binom
 import thud
 from thud.base._schema import VERDICTS
 from thud.cli.recording_commands import run_history
-from thud.level.assessment import assess_levels
+from thud.level.assessment import assess_levels, criterion_quantity
 from thud.level.estimate import Contribution, Estimate
 from thud.level.levels import get_bands
 from thud.report.ball_history import (
@@ -25,6 +26,8 @@ from thud.report.ball_history import (
     YEAR,
     ControlLimits,
     History,
+    Series,
+    Trend,
     _control_limits,
     _trend,
     read_history,
@@ -88,6 +91,14 @@ def history(slope: float = 0.0, count: int = 6, seed: int | None = None) -> Hist
     return History("ball 7", tuple(dates), tuple(reports))
 
 
+def line(time: Any, value: Any, deviation: Any) -> Trend:  # noqa: ANN401
+    """Return the trend of values with standard uncertainties, at a significance of 5 %."""
+    entry = dict(zip(("lower", "upper"), LIMITS, strict=True))
+    deviations = np.broadcast_to(deviation, len(time))
+    series = Series(criterion_quantity("octave_63"), (entry,), time, value, deviations)
+    return _trend(series, 0.05)
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Write five reports of a drifting ball, the last first."""
@@ -111,7 +122,7 @@ def test_line_is_that_of_least_squares() -> None:
         rng.normal(31, 1, 12),
         rng.uniform(0.1, 1, 12),
     )
-    found = _trend(time, value, deviation, LIMITS, 0.05)
+    found = line(time, value, deviation)
     slope, start = np.polyfit(time, value, 1, w=1 / deviation)
     assert found.slope == pytest.approx(slope)
     np.testing.assert_allclose(found.value, start + slope * time[[0, -1]])
@@ -119,7 +130,7 @@ def test_line_is_that_of_least_squares() -> None:
 
 def test_trend_without_noise_reaches_the_limit_on_its_day() -> None:
     found = history(slope=0.2, count=11)
-    trend = found.trends()[1]
+    trend = found.series[1].trend
     assert trend is not None
     assert trend.significant
     assert trend.slope == pytest.approx(0.2)
@@ -135,7 +146,7 @@ def test_trend_without_noise_reaches_the_limit_on_its_day() -> None:
 def test_limit_beyond_the_dates_of_the_reports_is_not_predicted() -> None:
     # The line reaches 32.5 dB in year 15, five years after the last report.
     found = history(slope=0.1, count=11)
-    trend = found.trends()[1]
+    trend = found.series[1].trend
     assert trend is not None
     assert trend.significant
     assert np.isnan([trend.reached, trend.earliest, trend.latest]).all()
@@ -145,7 +156,7 @@ def test_limit_beyond_the_dates_of_the_reports_is_not_predicted() -> None:
 
 def test_interval_beyond_the_dates_of_the_reports_has_no_date() -> None:
     reports = history(slope=0.2, count=9)
-    trend = reports.trends()[1]
+    trend = reports.series[1].trend
     assert trend is not None
     assert trend.reached < 8 < trend.latest
     assert "to after the last report)" in reports.warnings()[0]
@@ -166,19 +177,23 @@ def test_control_limits_are_those_of_the_moving_range() -> None:
     assert _control_limits(values[:4]) is None
 
 
-def test_values_beyond_the_control_limits_are_named() -> None:
-    reports = history(count=9, seed=2).reports
-    for k, report_ in enumerate(reports):
-        report_["criteria"][0]["value"] = 39.0 + 0.05 * (-1) ** k
-    reports[4]["criteria"][0]["value"] = 42.0
-    found = History("ball", history(count=9).dates, reports)
-    assert re.search("31.5 Hz, dB: beyond the action limits .* on 2019-01-01$", found.warnings()[0])
-    reports[4]["criteria"][0]["value"] = 39.0
-    for k in (7, 8):
-        reports[k]["criteria"][0]["value"] = 39.25
-    assert "31.5 Hz, dB: two of the last three values" in found.warnings()[0]
-    reports[7]["criteria"][0]["value"] = 39.0
-    assert not any("two of the last" in warning for warning in found.warnings())
+@pytest.mark.parametrize(
+    ("values", "patterns"),
+    [
+        ({4: 42.0}, ["31.5 Hz, dB: beyond the action limits .* on 2019-01-01$"]),
+        ({7: 39.25, 8: 39.25}, ["31.5 Hz, dB: two of the last three values"]),
+        ({8: 39.25}, []),
+    ],
+)
+def test_values_beyond_the_control_limits_are_named(
+    values: dict[int, float], patterns: list[str]
+) -> None:
+    found = history(count=9)
+    for k, report_ in enumerate(found.reports):
+        report_["criteria"][0]["value"] = values.get(k, 39.0 + 0.05 * (-1) ** k * (k not in (7, 8)))
+    warnings = found.warnings()
+    assert len(warnings) == len(patterns)
+    assert all(map(re.search, patterns, warnings))
 
 
 @pytest.mark.parametrize(
@@ -191,12 +206,10 @@ def test_values_beyond_a_warning_limit_count_on_each_side(
     named: bool,  # noqa: FBT001
 ) -> None:
     found = history(count=3)
-    entries = [
-        {**report["criteria"][0], "value": 39.0 + distance}
-        for report, distance in zip(found.reports, distances, strict=True)
-    ]
-    warnings = found._control_warnings("level", entries, ControlLimits(39.0, 1.0))  # noqa: SLF001
-    assert len(warnings) == named
+    values = 39.0 + np.array(distances)
+    series = replace(found.series[0], values=values, control=ControlLimits(39.0, 1.0))
+    found.__dict__["series"] = (series,)
+    assert len(found.warnings()) == named
 
 
 def test_action_limits_are_rarely_passed_by_chance() -> None:
@@ -206,7 +219,7 @@ def test_action_limits_are_rarely_passed_by_chance() -> None:
         values = rng.standard_normal(8)
         limits = _control_limits(values)
         assert limits is not None
-        told += limits.beyond(values, ACTION).any()
+        told += (np.abs(values - limits.mean) > ACTION * limits.deviation).any()
     # 1.6 % of histories of eight values (simulation in docs/report.md).
     assert binom.ppf(0.0005, runs, 0.016) <= told <= binom.ppf(0.9995, runs, 0.016)
 
@@ -219,7 +232,7 @@ def test_temperatures_and_calibrations_are_shown() -> None:
         report_["files"] = [{"calibration": "100 N/V" if k < 4 else "101 N/V"}]
         report_["instruments"] = [{"name": "plate", "calibrated": "2016-07-01"}, "amplifier"]
     found = History("ball_7", plain.dates, reports)
-    days = [day.date().isoformat() for day in found.calibrations()]
+    days = [day.date().isoformat() for day in found.calibrations]
     assert days == ["2016-07-01", plain.dates[4].date().isoformat()]
     (row,) = [row for row in found.table() if row[0] == "Temperature, °C"]
     assert row[1:4] == ("–", "19.0", "20.0")
@@ -231,7 +244,7 @@ def test_temperatures_and_calibrations_are_shown() -> None:
     panel = next(axes for axes in figure.axes if axes.get_ylabel().startswith("Temperature"))
     np.testing.assert_array_equal(panel.lines[0].get_ydata(), [19, 20, 21, 22, 23])
     level = next(axes for axes in figure.axes if axes.get_ylabel().startswith("63 Hz"))
-    limits = found.control_limits()[1]
+    limits = found.series[1].control
     assert limits is not None
     drawn = {line.get_ydata()[0] for line in level.lines if line.get_linestyle() in (":", "-.")}
     expected = [limits.mean + k * limits.deviation for k in (-3, -2, 2, 3)]
@@ -267,16 +280,13 @@ def test_different_balls_are_named_in_table_and_chart() -> None:
 
 
 def test_ball_that_does_not_change_has_no_trend() -> None:
-    told = sum(
-        any(trend is not None and trend.significant for trend in history(seed=k).trends())
-        for k in range(300)
-    )
+    told = sum(any(series.is_drifting for series in history(seed=k).series) for k in range(300))
     # Five levels differ, the test is for all of them together: at most 5 % (99.9 % of the draws).
     assert told <= binom.ppf(0.999, 300, 0.05)
 
 
 def test_drift_is_found() -> None:
-    trends = [history(slope=0.2, seed=k).trends()[1] for k in range(40)]
+    trends = [history(slope=0.2, seed=k).series[1].trend for k in range(40)]
     assert sum(trend is not None and trend.significant for trend in trends) > 30
 
 
@@ -285,7 +295,7 @@ def test_interval_of_the_date_holds_the_truth() -> None:
     time, inside, runs = np.arange(8.0), 0, 400
     for _ in range(runs):
         value = 31 + 0.3 * time + 0.1 * rng.standard_normal(8)
-        trend = _trend(time, value, np.full(8, 0.1), LIMITS, 0.05)
+        trend = line(time, value, 0.1)
         inside += trend.earliest <= 5 <= trend.latest
     # The wider of two intervals holds it at least as often as it says.
     assert inside >= binom.ppf(0.001, runs, 0.95)
@@ -295,13 +305,13 @@ def test_ends_of_the_date_are_those_of_the_interval_of_the_line() -> None:
     rng = np.random.default_rng(5)
     time, deviation = np.sort(rng.uniform(0, 9, 12)), rng.uniform(0.05, 0.2, 12)
     value = 31 + 0.3 * time + deviation * rng.standard_normal(12)
-    trend = _trend(time, value, deviation, LIMITS, 0.05)
-    line, covariance = np.polyfit(time, value, 1, w=1 / deviation, cov="unscaled")
+    trend = line(time, value, deviation)
+    fit, covariance = np.polyfit(time, value, 1, w=1 / deviation, cov="unscaled")
     factor = trend.expanded / np.sqrt(covariance[0, 0])
     assert trend.earliest < trend.reached < trend.latest
     for end in (trend.earliest, trend.latest):
         width = factor * np.sqrt(np.array([end, 1]) @ covariance @ np.array([end, 1]))
-        assert abs(np.polyval(line, end) - LIMITS[1]) == pytest.approx(width)
+        assert abs(np.polyval(fit, end) - LIMITS[1]) == pytest.approx(width)
 
 
 @pytest.mark.parametrize("stated", [0.0, 0.001])
@@ -309,24 +319,22 @@ def test_few_points_on_a_line_by_chance_are_no_trend(stated: float) -> None:
     rng = np.random.default_rng(6)
     time, runs = np.arange(4.0), 600
     values = 31 + 0.1 * rng.standard_normal((runs, 4))
-    told = sum(_trend(time, v, np.full(4, stated), LIMITS, 0.05).significant for v in values)
+    told = sum(line(time, v, stated).significant for v in values)
     assert binom.ppf(0.001, runs, 0.05) <= told <= binom.ppf(0.999, runs, 0.05)
 
 
 def test_scatter_beyond_the_stated_uncertainty_counts() -> None:
     time, value = np.arange(6.0), np.array([31.0, 31.5, 30.6, 31.6, 31.0, 31.8])
-    trusting, doubting = (
-        _trend(time, value, np.full(6, deviation), LIMITS, 0.05) for deviation in (0.01, 0.4)
-    )
+    trusting, doubting = (line(time, value, deviation) for deviation in (0.01, 0.4))
     assert not trusting.significant
     assert trusting.slope == pytest.approx(doubting.slope)
     assert trusting.expanded > 0.2
 
 
 def test_few_reports_and_equal_values_have_no_trend() -> None:
-    assert history(slope=0.5, count=2).trends() == [None] * 10
-    trends = history(slope=0.5, count=5).trends()
-    assert [i for i, trend in enumerate(trends) if trend] == [1]
+    assert not any(series.trend for series in history(slope=0.5, count=2).series)
+    known = history(slope=0.5, count=5).series
+    assert [i for i, series in enumerate(known) if series.trend] == [1]
 
 
 def test_chart_shows_each_criterion_its_limits_and_verdicts(folder: Path) -> None:
@@ -345,8 +353,8 @@ def test_chart_shows_each_criterion_its_limits_and_verdicts(folder: Path) -> Non
     (area,) = second.collections[:1]
     box = area.get_datalim(second.transData)
     assert (box.y0, box.y1) == LIMITS
-    (line,) = [one for one in second.lines if one.get_linestyle() == "--"]
-    assert np.diff(line.get_ydata())[0] == pytest.approx(4 * 0.35, abs=0.1)
+    (drawn,) = [one for one in second.lines if one.get_linestyle() == "--"]
+    assert np.diff(drawn.get_ydata())[0] == pytest.approx(4 * 0.35, abs=0.1)
     assert "not known" in [text.get_text() for text in panels["Drop height, m"].texts]
     parts = [axes.get_tightbbox() for axes in figure.axes] + [figure.legends[0].get_window_extent()]
     for i, part in enumerate(parts):
@@ -409,6 +417,7 @@ def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[st
         ({"format": "another"}, naming("z/report.json", "version")),
         ({"criteria": []}, naming("z/report.json", "version")),
         ({"criteria": [3]}, naming("z/report.json", "version")),
+        ({"files": None}, naming("z/report.json", "version")),
     ],
 )
 def test_reports_that_do_not_belong_are_refused(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from functools import cached_property
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +24,7 @@ from thud.report.rows import NOT_KNOWN, capital, number, quantity_of, value_text
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -45,12 +47,10 @@ MARKS = {VERDICTS[0]: "", VERDICTS[1]: " no", VERDICTS[2]: " ?"}
 SIGNIFICANT = " *"
 # Maximum size of a report, bytes.
 MAX_SIZE = 2**28
-# Entries of a report, and of each of its criteria, that a history needs.
-KEYS = ("ball", "serial", "source", "date", "verdict", "criteria")
-CRITERION_KEYS = (
-    "name", "unit", "band", "value", "uncertainty", "expanded_uncertainty", "upper_bound", "lower",
-    "upper", "verdict",
-)  # fmt: skip
+# Texts of a report, and numbers of each of its criteria, that a history needs.
+TEXTS = ("ball", "serial", "source", "date", "verdict")
+LIMITS = ("lower", "upper")
+VALUES = ("value", "uncertainty", "expanded_uncertainty")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +87,53 @@ class ControlLimits:
     mean: float
     deviation: float
 
-    def beyond(self, values: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
-        """Return 1 or -1 for values above or below the mean by a factor of deviations, else 0."""
-        distance = values - self.mean
-        return np.where(np.abs(distance) > factor * self.deviation, np.sign(distance), 0.0)
+
+@dataclass(frozen=True, eq=False)
+class Series(Immutable):
+    """A criterion in the reports of a ball.
+
+    Attributes
+    ----------
+    quantity : Quantity
+        Quantity of the criterion.
+    entries : tuple of dict, shape (n_report,)
+        The criterion in each report, in the order of the dates.
+    years, values, uncertainties : ndarray, shape (n_known,)
+        Times since the first report, years, values and standard uncertainties, SI units, of the
+        values that are known and no upper bounds.
+    trend : Trend or None
+        None with fewer than three dates, or equal values.
+    control : ControlLimits or None
+        None with fewer than five values.
+    """
+
+    quantity: Quantity
+    entries: tuple[dict[str, Any], ...]
+    years: NDArray[np.float64]
+    values: NDArray[np.float64]
+    uncertainties: NDArray[np.float64]
+    trend: Trend | None = None
+    control: ControlLimits | None = None
+
+    @property
+    def title(self) -> str:
+        """Name and unit of the quantity."""
+        return capital(self.quantity.label)
+
+    @property
+    def is_drifting(self) -> bool:
+        """Whether the trend is significant."""
+        return self.trend is not None and self.trend.significant
+
+    @property
+    def slope_text(self) -> str:
+        """Change per year with its expanded uncertainty as text; a dash if there is no trend."""
+        if self.trend is None:
+            return "–"
+        scale, decimals = self.quantity.display_scale, self.quantity.decimals + 1
+        slope, expanded = scale * self.trend.slope, scale * self.trend.expanded
+        sign = "+" if round(slope, decimals) > 0 else ""
+        return f"{sign}{number(slope, decimals)} ± {number(expanded, decimals)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,91 +169,71 @@ class History:
         """Return the date of a time since the first report, years."""
         return self.dates[0] + years * YEAR
 
-    def criteria(self) -> list[list[dict[str, Any]]]:
-        """Return the entries of each criterion in the reports, in the order of the dates."""
-        reports = (report["criteria"] for report in self.reports)
-        return [list(entries) for entries in zip(*reports, strict=True)]
+    @cached_property
+    def series(self) -> tuple[Series, ...]:
+        """The criteria, with their trends and control limits."""
+        criteria = zip(*(report["criteria"] for report in self.reports), strict=True)
+        known = [_known(entries, self.years) for entries in criteria]
+        fitted = [len(set(s.years)) >= MIN_REPORTS and np.ptp(s.values) > 0 for s in known]
+        significance = SIGNIFICANCE / max(sum(fitted), 1)
+        return tuple(
+            replace(
+                series,
+                trend=_trend(series, significance) if is_fitted else None,
+                control=_control_limits(series.values),
+            )
+            for series, is_fitted in zip(known, fitted, strict=True)
+        )
 
-    def trends(self) -> list[Trend | None]:
-        """Return the trend of each criterion; None with fewer than three dates, or equal values."""
-        series = [(entries, self._known(entries)) for entries in self.criteria()]
-        fitted = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
-        share = SIGNIFICANCE / max(sum(fitted), 1)
-        return [
-            _trend(*columns, (entries[-1]["lower"], entries[-1]["upper"]), share)
-            if is_fitted
-            else None
-            for (entries, columns), is_fitted in zip(series, fitted, strict=True)
-        ]
-
-    def control_limits(self) -> list[ControlLimits | None]:
-        """Return the control limits of each criterion; None with fewer than five values."""
-        return [_control_limits(self._known(entries)[1]) for entries in self.criteria()]
-
+    @property
     def temperatures(self) -> list[float | None]:
-        """Return the recorded temperature of each report, degC; None if it is not stated."""
+        """Recorded temperature of each report, degC; None if it is not stated."""
         values = (report.get("temperature") for report in self.reports)
         return [value if _is_number(value) else None for value in values]
 
+    @property
     def calibrations(self) -> list[datetime]:
-        """Return the dates of the calibrations of instruments, between first and last report.
+        """Dates of the calibrations of instruments, between first and last report.
 
         They are the dates of the certificates; a report whose calibration factor differs from that
         of the report before it counts as a calibration, too.
         """
-        dates = set()
-        previous: list[str] | None = None
-        for date, report in zip(self.dates, self.reports, strict=True):
-            items = [item for item in report.get("instruments", []) if isinstance(item, dict)]
-            dates |= {read_date(str(item.get("calibrated", ""))) for item in items}
-            files = [file for file in report.get("files", []) if isinstance(file, dict)]
-            factors = sorted({str(file.get("calibration", "")) for file in files})
-            if previous is not None and factors != previous:
-                dates.add(date)
-            previous = factors
-        return sorted(date for date in dates if date and self.dates[0] <= date <= self.dates[-1])
-
-    def _known(
-        self, entries: list[dict[str, Any]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return times, values and standard uncertainties, without upper bounds."""
-        rows = [
-            (year, entry["value"], entry["uncertainty"] or 0.0)
-            for year, entry in zip(self.years, entries, strict=True)
-            if entry["value"] is not None and not entry["upper_bound"]
+        instruments = chain.from_iterable(_tables(r, "instruments") for r in self.reports)
+        dates = {read_date(str(item.get("calibrated", ""))) for item in instruments}
+        factors = [
+            {str(file.get("calibration", "")) for file in _tables(report, "files")}
+            for report in self.reports
         ]
-        columns = np.array(rows, dtype=np.float64).reshape(-1, 3)
-        return columns[:, 0], columns[:, 1], columns[:, 2]
+        pairs = zip(self.dates[1:], pairwise(factors), strict=True)
+        dates |= {date for date, (before, after) in pairs if before != after}
+        return sorted(date for date in dates if date and self.dates[0] <= date <= self.dates[-1])
 
     def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: values by date, change per year and date of the limit."""
-        criteria, last = self.criteria(), len(self.dates) - 1
-        quantities = [quantity_of(entries[0]) for entries in criteria]
-        temperatures = [_degrees(value) for value in self.temperatures()]
-        balls = self.balls
-        head = ("Ball",) if balls else ()
-        titles = [capital(quantity.label) for quantity in quantities]
-        columns = [("", *head, *titles, "Temperature, °C", "verdict")]
-        for i in range(last + 1):
-            if 0 < i <= last + 1 - MAX_COLUMNS:
-                continue
-            column = [entries[i] for entries in criteria]
-            cells = (value_text(entry) + MARKS[entry["verdict"]] for entry in column)
-            day = self.dates[i].date().isoformat()
-            ball = balls[i : i + 1]
-            columns.append((day, *ball, *cells, temperatures[i], self.reports[i]["verdict"]))
-        trends = self.trends()
-        slopes = map(_slope, quantities, trends)
-        none = ("",) * len(head)
-        columns.append(("per year", *none, *slopes, "", ""))
-        columns.append(("limit on", *none, *(self._limit(trend) for trend in trends), "", ""))
-        return list(zip(*columns, strict=True))
+        count = len(self.dates)
+        shown = [i for i in range(count) if i == 0 or i > count - MAX_COLUMNS]
+
+        def row(title: str, cells: Sequence[str], *trend: str) -> tuple[str, ...]:
+            return (title, *(cells[i] for i in shown), *(trend or ("", "")))
+
+        days = [date.date().isoformat() for date in self.dates]
+        rows = [row("", days, "per year", "limit on")]
+        if self.balls:
+            rows.append(row("Ball", self.balls))
+        for series in self.series:
+            cells = [value_text(entry) + MARKS[entry["verdict"]] for entry in series.entries]
+            slope = series.slope_text + SIGNIFICANT * series.is_drifting
+            reached = series.trend and self._date_text(series.trend.reached)
+            rows.append(row(series.title, cells, slope, reached or "–"))
+        rows.append(row("Temperature, °C", [*map(_degrees, self.temperatures)]))
+        rows.append(row("verdict", [report["verdict"] for report in self.reports]))
+        return rows
 
     def marks(self) -> str:
         """Return the meaning of the marks that the table has, as a line; empty if it has none."""
-        verdicts = {entry["verdict"] for entries in self.criteria() for entry in entries}
+        verdicts = {entry["verdict"] for series in self.series for entry in series.entries}
         parts = [f"{mark.strip()}: {v}" for v, mark in MARKS.items() if mark and v in verdicts]
-        if any(trend is not None and trend.significant for trend in self.trends()):
+        if any(series.is_drifting for series in self.series):
             parts.append(
                 f"{SIGNIFICANT.strip()}: the drift is significant, at {100 * SIGNIFICANCE:g} % "
                 "for all criteria together"
@@ -219,49 +242,32 @@ class History:
 
     def warnings(self) -> list[str]:
         """Return a warning for each significant trend, and for values beyond control limits."""
-        known = [value for value in self.temperatures() if value is not None]
-        ends = dict.fromkeys(_degrees(value) for value in (min(known), max(known))) if known else {}
-        temperature = f" (temperature {' to '.join(ends)} °C)" if known else ""
-        warnings = []
-        for entries, trend, limits in zip(
-            self.criteria(), self.trends(), self.control_limits(), strict=True
-        ):
-            quantity = quantity_of(entries[0])
-            title = capital(quantity.label)
-            if trend is not None and trend.significant:
-                slope = _slope(quantity, trend).removesuffix(SIGNIFICANT)
-                text = f"{title}: changes by {slope} per year{temperature}"
-                date = self._date_text(trend.reached)
-                if date:
-                    start = self._date_text(trend.earliest) or "before the first report"
-                    end = self._date_text(trend.latest) or "after the last report"
-                    text += f"; reached a limit on {date} (95 %: {start} to {end})"
-                warnings.append(text)
-            if limits is not None:
-                warnings += self._control_warnings(title, entries, limits)
-        return warnings
+        return [warning for series in self.series for warning in self._warnings(series)]
 
-    def _control_warnings(
-        self, title: str, entries: list[dict[str, Any]], limits: ControlLimits
-    ) -> list[str]:
-        years, values, _ = self._known(entries)
-        beyond = zip(years, limits.beyond(values, ACTION), strict=True)
-        dates = [self._date_text(year) for year, side in beyond if side]
-        warnings = []
+    def _warnings(self, series: Series) -> Iterator[str]:
+        trend, limits = series.trend, series.control
+        if trend is not None and trend.significant:
+            known = [value for value in self.temperatures if value is not None]
+            ends = dict.fromkeys(map(_degrees, (min(known), max(known)))) if known else ()
+            temperature = f" (temperature {' to '.join(ends)} °C)" if ends else ""
+            text = f"{series.title}: changes by {series.slope_text} per year{temperature}"
+            if date := self._date_text(trend.reached):
+                start = self._date_text(trend.earliest) or "before the first report"
+                end = self._date_text(trend.latest) or "after the last report"
+                text += f"; reached a limit on {date} (95 %: {start} to {end})"
+            yield text
+        if limits is None:
+            return
+        distance = (series.values - limits.mean) / limits.deviation
+        dates = [self._date_text(year) for year in series.years[np.abs(distance) > ACTION]]
         if dates:
-            warnings.append(
-                f"{title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
-            )
-        sides = limits.beyond(values[-3:], WARNING).tolist()
-        if max(sides.count(1.0), sides.count(-1.0)) > 1:
-            warnings.append(
-                f"{title}: two of the last three values lie beyond one warning limit "
+            yield f"{series.title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
+        last = distance[-3:]
+        if max((last > WARNING).sum(), (last < -WARNING).sum()) > 1:
+            yield (
+                f"{series.title}: two of the last three values lie beyond one warning limit "
                 f"({WARNING:g} σ)"
             )
-        return warnings
-
-    def _limit(self, trend: Trend | None) -> str:
-        return "–" if trend is None else self._date_text(trend.reached) or "–"
 
     def _date_text(self, years: float) -> str:
         """Return the date of a time, years, as text; empty if outside the dates of the reports."""
@@ -274,8 +280,23 @@ def _ball(report: dict[str, Any]) -> str:
     return " ".join(filter(None, (report["ball"], report["serial"])))
 
 
+def _tables(report: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    return [item for item in report.get(key, []) if isinstance(item, dict)]
+
+
 def _degrees(value: float | None) -> str:
     return "–" if value is None else number(value, 1)
+
+
+def _known(entries: tuple[dict[str, Any], ...], years: NDArray[np.float64]) -> Series:
+    """Return a criterion without trend and control limits."""
+    rows = [
+        (year, entry["value"], entry["uncertainty"] or 0.0)
+        for year, entry in zip(years, entries, strict=True)
+        if entry["value"] is not None and not entry["upper_bound"]
+    ]
+    columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    return Series(quantity_of(entries[0]), entries, *columns)
 
 
 def _control_limits(values: NDArray[np.float64]) -> ControlLimits | None:
@@ -306,21 +327,16 @@ def read_history(
     if not files:
         refuse("there are no reports", "one report.json or more")
     dated = sorted(((*_read(file), file) for file in files), key=lambda entry: entry[0])
-    for _, report, file in dated[1:]:
-        _require_same(report, file, dated[0][1], dated[0][2], different_balls=different_balls)
-    names = dict.fromkeys(_ball(report) for _, report, _ in dated)
-    title = next(iter(names)) if len(names) == 1 else f"{len(names)} balls"
-    reports = tuple(report for _, report, _ in dated)
-    return History(title or "ball", tuple(date for date, _, _ in dated), reports)
+    dates, reports, origins = zip(*dated, strict=True)
+    for report, file in zip(reports[1:], origins[1:], strict=True):
+        _require_same(report, file, reports[0], origins[0], allow_balls=different_balls)
+    names = {_ball(report) for report in reports}
+    title = names.pop() if len(names) == 1 else f"{len(names)} balls"
+    return History(title or "ball", dates, reports)
 
 
 def _require_same(
-    report: dict[str, Any],
-    file: Path,
-    first: dict[str, Any],
-    origin: Path,
-    *,
-    different_balls: bool,
+    report: dict[str, Any], file: Path, first: dict[str, Any], origin: Path, *, allow_balls: bool
 ) -> None:
     names, first_names = ([c["name"] for c in r["criteria"]] for r in (report, first))
     if report["source"] != first["source"] or names != first_names:
@@ -329,7 +345,7 @@ def _require_same(
             "reports of one source",
         )
     for key, title in (("serial", "serial number"), ("ball", "ball")):
-        if report[key] != first[key] and not different_balls:
+        if report[key] != first[key] and not allow_balls:
             refuse(
                 f"{file}: its {title} {report[key]!r} is not that of {origin}, {first[key]!r}",
                 "reports of one ball, or --different-balls",
@@ -367,41 +383,37 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
 
 def _is_complete(report: dict[str, Any]) -> bool:
     """Whether a report has all entries that a history needs, each of its type."""
-    entries = report.get("criteria")
-    if any(key not in report for key in KEYS) or not isinstance(entries, list) or not entries:
-        return False
-    if not all(isinstance(report[key], str) for key in KEYS if key != "criteria"):
-        return False
-    return all(
-        isinstance(entry, dict)
-        and all(key in entry for key in CRITERION_KEYS)
-        and all(_is_number(entry[key]) for key in ("lower", "upper"))
-        and all(
-            entry[key] is None or _is_number(entry[key])
-            for key in ("value", "uncertainty", "expanded_uncertainty", "band")
-        )
-        and all(isinstance(entry[key], str) for key in ("name", "unit"))
-        and entry["verdict"] in VERDICTS
-        for entry in entries
-    )  # fmt: skip
+    criteria: Any = report.get("criteria")
+    return (
+        all(isinstance(report.get(key), str) for key in TEXTS)
+        and all(isinstance(report.get(key, []), list) for key in ("instruments", "files"))
+        and isinstance(criteria, list)
+        and bool(criteria)
+        and all(isinstance(entry, dict) and _is_criterion(entry) for entry in criteria)
+    )
+
+
+def _is_criterion(entry: dict[str, Any]) -> bool:
+    return (
+        isinstance(entry.get("name"), str)
+        and isinstance(entry.get("upper_bound"), bool)
+        and entry.get("verdict") in VERDICTS
+        and all(_is_number(entry.get(key)) for key in LIMITS)
+        and all(entry.get(key, "") is None or _is_number(entry.get(key)) for key in VALUES)
+    )
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _trend(
-    time: NDArray[np.float64],
-    value: NDArray[np.float64],
-    uncertainty: NDArray[np.float64],
-    limits: tuple[float, float],
-    significance: float,
-) -> Trend:
+def _trend(series: Series, significance: float) -> Trend:
     """Return the least-squares line, weighted by 1/uncertainty**2, with its uncertainty.
 
     It is the larger of two, by the stated uncertainties and by the scatter with n - 2 degrees of
     freedom: a trend must be significant by both.
     """
+    time, value, uncertainty = series.years, series.values, series.uncertainties
     count = len(time)
     stated = bool((uncertainty > 0).all())
     weight = 1 / uncertainty**2 if stated else np.ones(count)
@@ -425,7 +437,7 @@ def _trend(
     line = mean + slope * (ends - middle)
     times = (math.nan, math.nan, math.nan)
     if significant:
-        limit = limits[1] if slope > 0 else limits[0]
+        limit = series.entries[-1]["upper" if slope > 0 else "lower"]
         crossing = _crossing(limit - mean, slope, factor(0.05), weight.sum(), spread)
         # A line says nothing beyond its values.
         if time[0] <= middle + crossing[0] <= time[-1]:
@@ -449,14 +461,3 @@ def _crossing(
         return distance / slope, math.nan, math.nan
     low, high = (b - math.sqrt(root)) / a, (b + math.sqrt(root)) / a
     return distance / slope, low, high
-
-
-def _slope(quantity: Quantity, trend: Trend | None) -> str:
-    """Return a slope with its expanded uncertainty as text, marked if it is significant."""
-    if trend is None:
-        return "–"
-    slope, expanded = (width * quantity.display_scale for width in (trend.slope, trend.expanded))
-    decimals = quantity.decimals + 1
-    sign = "+" if round(slope, decimals) > 0 else ""
-    mark = SIGNIFICANT if trend.significant else ""
-    return f"{sign}{number(slope, decimals)} ± {number(expanded, decimals)}{mark}"

@@ -20,13 +20,13 @@ from thud.plot.style import (
     own_style,
 )
 from thud.report.ball_history import ACTION, WARNING
-from thud.report.rows import NOT_KNOWN, capital, quantity_of
+from thud.report.rows import NOT_KNOWN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.report.ball_history import History, Trend
+    from thud.report.ball_history import History, Series
 
 # Marker and its fill by verdict: distinct in grey as well.
 MARKS = {
@@ -34,6 +34,7 @@ MARKS = {
     "undecided": ("s", "white"),
     "does not conform": ("X", COLORS[1]),
 }
+TREND: dict[str, Any] = {"color": COLORS[0], "linewidth": 1, "linestyle": "--"}
 # Lines of the control limits, by their distance in standard deviations, and of calibrations.
 CONTROL: dict[float, dict[str, Any]] = {
     WARNING: {"color": COLORS[4], "linewidth": 0.8, "linestyle": ":"},
@@ -54,25 +55,17 @@ def draw_history(history: History) -> Figure:
     lines the significant trends, control limits and calibrations. The last panel has the recorded
     temperatures. If the reports are of different balls, each point has the number of its ball.
     """
-    criteria, trends = history.criteria(), history.trends()
-    control, temperatures = history.control_limits(), history.temperatures()
-    has_temperature = any(value is not None for value in temperatures)
-    count = len(criteria) + has_temperature
+    has_temperature = any(value is not None for value in history.temperatures)
+    count = len(history.series) + has_temperature
     rows = -(-count // 2)
     figure = new_figure(0.5 + 1.15 * rows, 2 * WIDTH)
     panels = figure.subplots(rows, 2, sharex=True, squeeze=False).T.ravel()
-    for axes, entries, trend, limits in zip(panels, criteria, trends, control, strict=False):
-        _draw_criterion(axes, history, entries, trend)
-        if limits is not None:
-            scale = quantity_of(entries[0]).display_scale
-            for factor, line in CONTROL.items():
-                for sign in (-1, 1):
-                    y = (limits.mean + sign * factor * limits.deviation) * scale
-                    axes.axhline(y, **line)
+    for axes, series in zip(panels, history.series, strict=False):
+        _draw_criterion(axes, history, series)
     if has_temperature:
-        _draw_temperature(panels[len(criteria)], history)
+        _draw_temperature(panels[count - 1], history)
     for axes in panels[:count]:
-        for date in history.calibrations():
+        for date in history.calibrations:
             axes.axvline(date, **CALIBRATION)
     for axes in panels[count:]:
         axes.remove()
@@ -84,15 +77,12 @@ def draw_history(history: History) -> Figure:
     locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
     first.xaxis.set_major_locator(locator)
     first.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
-    _add_legend(first, trends, history)
+    _add_legend(first, history)
     return figure
 
 
-def _draw_criterion(
-    axes: Axes, history: History, entries: list[dict[str, Any]], trend: Trend | None
-) -> None:
-    quantity = quantity_of(entries[0])
-    scale = quantity.display_scale
+def _draw_criterion(axes: Axes, history: History, series: Series) -> None:
+    entries, scale = series.entries, series.quantity.display_scale
     bounds = np.array([(entry["lower"], entry["upper"]) for entry in entries]) * scale
     # A count has a single allowed value: its area gets a height.
     is_count = bounds[0, 0] == bounds[0, 1]
@@ -106,12 +96,10 @@ def _draw_criterion(
     for i, (date, entry) in enumerate(zip(history.dates, entries, strict=True)):
         if entry["value"] is None:
             continue
-        marker, color = MARKS.get(entry["verdict"], ("D", "white"))
         bar = (entry["expanded_uncertainty"] or 0.0) * scale
         axes.errorbar(
             date, entry["value"] * scale, yerr=bar,  # type: ignore[arg-type]
-            marker=marker, markersize=4.5, markerfacecolor=color, color="black", capsize=2,
-            elinewidth=0.8, markeredgewidth=0.7,
+            **_marker(entry["verdict"]),
         )  # fmt: skip
         if numbers:
             axes.annotate(
@@ -120,17 +108,21 @@ def _draw_criterion(
             )  # fmt: skip
     if all(entry["value"] is None for entry in entries):
         axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
-    if trend is not None and trend.significant:
-        dates = np.array([history.date(year) for year in trend.time])
-        axes.plot(dates, trend.value * scale, color=COLORS[0], linewidth=1, linestyle="--")
+    if series.trend is not None and series.trend.significant:
+        dates = np.array([history.date(year) for year in series.trend.time])
+        axes.plot(dates, series.trend.value * scale, **TREND)
+    if series.control is not None:
+        for factor, line in CONTROL.items():
+            for distance in (-factor * series.control.deviation, factor * series.control.deviation):
+                axes.axhline((series.control.mean + distance) * scale, **line)
     axes.margins(y=0.15)
     if is_count:
         axes.yaxis.set_major_locator(MultipleLocator(1))
-    axes.set_ylabel(capital(quantity.label).replace(", ", ",\n"))
+    axes.set_ylabel(series.title.replace(", ", ",\n"))
 
 
 def _draw_temperature(axes: Axes, history: History) -> None:
-    pairs = zip(history.dates, history.temperatures(), strict=True)
+    pairs = zip(history.dates, history.temperatures, strict=True)
     known = [(date, value) for date, value in pairs if value is not None]
     dates, values = zip(*known, strict=True)
     axes.plot(dates, values, color="black", linestyle="none", marker="o", markersize=3.5)
@@ -138,19 +130,25 @@ def _draw_temperature(axes: Axes, history: History) -> None:
     axes.set_ylabel("Temperature,\n°C")
 
 
-def _add_legend(axes: Axes, trends: list[Trend | None], history: History) -> None:
+def _marker(verdict: str) -> dict[str, Any]:
+    """Return the style of a value by its verdict."""
+    marker, color = MARKS[verdict]
+    return {
+        "marker": marker, "markersize": 4.5, "markerfacecolor": color, "markeredgewidth": 0.7,
+        "color": "black", "linestyle": "none", "capsize": 2, "elinewidth": 0.8,
+    }  # fmt: skip
+
+
+def _add_legend(axes: Axes, history: History) -> None:
     axes.fill_between([], [], color=GRAY, linewidth=0, label="allowed")
-    for verdict, (marker, color) in MARKS.items():
-        axes.errorbar(
-            [], [], yerr=[], label=verdict, marker=marker, markersize=4.5, markerfacecolor=color,
-            color="black", linestyle="none", capsize=2, elinewidth=0.8, markeredgewidth=0.7,
-        )  # fmt: skip
-    if any(trend is not None and trend.significant for trend in trends):
-        axes.plot([], [], color=COLORS[0], linewidth=1, linestyle="--", label="trend")
-    if any(limits is not None for limits in history.control_limits()):
+    for verdict in MARKS:
+        axes.errorbar([], [], yerr=[], label=verdict, **_marker(verdict))
+    if any(series.is_drifting for series in history.series):
+        axes.plot([], [], label="trend", **TREND)
+    if any(series.control is not None for series in history.series):
         for (factor, line), name in zip(CONTROL.items(), ("warning", "action"), strict=True):
             axes.plot([], [], label=f"{name} limits ({factor:g} σ)", **line)
-    if history.calibrations():
+    if history.calibrations:
         axes.plot([], [], label="calibration", **CALIBRATION)
     balls = [f"{number}: {name}" for name, number in _ball_numbers(history).items()]
     title = fill("; ".join(balls), MAX_TITLE) or history.title
