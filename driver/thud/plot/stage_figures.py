@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.recordings.stage import Stage
+    from thud.recordings.drops import Stage
 
 # Time around the contact in which changes of the force are drawn, s.
 AROUND = 0.01

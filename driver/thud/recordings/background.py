@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
 from thud.level.levels import RECORDED_BAND
-from thud.recordings.quantization import MARGIN, MAX_BACKGROUND, Quantization
+from thud.recordings.drops import BACKGROUND_MARGIN, MAX_BACKGROUND, Quantization
 from thud.recordings.tones import find_tones
 
 if TYPE_CHECKING:
@@ -64,6 +64,9 @@ MIN_CELLS = 22
 # in variances of the noise, up to which it is the cause.
 TIME_CONSTANTS = np.geomspace(0.1, 30, 200)
 INCREASE = 9.0
+# Standard deviation of the offset, as a fraction of the peak, from which a warning is raised: 0.03
+# dB at 250, 0.06 dB at 500 Hz.
+MAX_OFFSET = 5e-4
 # Minimum drift and hum that are noted, in standard deviations.
 MIN_DEVIATIONS = 3.0
 
@@ -153,8 +156,15 @@ class Background(Immutable):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """Tones, step, drift and hum, the last two from three standard deviations on."""
+        """Tones, step, drift and hum, the last two from three standard deviations on.
+
+        A warning if quantization makes the offset uncertain; the uncertainty includes it.
+        """
         notes = [*self.tones]
+        quantization = self.quantization
+        if quantization.offset > MAX_OFFSET * self.peak:
+            others = {"step": quantization.step}
+            notes.append(Note("coarse_steps", value=quantization.offset, unit="N", others=others))
         if self.step:
             notes.append(Note("offset_step", value=self.step, unit="N"))
         weights = self.whiten.T @ (self.whiten @ self.mean)
@@ -187,8 +197,8 @@ def remove_background(
     tones, notes = find_tones(force, rate, section.contact)
     quiet = force - tones
     # At most half of a short background is cut off.
-    before_stop = int(max(first - MARGIN * rate, first / 2))
-    after_start = int(min(stop + MARGIN * rate, (stop + count) / 2))
+    before_stop = int(max(first - BACKGROUND_MARGIN * rate, first / 2))
+    after_start = int(min(stop + BACKGROUND_MARGIN * rate, (stop + count) / 2))
     quiet -= float(np.median(np.concatenate([quiet[:before_stop], quiet[after_start:]])))
     smooth = uniform_filter1d(quiet[first:stop], max(1, round(rate / RECORDED_BAND)))
     low, peak = float(smooth.min()), float(smooth.max())

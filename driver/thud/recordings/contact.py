@@ -19,9 +19,7 @@ from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.recordings.background import MAINS, N_HARMONIC, cell_means, uniform_cells
-from thud.recordings.drops import robust_deviation
-from thud.recordings.quantization import MAX_BACKGROUND
-from thud.recordings.stage import Stage
+from thud.recordings.drops import MAX_BACKGROUND, Stage, robust_deviation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,7 +20,7 @@ from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
 from thud.recordings.checks import CONTACT_CHECKS
 from thud.recordings.contact import SAMPLE_ERROR, Contact, find_edge
-from thud.recordings.drops import robust_deviation
+from thud.recordings.drops import Stage, robust_deviation
 from thud.recordings.instruments import peak_uncertainty
 from thud.recordings.quantities import (
     BOUNCES,
@@ -32,7 +32,6 @@ from thud.recordings.quantities import (
 )
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.ringing import find_ringing, is_in_record
-from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

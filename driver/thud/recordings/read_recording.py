@@ -20,14 +20,13 @@ from thud.recordings.background import remove_background
 from thud.recordings.checks import copies
 from thud.recordings.config import Config, read_config
 from thud.recordings.contact import find_contact
-from thud.recordings.drops import Section, choose, cut_section, find_drops, require_chosen
+from thud.recordings.drops import Section, Stage, choose, cut_section, find_drops, require_chosen
 from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
 from thud.recordings.response import correct
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
-from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

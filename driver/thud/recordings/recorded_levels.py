@@ -14,9 +14,9 @@ from thud.base.immutable import Immutable
 from thud.level.estimate import NOISE, RECTANGULAR, Contribution, Estimate
 from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.contact import band_noise
+from thud.recordings.drops import Stage
 from thud.recordings.filters import filter_levels
 from thud.recordings.instruments import AMPLITUDE_DECIBEL, ASSUMED, CALIBRATION
-from thud.recordings.stage import Stage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

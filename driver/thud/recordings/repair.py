@@ -1,7 +1,11 @@
-"""Repair of a recorded force: spikes are filled, also in each load cell."""
+"""Repair of a recorded force: spikes are filled, also in each load cell; errors by quantization.
+
+Derivation of the latter: docs/recordings_theory.md, section 2.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +15,7 @@ from scipy.ndimage import maximum_filter, median_filter
 from thud.base.checks import refuse
 from thud.base.note import Note, of_part
 from thud.recordings.checks import CELL_CHECKS, SECTION_CHECKS, cells
-from thud.recordings.quantization import find_quantization
+from thud.recordings.drops import BACKGROUND_MARGIN, MAX_BACKGROUND, Quantization
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,6 +34,19 @@ MIN_RATIO = 4.0
 CLEAN = np.abs(np.arange(-12, 13)) > 4  # noqa: PLR2004
 MIN_SPIKE = 0.005
 MIN_STEPS = 3.5
+# Minimum step as a fraction of the maximum force: smaller ones are rounding of floats, or harmless.
+MIN_STEP_SIZE = 1e-5
+# Differences of up to MAX_MULTIPLE steps are multiples of the step within TOLERANCE steps. There
+# are at least MIN_GAPS of them, at least the fraction MIN_FRACTION of them multiples.
+MAX_MULTIPLE = 20
+TOLERANCE = 0.1
+MIN_GAPS = 4
+MIN_FRACTION = 0.9
+# Fraction of the samples in two neighboring codes from which the noise is less than a step.
+TWO_CODES = 0.999
+# Noise from sample to sample, in steps, above which it averages the steps: of the error of a
+# constant background 0.7 % are left.
+MAX_NOISE = 0.5
 
 
 def repair(section: Section) -> Section:
@@ -78,3 +95,60 @@ def _find_spikes(section: Section, limit: float) -> NDArray[np.bool_]:
     clean = MIN_RATIO * maximum_filter(from_cubic, footprint=CLEAN, mode="nearest")
     is_out = np.minimum(from_cubic, from_median) > np.maximum(clean, limit)
     return np.asarray(is_out & (jump < from_cubic))
+
+
+def find_quantization(section: Section) -> Quantization:
+    """Return the errors due to quantization of a recorded drop; of load cells, their sum."""
+    if section.cells:
+        cells = [find_quantization(cell) for cell in section.cells]
+        return Quantization(
+            max(cell.step for cell in cells),
+            sum(cell.density for cell in cells),
+            math.hypot(*(cell.offset for cell in cells)),
+        )
+    force, rate, (first, stop) = section.force, section.sample_rate, section.contact
+    length, margin = int(MAX_BACKGROUND * rate), int(BACKGROUND_MARGIN * rate)
+    before = force[max(first - length, 0) : max(first - margin, 1)]
+    after = force[min(stop + margin, len(force) - 1) : stop + length]
+    background = np.concatenate([before, after])
+    step = _find_step(np.concatenate([background, force[first:stop]]))
+    offset = _offset_deviation(background, step) if step else 0.0
+    if not offset:
+        return Quantization(step)
+    # The error is white, unless the force stays within a step for several samples: near the peak
+    # of a half sine its sawtooth has q**3 T zeta(3) / pi**4 / P on either side.
+    contact = force[first:stop]
+    peak = max(float(contact.max() - np.median(background)), step)
+    slow = 2 * 0.01234 * step**3 * len(contact) / rate / peak
+    return Quantization(step, max(step**2 / 6 / rate, slow), offset)
+
+
+def _find_step(values: NDArray[np.float64]) -> float:
+    """Return the smallest difference between distinct values, if others are its multiples, or 0."""
+    least = MIN_STEP_SIZE * float(np.abs(values).max())
+    gaps = np.diff(np.unique(values))
+    gaps = gaps[gaps > least / 10]
+    step = float(gaps.min(initial=math.inf))
+    multiples = gaps[gaps < MAX_MULTIPLE * step] / step
+    is_near = np.abs(multiples - np.rint(multiples)) < TOLERANCE
+    is_step = step > least and len(is_near) >= MIN_GAPS and is_near.mean() >= MIN_FRACTION
+    return step if is_step else 0.0
+
+
+def _offset_deviation(background: NDArray[np.float64], step: float) -> float:
+    """Return the standard deviation of the error of the mean of a background, N.
+
+    In two codes, of which the rarer one has the fraction p, the true mean is up to 1/2 - p steps
+    from the recorded one. Noise of s steps from sample to sample lowers step / sqrt(12), the error
+    of a constant, by exp(-2 pi**2 s**2), the first harmonic of the error over the steps; hum and
+    drift lower it by the root of the number of steps over which they change the background.
+    """
+    steps = np.rint((background - background[0]) / step)
+    fractions = np.sort(np.unique(steps, return_counts=True)[1])[:-3:-1] / len(steps)
+    if fractions.sum() > TWO_CODES:
+        return step * float(fractions[0] - 0.5) / math.sqrt(3)
+    noise = max(float(np.mean(np.diff(steps) ** 2)) / 2 - 1 / 12, 0.0)
+    if noise > MAX_NOISE**2:
+        return 0.0
+    span = 1 + math.sqrt(8) * float(steps.std())
+    return step * math.exp(-2 * np.pi**2 * noise) / math.sqrt(12 * span)

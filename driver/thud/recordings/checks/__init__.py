@@ -8,7 +8,6 @@ where that is read or averaged: `thud.recordings.signal.check_peak` of a signal 
 corrected: 1.9 dB at 708 Hz).
 """
 
-from thud.recordings import quantization
 from thud.recordings.checks import aliasing, clipping, continuity
 
 # Of the repaired force of a load cell, or of the drop: check(section).
@@ -16,4 +15,4 @@ CELL_CHECKS = (clipping.check, continuity.check_lost, continuity.check_noise)
 # Of the repaired force of the drop: check(section).
 SECTION_CHECKS = (continuity.check_slope,)
 # Of a contact, after the removal of the background: check(section, contact).
-CONTACT_CHECKS = (aliasing.check, quantization.check)
+CONTACT_CHECKS = (aliasing.check,)

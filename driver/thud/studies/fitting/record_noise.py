@@ -23,8 +23,7 @@ from thud.recordings.background import (
     fit_noise,
     unit_covariances,
 )
-from thud.recordings.drops import CELL, FOOT, MARGIN
-from thud.recordings.quantization import MAX_BACKGROUND
+from thud.recordings.drops import CELL, FOOT, MARGIN, MAX_BACKGROUND
 from thud.studies.fitting.inference import UNLIKELY
 
 if TYPE_CHECKING:
