@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 import textwrap
 from itertools import zip_longest
@@ -63,32 +62,24 @@ def unmarked(text: str) -> str:
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
     """Return rows of text as lines with aligned columns, up to `WIDTH` wide.
 
-    Cells of wider tables are broken, those of the first column last. If there are too many columns,
-    they are distributed over several tables, each with the first column.
+    Cells of wider tables are broken, but not those of the first column. If there are too many
+    columns, they are distributed over several tables, each with the first column.
 
     >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
     octave  level
     31.5    39
     """
     columns = list(zip(*rows, strict=True))
-    words = [[w.rstrip() for cell in column for w in _WORD.findall(cell)] for column in columns]
-    minima = [min(max(map(len, column)), _MAX_WORD) for column in words]
-    natural = [max(map(len, column)) for column in columns]
-
-    def split(limit: float) -> list[list[int]]:
-        tables = [[0]]
-        for i in range(1, len(columns)):
-            longer = [*tables[-1], i]
-            is_wide = _total([natural[k] for k in longer]) > limit
-            is_wide |= _total([minima[k] for k in longer]) > WIDTH
-            if is_wide and len(tables[-1]) > 1:
-                tables.append([0])
-            tables[-1].append(i)
-        return tables
-
-    # As few tables as can be made narrow enough, of similar widths.
-    fewest = len(split(math.inf))
-    tables = next(parts for w in range(_total(natural) + 1) if len(parts := split(w)) == fewest)
+    minima = [
+        min(max(len(word.rstrip()) for cell in column for word in _WORD.findall(cell)), _MAX_WORD)
+        for column in columns
+    ]
+    minima[0] = min(max(map(len, columns[0])), _MAX_WORD)  # labels stay whole
+    tables = [[0]]
+    for i in range(1, len(columns)):
+        if len(tables[-1]) > 1 and _total([minima[k] for k in (*tables[-1], i)]) > WIDTH:
+            tables.append([0])
+        tables[-1].append(i)
     return "\n\n".join(
         _format_table([columns[i] for i in table], [minima[i] for i in table]) for table in tables
     )
@@ -110,26 +101,21 @@ def wrap(text: str) -> str:
       word word word word word word word word word word word word word word word
         word
     """
-    return "\n".join(map(_wrap_line, text.split("\n")))
-
-
-def _wrap_line(line: str) -> str:
-    if len(unmarked(line)) <= WIDTH:
-        return line
-    # Further lines of a comment are comments, too.
-    indent = line[: len(line) - len(line.lstrip(" #"))] + "  "
-    return textwrap.fill(
-        line, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
-    )
+    lines = text.split("\n")
+    for i, line in enumerate(lines):
+        if len(unmarked(line)) > WIDTH:
+            # Further lines of a comment are comments, too.
+            indent = line[: len(line) - len(line.lstrip(" #"))] + "  "
+            lines[i] = textwrap.fill(
+                line, WIDTH, subsequent_indent=indent, break_long_words=False,
+                break_on_hyphens=False,
+            )  # fmt: skip
+    return "\n".join(lines)
 
 
 def _format_table(columns: Sequence[Column], minima: Sequence[int]) -> str:
     """Return columns of text as lines; the widest columns are made narrower until they fit."""
     widths = [max(map(len, column)) for column in columns]
-    # Labels stay whole if the table fits with them.
-    label = min(widths[0], _MAX_WORD)
-    if _total([label, *minima[1:]]) <= WIDTH:
-        minima = [label, *minima[1:]]
     while _total(widths) > WIDTH:
         reducible = [i for i, minimum in enumerate(minima) if widths[i] > minimum]
         widths[max(reducible, key=widths.__getitem__)] -= 1
@@ -138,15 +124,13 @@ def _format_table(columns: Sequence[Column], minima: Sequence[int]) -> str:
     lines = []
     for row, cells in zip(zip(*broken, strict=True), zip(*columns, strict=True), strict=True):
         for parts in zip_longest(*row, fillvalue=""):
-            shown = map(_padded, parts, widths, cells)
-            lines.append((" " * _GAP).join(shown).rstrip())
+            line = ""
+            for part, width, cell in zip(parts, widths, cells, strict=True):
+                is_marked = part and isinstance(cell, Result)
+                line += marked(part, cell.verdict) if is_marked else part
+                line += " " * (width + _GAP - len(part))
+            lines.append(line.rstrip())
     return "\n".join(lines)
-
-
-def _padded(part: str, width: int, cell: str) -> str:
-    """Return a line of a cell with a width, marked if the cell tells a verdict."""
-    shown = marked(part, cell.verdict) if part and isinstance(cell, Result) else part
-    return shown + " " * (width - len(part))
 
 
 def _total(widths: Sequence[int]) -> int:
