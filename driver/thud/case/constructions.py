@@ -8,7 +8,7 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FLOORS, KEYS, FloorOptions, JoistFloor, RectangularFloor, Room
 from thud.base.checks import (
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 # Keys of the room that belong to a construction: its suspended ceiling.
 CEILING_KEYS = tuple(k.name for k in KEYS if k.owner == "room" and k.name.startswith("ceiling_"))
-Table = TypeVar("Table", bound=TomlTable)
 _UNITS = {(k.owner, k.name): k.unit for k in KEYS}
 
 
@@ -226,14 +225,14 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     require_kind("construction", name, str | os.PathLike)
     if not isinstance(name, str) or name.endswith(".toml"):
         return read_construction(Path(name))
-    by_name = {_plain(entry.name): entry for entry in _library()}
-    if _plain(name) not in by_name:
-        names = [entry.name for entry in by_name.values()]
-        refuse(
-            f"construction = {shown(name)} is not known{suggestion(name, names)}",
-            "names that thud-driver floor --list shows, or the path of a TOML file",
-        )
-    return deepcopy(by_name[_plain(name)])
+    for entry in _library():
+        if _plain(entry.name) == _plain(name):
+            return deepcopy(entry)
+    hint = suggestion(name, [entry.name for entry in _library()])
+    return refuse(
+        f"construction = {shown(name)} is not known{hint}",
+        "names that thud-driver floor --list shows, or the path of a TOML file",
+    )
 
 
 def construction_rows(entries: Iterable[Construction]) -> list[tuple[str, ...]]:
@@ -253,12 +252,15 @@ def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> C
 def _library() -> tuple[Construction, ...]:
     """Return all constructions, sorted by kind, and by the words and numbers of their names."""
     entries = map(read_construction, (inputs_folder() / "constructions").glob("*.toml"))
-    return tuple(sorted(entries, key=lambda entry: (entry.kind, _order(entry.name))))
-
-
-def _order(name: str) -> str:
-    """Return a name whose numbers, of four digits, are sorted by their value after words."""
-    return re.sub(r"\d+", lambda match: f"~{match[0]:0>4}", _plain(name))
+    # Numbers, of four digits, are sorted by their value, and after words.
+    return tuple(
+        sorted(
+            entries,
+            key=lambda entry: (
+                entry.kind, re.sub(r"\d+", lambda n: f"~{n[0]:0>4}", _plain(entry.name)),
+            ),
+        )
+    )  # fmt: skip
 
 
 def _plain(text: str) -> str:
@@ -277,39 +279,27 @@ def _sides(case: Case) -> tuple[float, float] | None:
     return None
 
 
-@dataclass(frozen=True)
-class _Sourced(TomlTable):
-    value: Any = key(lambda _, value: value, "value of a key")
-    source: str = key(to_text, "its source", "")
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.require("value", "source")
-
-
-def _read_each(kind: type[Table], tables: Mapping[str, object]) -> list[Table]:
-    """Return tables of a kind; their labels are in messages."""
-    result = []
-    for label, table in tables.items():
-        try:
-            result.append(kind.read("the table", table))
-        except InputError as error:
-            raise error.within(label) from error
-    return result
-
-
-def _to_sourced(name: str, value: object) -> dict[str, _Sourced]:
-    """Return value and source of each key in a table."""
-    table = require_table(name, value)
-    entries = _read_each(_Sourced, {f"[{name}] {word}": table[word] for word in table})
-    return dict(zip(table, entries, strict=True))
+def _to_sourced(name: str, value: object) -> Mapping[str, Any]:
+    """Return a table of keys, each a table of value and source."""
+    for word, entry in require_table(name, value).items():
+        if not isinstance(entry, dict) or entry.keys() != {"value", "source"}:
+            refuse_value(f"[{name}] {word}", entry, "a table of value and source")
+        to_text(f"[{name}] {word}: source", entry["source"])
+    return require_table(name, value)
 
 
 def _to_layers(name: str, value: object) -> tuple[Layer, ...]:
     """Return the layers in a list of tables."""
     if not isinstance(value, list) or not value:
         refuse_value(name, value, "a list of tables with material, thickness and density")
-    return tuple(_read_each(Layer, {f"layer {i}": table for i, table in enumerate(value, 1)}))
+    layers = []
+    for i, table in enumerate(value, 1):
+        label = f"layer {i}"
+        try:
+            layers.append(Layer.read("the table", table))
+        except InputError as error:
+            raise error.within(label) from error
+    return tuple(layers)
 
 
 @dataclass(frozen=True)
@@ -320,8 +310,8 @@ class _File(TomlTable):
     kind: str = key(to_text, "kind, such as timber joists", "")
     floor: str = key(one_of(FLOORS), "name of the floor", "")
     layers: tuple[Layer, ...] = key(_to_layers, "layers from top to bottom", ())
-    keys: dict[str, _Sourced] = key(_to_sourced, "keys of the floor", {})
-    room: dict[str, _Sourced] = key(_to_sourced, "keys of the suspended ceiling", {})
+    keys: dict[str, Any] = key(_to_sourced, "keys of the floor", {})
+    room: dict[str, Any] = key(_to_sourced, "keys of the suspended ceiling", {})
     note: str = key(to_line, "what the floor neglects", "")
 
     def __post_init__(self) -> None:
@@ -339,13 +329,15 @@ def read_construction(path: Path) -> Construction:
     content, _ = read_toml(path)
     try:
         file = _File.read("the construction", content)
-        room = {name: entry.value for name, entry in file.room.items()}
-        floor = {name: entry.value for name, entry in file.keys.items()}
+        room, floor = (
+            {name: entry["value"] for name, entry in table.items()}
+            for table in (file.room, file.keys)
+        )
         case = Case.from_namelist({"floor": {"name": file.floor}, file.floor: floor, "room": room})
         check_case(case if room else replace(case, room=None))
     except InputError as error:
         raise error.within(path) from error
     assert case.floor is not None  # noqa: S101 - the tables have a floor
-    sources = {name: entry.source for name, entry in (file.keys | file.room).items()}
+    sources = {name: entry["source"] for name, entry in (file.keys | file.room).items()}
     room = {name: float(value) for name, value in room.items()}
     return Construction(file.name, file.kind, case.floor, room, file.layers, sources, file.note)
