@@ -40,7 +40,6 @@ from thud.base.checks import (
     suggestion,
 )
 from thud.base.display import Displayed
-from thud.base.errors import InputError
 from thud.base.files import replace_file
 
 if TYPE_CHECKING:
@@ -64,9 +63,6 @@ OPTIONAL_GROUPS: dict[str, type[Group]] = {
 def attribute_of(key: Key) -> str:
     """Return the name of the attribute of a `Case` that holds a key, or would hold it."""
     return "model" if key.owner in MODELS else "floor" if key.owner in FLOORS else key.group
-
-
-_ATTRIBUTES = [(key, attribute_of(key)) for key in KEYS]
 
 
 def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -> ModelOptions:
@@ -132,12 +128,8 @@ class Case(Displayed):
     def __post_init__(self) -> None:
         """Raise InputError if a group is of a wrong type."""
         super().__post_init__()
-        kinds: dict[str, Any] = {
-            **GROUPS,
-            "model": ModelOptions,
-            "floor": FloorOptions,
-            **OPTIONAL_GROUPS,
-        }
+        chosen = {"model": ModelOptions, "floor": FloorOptions}
+        kinds: dict[str, Any] = {**GROUPS, **chosen, **OPTIONAL_GROUPS}
         for group, kind in kinds.items():
             if group in GROUPS or getattr(self, group) is not None:
                 require_kind(group, getattr(self, group), kind)
@@ -165,7 +157,8 @@ class Case(Displayed):
         If that is None, the value of the standard ball by the model follows, else None.
         """
         model = self.model.name if self.model else ""
-        for key, attribute in _ATTRIBUTES:
+        for key in KEYS:
+            attribute = attribute_of(key)
             options = getattr(self, attribute, None)
             is_used = self.model or attribute not in GROUPS or attribute == "ball"
             if options and is_used and key.owner in {"", attribute, getattr(options, "name", "")}:
@@ -195,24 +188,22 @@ class Case(Displayed):
             if standard is not None:
                 continue
             is_list = isinstance(value, tuple)
-            entries = list(value) if isinstance(value, tuple) else [value]
+            entries = [*value] if isinstance(value, tuple) else [value]
             # What f90nml can write.
-            are_plain = all(
-                entry.isprintable()
-                if isinstance(entry, str)
-                else isinstance(entry, float)
+            are_plain = (
+                isinstance(entry, float)
                 or (isinstance(entry, int) and abs(entry) <= MAX_NUMBER)
+                or (isinstance(entry, str) and entry.isprintable())
                 for entry in entries
             )
-            if not are_plain or is_list is not (key.kind in {"list", "texts"}):
+            if not all(are_plain) or is_list is not (key.kind in {"list", "texts"}):
                 refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
             group = groups.setdefault(key.group, {})
             if entries:
                 group[key.name] = entries if is_list else value
-        namelist = f90nml.Namelist()  # a dictionary of groups would be sorted
+        namelist: Any = f90nml.Namelist()  # a dictionary of groups would be sorted
         namelist.update(groups)
-        result: Namelist = namelist
-        return result
+        return namelist  # type: ignore[no-any-return]
 
     @classmethod
     def from_text(cls, content: str) -> Self:
@@ -277,17 +268,6 @@ def read_case(path: str | os.PathLike[str]) -> Case:
 def check_case(case: Case) -> None:
     """Raise InputError with the message of the library if a case is invalid."""
     ask("check", case=case_text(case))
-
-
-def is_portable_name(name: object) -> bool:
-    """Whether a value is a name for files that any system can hold, as the library knows them."""
-    if not isinstance(name, str) or name != name.strip():
-        return False
-    try:
-        check_case(Case(name=name))
-    except InputError:
-        return False
-    return True
 
 
 def write_case(case: Case, path: str | os.PathLike[str]) -> None:

@@ -22,7 +22,6 @@ from thud.case.case import (
     Case,
     check_case,
     impact_only,
-    is_portable_name,
     new_model,
     read_case,
 )
@@ -173,9 +172,8 @@ def read_common(
     """Read the part that all kinds share; `own_keys` are those besides `COMMON_KEYS`."""
     refuse_unknown("the study", content, (*COMMON_KEYS, *own_keys))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
-    name = content["name"]
-    if not is_portable_name(name):
-        refuse_value("name", name, "a short name for files on any system, without folders")
+    check_case(Case(name=content["name"]))
+    name = content["name"].rstrip()
     case, density = fix_keys(_case(content.get("case"), folder, fixed), fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
