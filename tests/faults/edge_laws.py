@@ -42,7 +42,7 @@ def _laws(impact: thud.Impact) -> dict[str, bool]:
     laws = {
         "numbers are finite": all(np.isfinite(values).all() for values in arrays),
         "thirds hold no more than all": _energy(third[1]) <= total + 1e-6,
-        "an octave of exact bands is its thirds": impact.level_method != "exact"
+        "an octave of exact bands is its thirds": impact.case.levels.method != "exact"
         or abs(_energy(third[1][3:12]) - _energy(octave[1][1:4])) < 1e-3
         or _energy(octave[1][1:4]) < total - 110,
         "impulse is the change of momentum": gravity

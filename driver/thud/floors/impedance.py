@@ -163,9 +163,8 @@ def ball_impedance(
     changes, estimates = [], []
     for value in floors:
         force = _force_on(source, float(value))
-        changes.append(
-            force_exposure_levels(force, source.sample_rate, bands, source.level_method) - blocked
-        )
+        levels = force_exposure_levels(force, source.sample_rate, bands, source.case.levels.method)
+        changes.append(levels - blocked)
         pairs = zip(spectrum, _band_spectra(force, source.sample_rate, bands), strict=True)
         estimates.append([value * np.vdot(f, fb - f) / np.vdot(f, f) for fb, f in pairs])
     return BallImpedance(

@@ -7,23 +7,21 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask, without_units
-from thud.base.display import Displayed
-from thud.base.extras import data_frame
-from thud.base.tabulated import column_rows
+from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text, new_model
 
 if TYPE_CHECKING:
     import numpy as np
-    import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
     from thud.base.bridge import Bundle
+    from thud.base.tabulated import Columns
 
 
 @dataclass(frozen=True, eq=False)
-class CompressionCurve(Displayed):
+class CompressionCurve(Tabulated):
     """Force and deflection of a ball between two rigid plates without friction.
 
     Attributes
@@ -46,28 +44,20 @@ class CompressionCurve(Displayed):
         end = f"{self.force[-1]:.1f} N at {1e3 * self.deflection[-1]:.1f} mm"
         return f"<CompressionCurve, {model}: {end}>"
 
+    def columns(self) -> Columns:
+        """Return the columns of ``compression.csv``."""
+        return {"deflection, m": (self.deflection, ".4g"), "force, N": (self.force, ".2f")}
+
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and about ten rows of text."""
-        step = max(1, len(self.force) // 10)
-        return column_rows(
-            {
-                "deflection, mm": (1e3 * self.deflection[::step], ".2f"),
-                "force, N": (self.force[::step], ".2f"),
-            }
-        )
+        header, *rows = super().rows()
+        return [header, *rows[:: max(1, len(rows) // 10)]]
 
     def plot(self) -> Figure:
         """Return a figure of the force against the deflection."""
         from thud.plot.ball_figures import compression
 
         return compression({"": self})
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the columns of ``compression.csv``.
-
-        Raise InputError if pandas is not installed.
-        """
-        return data_frame({"deflection_m": self.deflection, "force_N": self.force})
 
 
 def compress(

@@ -84,7 +84,8 @@ class FloorImpact(Impact):
 
     def blocked_levels(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the levels of the force on a rigid floor, dB, shape (n_band,); see `levels`."""
-        return force_exposure_levels(self.blocked_force, self.sample_rate, bands, self.level_method)
+        method = self.case.levels.method
+        return force_exposure_levels(self.blocked_force, self.sample_rate, bands, method)
 
     def difference(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the level differences contact − blocked force, dB, shape (n_band,)."""

@@ -92,11 +92,6 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         return self.case.ball.mass
 
     @property
-    def velocity_tolerance(self) -> float:
-        """Relative difference up to which two impact velocities count as equal: 0."""
-        return 0.0
-
-    @property
     def limits_source(self) -> LimitsSource:
         """Source whose limits apply."""
         return self.case.limits.source
@@ -155,11 +150,6 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         chosen = self.case.levels.force if force is None else force
         require_choice("force", chosen, FORCES)
         return chosen
-
-    @property
-    def level_method(self) -> LevelsMethod:
-        """Method of the levels, ``"exact"`` or ``"fft"``."""
-        return self.case.levels.method
 
     def levels(
         self,

@@ -88,9 +88,6 @@ class Recording(ImpactOrRecording):
 
     # Of every `ImpactResult`: a recording has only the force on the floor, and no floor or room.
     touch_time: ClassVar[float] = 0.0
-    level_method: ClassVar[LevelsMethod] = "exact"
-    # Relative tolerance of the velocity, for a drop height of at least 0.85 m ± 1 cm.
-    velocity_tolerance: ClassVar[float] = 0.015
     case: ClassVar[Case] = Case(model=None)
     on_floor: ClassVar[None] = None
     room_level: ClassVar[None] = None
@@ -251,7 +248,7 @@ class Recording(ImpactOrRecording):
 
         Raise InputError if the method is not ``"exact"``, the only one for recordings.
         """
-        require_choice("method", method or self.level_method, [self.level_method])
+        require_choice("method", method or "exact", ["exact"])
         return self.average(bands).level.copy()
 
     @cached_property

@@ -226,7 +226,7 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     columns = ("background", "spread", "flag")
     return {
         "band": get_bands(bands).nominal.tolist(),
-        "method": recording.level_method,
+        "method": recording.case.levels.method,
         "level": average.level.tolist(),
         "uncertainty": [estimate.uncertainty for estimate in average.estimates],
         "expanded_uncertainty": [estimate.expanded for estimate in average.estimates],
