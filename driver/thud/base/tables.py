@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 import textwrap
 from itertools import zip_longest
@@ -75,11 +76,22 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
         for column in columns
     ]
     minima[0] = min(max(map(len, columns[0])), _MAX_WORD)  # labels stay whole
-    tables = [[0]]
-    for i in range(1, len(columns)):
-        if len(tables[-1]) > 1 and _total([minima[k] for k in (*tables[-1], i)]) > WIDTH:
-            tables.append([0])
-        tables[-1].append(i)
+    natural = [max(map(len, column)) for column in columns]
+
+    def split(limit: float) -> list[list[int]]:
+        tables = [[0]]
+        for i in range(1, len(columns)):
+            longer = [*tables[-1], i]
+            is_wide = _total([natural[k] for k in longer]) > limit
+            is_wide |= _total([minima[k] for k in longer]) > WIDTH
+            if is_wide and len(tables[-1]) > 1:
+                tables.append([0])
+            tables[-1].append(i)
+        return tables
+
+    # As few tables as fit, of similar widths: the levels of all bands stand in one.
+    fewest = len(split(math.inf))
+    tables = next(parts for w in range(_total(natural) + 1) if len(parts := split(w)) == fewest)
     return "\n\n".join(
         _format_table([columns[i] for i in table], [minima[i] for i in table]) for table in tables
     )
