@@ -327,7 +327,7 @@ def test_noise_counts_in_bands_where_it_exceeds_the_scatter() -> None:
         repeated, noise = Estimate.of_drops(39.0, samples, [0.2 * math.sqrt(5)] * 5).contributions
         assert (repeated.counted, noise.counted) == (not expected, expected)
     entry = measure_levels([make_drop(3.0, seed=1)] * 3)
-    average = average_levels(entry)
+    average = average_levels(entry, {}, ())
     noise = entry.contributions["noise"][0] / math.sqrt(3)
     for estimate, expected in zip(average.estimates, noise, strict=True):
         counted = {part.name: part.counted for part in estimate.contributions}

@@ -517,7 +517,7 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
             np.full(level.shape, ""), {"noise": parts[:, :, 0], "method": parts[:, :, 1]},
         )  # fmt: skip
 
-    found = average_levels(of(3), {"calibration": np.full(5, 0.17)})
+    found = average_levels(of(3), {"calibration": np.full(5, 0.17)}, ())
     energies = 10 ** (levels / 10)
     below = np.mean(10 ** (backgrounds / 10))
     energy = energies.mean() - below
@@ -541,7 +541,7 @@ def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
         "repeatability": (2, True), "noise": (math.inf, False), "method": (math.inf, True),
         "calibration": (math.inf, True),
     }  # fmt: skip
-    alone = average_levels(of(1))
+    alone = average_levels(of(1), {}, ())
     assert np.isnan(alone.spread).all()
     np.testing.assert_allclose(uncertainty(alone), math.hypot(noise[0], method[0]))
     (one, *_) = alone.estimates
@@ -554,7 +554,7 @@ def test_average_and_estimates_have_one_budget_with_calibration_and_plate() -> N
     recording = thud.Recording("three", drops, (), config, calibration_uncertainty=0.01)
     average = recording.average()
     assert recording.level_estimates() == average.estimates
-    alone = average_levels(measure_levels(drops))
+    alone = average_levels(measure_levels(drops), {}, ())
     shared = instrument_uncertainties(drops, config, 0.01)
     for band, level in enumerate(average.estimates):
         parts = {part.name: part for part in level.contributions}

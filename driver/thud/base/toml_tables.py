@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -114,8 +114,9 @@ class TomlTable:
         return [
             entry.name
             for entry, value in values
+            # The default of keys without another one is an empty table.
             if value is not None and value is not entry.default
-            if not (isinstance(value, dict) and not value)
+            if value or entry.default is not MISSING
         ]
 
     def require(self, *names: str) -> None:

@@ -16,6 +16,7 @@ from .drops import (
     cut_section as cut_section,
     find_drops as find_drops,
 )
+from .instruments import instrument_uncertainties as instrument_uncertainties
 from .measured_drop import (
     Drop as Drop,
     measure_drop as measure_drop,

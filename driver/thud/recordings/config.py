@@ -85,15 +85,17 @@ def to_channels(name: str, value: object) -> str | tuple[int | str, ...]:
     return tuple(cells)
 
 
-def to_calibrations(name: str, value: Any) -> Any:  # noqa: ANN401 - of a user; one, or a tuple
-    """Return a calibration, also that of a list of one, or one for each channel.
+def to_calibrations(name: str, value: object) -> Any:  # noqa: ANN401 - one, or a tuple
+    """Return a calibration, also that of a list of one, or one for each channel."""
+    if not isinstance(value, list | tuple):
+        return to_calibration(name, value)
+    if len(value) == 1:
+        return to_calibration(name, value[0])
+    return tuple(to_calibration(f"{name}, entry {i}", v) for i, v in enumerate(value, 1))
 
-    Each is a number, a chain of factors or a `Calibration`.
-    """
-    if isinstance(value, list | tuple):
-        if len(value) == 1:
-            return to_calibrations(name, value[0])
-        return tuple(to_calibrations(f"{name}, entry {i}", v) for i, v in enumerate(value, 1))
+
+def to_calibration(name: str, value: Any) -> Calibration | float:  # noqa: ANN401 - of a user
+    """Return a number, or a chain of factors or a `Calibration` as the latter."""
     try:
         value = float(value) if isinstance(value, str) else value
     except ValueError:

@@ -126,8 +126,8 @@ def measure_levels(drops: Sequence[Drop], bands: BandSet = "octave") -> DropLeve
 
 def average_levels(
     drops: DropLevels,
-    instruments: Mapping[str, NDArray[np.float64]] | None = None,
-    not_stated: tuple[str, ...] = (),
+    instruments: Mapping[str, NDArray[np.float64]],
+    not_stated: tuple[str, ...],
 ) -> AverageLevels:
     """Return the energy average of the levels of drops, with its budget.
 
@@ -147,7 +147,7 @@ def average_levels(
         for name, values in drops.contributions.items()
         if name != NOISE
     }
-    causes |= instruments or {}
+    causes |= instruments
     causes = {name: values for name, values in causes.items() if values.any()}
     estimates = tuple(
         Estimate.of_drops(
