@@ -1,4 +1,4 @@
-"""Search of drops in a signal, assignment of bounces to them, and choice of those to measure."""
+"""Search of drops in a signal, assignment of bounces to them, and the samples around them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
-from thud.recordings.config import parse_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.recordings.config import Config
     from thud.recordings.response import Chain
     from thud.recordings.signal import Signal
 
@@ -220,8 +218,14 @@ def find_drops(
         )
     if not rate >= MIN_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {MIN_RATE:g} Hz")
-    cells = _cell_means(signal, first, stop, progress=progress)
-    pulses = _find_pulses(cells, first, stop, rate)
+    width = max(1, round(rate * CELL))
+    means = []
+    starts = range(first, stop, BLOCK * width)
+    for start in tqdm(starts, unit="block", desc=name, disable=not progress, leave=False):
+        force = signal.read(start, min(start + BLOCK * width, stop))
+        bounds = np.arange(0, len(force), width)
+        means.append(np.add.reduceat(force, bounds) / np.diff(bounds, append=len(force)))
+    pulses = _find_pulses(np.concatenate(means), first, stop, rate)
     drops, ignored = _assign_bounces(pulses, section, rate)
     if not drops:
         refuse(f"{name}: no impact", "a pulse of 12 to 40 ms that rises above the noise")
@@ -254,61 +258,9 @@ def cut_section(signal: Signal, pulse: Pulse) -> Section:
     )
 
 
-def choose(
-    drops: Sequence[Pulse], first: int, rate: float, config: Config
-) -> tuple[list[Pulse], list[Note]]:
-    """Return the drops to be measured, and notes on those that are left out.
-
-    The drops of a signal of a sample rate, Hz, have the numbers from `first` on. Without chosen
-    numbers all are measured but those that say why not.
-    """
-    chosen: list[Pulse] = []
-    notes: list[Note] = []
-    for number, drop in enumerate(drops, start=first):
-        reason = next((why for key, why in config.leave_out.items() if _holds(key, number)), None)
-        if reason is not None:
-            note = Note("drop_left_out", others={"reason": reason})
-        elif config.drops and not _holds(config.drops, number):
-            note = Note("drop_not_chosen", others={"chosen": config.drops})
-        elif drop.left_out and not config.drops:
-            note = drop.left_out
-        else:
-            chosen.append(drop)
-            continue
-        others = {**note.others, "time": drop.contact[0] / rate}
-        notes.append(replace(note, value=number, others=others))
-    return chosen, notes
-
-
-def _holds(text: str, number: int) -> bool:
-    return any(number in numbers for numbers in parse_numbers(text, "drops"))
-
-
 def robust_deviation(values: NDArray[np.float64]) -> float:
     """Return the standard deviation of normal values about zero, by their median magnitude."""
     return 1.4826 * float(np.median(np.abs(values)))
-
-
-def require_chosen(count: int, chosen: int, config: Config) -> None:
-    """Raise InputError if a number exceeds that of the drops, or none of the drops is chosen."""
-    for key, text in (("leave_out", ",".join(config.leave_out)), ("drops", config.drops)):
-        highest = max(numbers.stop - 1 for numbers in parse_numbers(text, key)) if text else 0
-        if highest > count:
-            refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}", subject=key)
-    if not chosen:
-        refuse("every drop is left out", "at least one drop")
-
-
-def _cell_means(signal: Signal, first: int, stop: int, *, progress: bool) -> NDArray[np.float64]:
-    """Return the means of a signal over cells, N; the last cell may be shorter."""
-    width = max(1, round(signal.sample_rate * CELL))
-    starts = range(first, stop, BLOCK * width)
-    means = []
-    for start in tqdm(starts, unit="block", desc=signal.name, disable=not progress, leave=False):
-        force = signal.read(start, min(start + BLOCK * width, stop))
-        bounds = np.arange(0, len(force), width)
-        means.append(np.add.reduceat(force, bounds) / np.diff(bounds, append=len(force)))
-    return np.concatenate(means)
 
 
 def _find_pulses(cells: NDArray[np.float64], first: int, stop: int, rate: float) -> list[Pulse]:

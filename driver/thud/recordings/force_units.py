@@ -110,24 +110,15 @@ def require_unit(text: object, label: str) -> str:
 
 
 def newtons_per_unit(
-    unit: str, calibration: float | Calibration | None, counts: float | None, label: str
+    unit: str, calibration: float | Calibration, counts: float | None, label: str
 ) -> tuple[float, str, float | None]:
     """Return N per unit of the values, its description, and its relative uncertainty or None.
 
     `unit` is the unit of the values; it may be empty if the calibration is a number, N per value.
-    The calibration is None if the values are forces. `counts` are the counts at full scale if the
-    values are integers, and `label` names file and channel in messages.
+    `counts` are the counts at full scale if the values are integers, and `label` names file and
+    channel in messages.
     """
     base, size = size_of(unit)
-    if calibration is None:
-        if base != "N":
-            described = "full-scale values" if unit == "FS" else f"values in {unit}"
-            refuse(
-                f"{label}: enter a calibration: the file holds {described}",
-                EXAMPLES,
-                subject="calibration",
-            )
-        return size, f"values in {unit}", None
     if isinstance(calibration, Calibration):
         product = _product(base, calibration.factors)
         if product is None and counts:

@@ -141,7 +141,7 @@ class Drop(Stage):
     @property
     def effective_rate(self) -> float:
         """Sample rate, Hz, or the lower one that the noise of the background would have."""
-        return min(self.sample_rate, 4 * CUTOFF_RATIO * self.contact.noise_bandwidth)
+        return min(self.contact.sample_rate, 4 * CUTOFF_RATIO * self.contact.noise_bandwidth)
 
     def levels(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).

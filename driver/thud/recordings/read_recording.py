@@ -18,9 +18,9 @@ from thud.base.checks import refuse, require_kind
 from thud.base.note import Note
 from thud.recordings.background import remove_background
 from thud.recordings.checks import copies
-from thud.recordings.config import Config, read_config
+from thud.recordings.config import Config, parse_numbers, read_config
 from thud.recordings.contact import find_contact
-from thud.recordings.drops import Section, Stage, choose, cut_section, find_drops, require_chosen
+from thud.recordings.drops import Pulse, Section, Stage, cut_section, find_drops
 from thud.recordings.measured_drop import Drop, measure_drop
 from thud.recordings.recording import Origin, Recording
 from thud.recordings.repair import repair
@@ -128,7 +128,7 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     with threadpool_limits(1, "blas"):
         for signal in chain.from_iterable(open_signals(item, config) for item in items):
             pulses, ignored = find_drops(signal, begin, end, progress=progress)
-            chosen, left_out = choose(pulses, count + 1, signal.sample_rate, config)
+            chosen, left_out = _choose(pulses, count + 1, signal.sample_rate, config)
             count += len(pulses)
             stated = config.calibration_uncertainty
             uncertainties.append(signal.calibration_uncertainty if stated is None else stated)
@@ -152,9 +152,44 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     if not origins:
         refuse("there are no recordings", "one file or more")
     drops = tuple(chain.from_iterable(measured))
-    require_chosen(count, len(drops), config)
+    for key, text in (("leave_out", ",".join(config.leave_out)), ("drops", config.drops)):
+        highest = max(numbers.stop - 1 for numbers in parse_numbers(text, key)) if text else 0
+        if highest > count:
+            refuse(f"{key}: there is no drop {highest}", f"numbers from 1 to {count}", subject=key)
+    if not drops:
+        refuse("every drop is left out", "at least one drop")
     if len(origins) > 1:
         copies.check(origins, measured)
     name = Path(origins[0].path or origins[0].name).stem
     uncertainty = None if None in uncertainties else max(value or 0.0 for value in uncertainties)
     return Recording(name, drops, tuple(origins), config, uncertainty, stages)
+
+
+def _choose(
+    drops: Sequence[Pulse], first: int, rate: float, config: Config
+) -> tuple[list[Pulse], list[Note]]:
+    """Return the drops to be measured, and notes on those that are left out.
+
+    The drops of a signal of a sample rate, Hz, have the numbers from `first` on. Without chosen
+    numbers all are measured but those that say why not.
+    """
+    chosen: list[Pulse] = []
+    notes: list[Note] = []
+    for number, drop in enumerate(drops, start=first):
+        reason = next((why for key, why in config.leave_out.items() if _holds(key, number)), None)
+        if reason is not None:
+            note = Note("drop_left_out", others={"reason": reason})
+        elif config.drops and not _holds(config.drops, number):
+            note = Note("drop_not_chosen", others={"chosen": config.drops})
+        elif drop.left_out and not config.drops:
+            note = drop.left_out
+        else:
+            chosen.append(drop)
+            continue
+        others = {**note.others, "time": drop.contact[0] / rate}
+        notes.append(replace(note, value=number, others=others))
+    return chosen, notes
+
+
+def _holds(text: str, number: int) -> bool:
+    return any(number in numbers for numbers in parse_numbers(text, "drops"))

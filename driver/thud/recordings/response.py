@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,10 +42,6 @@ def _to_linearity(name: str, value: object) -> tuple[tuple[float, float], ...]:
     if len(pairs) < 2:  # noqa: PLR2004
         refuse_value(name, value, "two or more pairs [applied, indicated], N")
     return tuple(to_pair(name, pair, "[applied, indicated]", 1e-3, 1e9) for pair in pairs)
-
-
-def _to_order(name: str, value: object) -> int:
-    return require_whole(name, value, 1, MAX_ORDER)
 
 
 @dataclass(frozen=True)
@@ -119,7 +116,7 @@ class RecorderFilter(TomlTable):
     kind: str = key(
         one_of((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
     )
-    order: int | None = key(_to_order, "order")
+    order: int | None = key(partial(require_whole, low=1, high=MAX_ORDER), "order")
     cutoff: float = key(between(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
     cutoff_uncertainty: float | None = key(
         between(0.0, 0.5), "relative standard uncertainty of the cutoff"

@@ -10,9 +10,9 @@ from thud.base.checks import refuse, shown, shown_text
 from thud.base.errors import InputError
 from thud.base.files import regular_file
 from thud.base.note import Note
-from thud.base.units import find_unit
+from thud.base.units import find_unit, size_of
 from thud.recordings.config import SUM, Config
-from thud.recordings.force_units import ALLOWED, RECORDED, Calibration, newtons_per_unit
+from thud.recordings.force_units import ALLOWED, EXAMPLES, RECORDED, Calibration, newtons_per_unit
 from thud.recordings.formats import MIN_SAMPLES, read_channels
 from thud.recordings.signal import HINT, POLARITIES, Signal, add_signals, find_peaks, orient
 
@@ -171,21 +171,9 @@ def _in_newtons(
     """
     if channel.n_sample < MIN_SAMPLES:
         refuse(f"{name}: {channel.n_sample} samples", f"{MIN_SAMPLES} samples or more")
-    notes = list(channel.notes)
-    rate = channel.sample_rate if config.sample_rate is None else config.sample_rate
-    if rate is None:
-        refuse(
-            f"{name}: the sample rate is not known",
-            "sample_rate in Hz, or a column of times in s",
-            subject="sample_rate",
-        )
-    if not RATES[0] <= rate <= RATES[1]:
-        refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
-    if channel.sample_rate not in {None, rate}:
-        of_file = {"of_file": channel.sample_rate or 0.0}
-        notes.append(Note("rate_replaced", value=rate, unit="Hz", others=of_file))
+    rate, rate_notes = _rate(channel, config.sample_rate, name)
     unit, unit_notes = _unit(channel, config.unit, calibration, name)
-    notes += unit_notes
+    notes = [*channel.notes, *rate_notes, *unit_notes]
     if channel.unapplied:
         unapplied = shown_text(channel.unapplied)
         if calibration is None:
@@ -196,7 +184,14 @@ def _in_newtons(
                 subject="calibration",
             )
         notes.append(Note("factor_not_applied", others={"factor": unapplied}))
-    scale, description, uncertainty = newtons_per_unit(unit, calibration, channel.counts, name)
+    base, scale = size_of(unit)
+    description, uncertainty = f"values in {unit}", None
+    if calibration is not None:
+        scale, description, uncertainty = newtons_per_unit(unit, calibration, channel.counts, name)
+    elif base != "N":
+        described = "full-scale values" if unit == "FS" else description
+        problem = f"{name}: enter a calibration: the file holds {described}"
+        refuse(problem, EXAMPLES, subject="calibration")
     # Integers are read as fractions of full scale.
     if channel.counts and unit == "counts":
         scale *= channel.counts
@@ -218,6 +213,23 @@ def _in_newtons(
         calibration_uncertainty=uncertainty,
         notes=tuple(replace(note, subject=name) for note in notes),
     )
+
+
+def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, list[Note]]:
+    """Return the sample rate of a channel, Hz: stated, or of the file."""
+    rate = channel.sample_rate if stated is None else stated
+    if rate is None:
+        refuse(
+            f"{name}: the sample rate is not known",
+            "sample_rate in Hz, or a column of times in s",
+            subject="sample_rate",
+        )
+    if not RATES[0] <= rate <= RATES[1]:
+        refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    if channel.sample_rate in {None, rate}:
+        return rate, []
+    of_file = {"of_file": channel.sample_rate or 0.0}
+    return rate, [Note("rate_replaced", value=rate, unit="Hz", others=of_file)]
 
 
 def _unit(
