@@ -19,7 +19,7 @@ from thud.recordings.background import (
     remove_background,
     uniform_cells,
 )
-from thud.recordings.checks import aliasing
+from thud.recordings.checks.force import check_aliasing
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section
 from thud.recordings.signal import Signal
@@ -130,7 +130,7 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     own = np.sqrt(power[(f > 354.8) & (f < 707.9)].mean())
     expected = 20 * np.log10(1 + top / own)
     section = Section("drop", one.force, rate, 0, one.gate)
-    told = aliasing.check(section, one)
+    told = check_aliasing(section, one)
     assert bool(told) == (expected > 0.1)
     for note in told:
         assert note.value == pytest.approx(expected, rel=1e-3)
@@ -139,7 +139,7 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     for factor, expected in ((0.1, bool(told)), (0.34, False)):
         variances = np.array([factor * white, 0, 0, 0, 0])
         noisy = replace(one, background=replace(one.background, variances=variances))
-        assert bool(aliasing.check(section, noisy)) == expected
+        assert bool(check_aliasing(section, noisy)) == expected
 
 
 def test_shapes_are_those_of_the_theory() -> None:

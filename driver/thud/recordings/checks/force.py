@@ -1,18 +1,36 @@
-"""Samples that are lost, held, gated or exchanged: by the noise, and by jumps of the force."""
+"""Checks of the force of one drop: a top that is cut off, samples that are lost, aliasing."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.ndimage import maximum_filter
+from scipy.ndimage import maximum_filter, uniform_filter1d
+from scipy.signal import peak_widths
 
 from thud.base.checks import refuse
 from thud.base.note import Note
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
+    from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
 
+# The force, averaged over SMOOTHING, s, is flat at its top if it is above (1 - a) of its maximum
+# almost as long as above (1 - 4 a). The ratio of the times is 1 for a top that is cut off, 1.41 and
+# at least 1.22 for tops of fourth order with one and two maxima, and 2 for parabolas. The fractions
+# a are the lowest one, MIN_FLAT standard deviations of the noise or quantization steps, and at
+# least MIN_FRACTION each, times powers of 2 up to MAX_FLAT. A half-sine of 20 ms that is flat for
+# less than MIN_TOP, s, has levels that are less than 0.01 dB off.
+SMOOTHING = 3e-4
+MAX_WIDTH_RATIO = 1.15
+MIN_FLAT = 4.0
+MIN_FRACTION = 4e-5
+MAX_FLAT = 0.02
+MIN_TOP = 5e-4
+# Fraction of full scale from which a sample is clipped.
+CLIPPED_FRACTION = 0.999
 # Minimum number of equal samples that are lost, and minimum jump into or out of them, as a fraction
 # of the peak: no flank rises as much between two samples at 20 kHz. It is at least MIN_SCORE
 # standard deviations of the noise, which may repeat coarse codes. Minimum of any jump in
@@ -43,6 +61,43 @@ MIN_RATIO = 3.0
 MIN_SIDE_RATIO = 6.0
 # Minimum jump as a fraction of the peak.
 MIN_JUMP = 0.005
+# Fraction of the rate above which content indicates aliasing, and error above which a warning is
+# raised, dB.
+ALIASED_FRACTION = 0.4
+MAX_ERROR = 0.1
+
+
+def check_clipping(section: Section) -> tuple[Note, ...]:
+    """Return a warning if the top of the force is flat.
+
+    Raise InputError if two of its samples reach full scale. A top that is cut off at 1450 N changes
+    250 Hz by 1.3 dB, at 1200 N 125 Hz by 3.9 dB.
+    """
+    force, rate = section.force[slice(*section.contact)], section.sample_rate
+    count = np.count_nonzero(force >= CLIPPED_FRACTION * (section.full_scale or math.inf))
+    if count > 1:
+        refuse(
+            f"{section.name}: the force is clipped at {force.max():.4g} N for "
+            f"{1e3 * count / rate:.3g} ms",
+            "a measuring range that includes the peak",
+        )
+    width = max(1, round(SMOOTHING * rate))
+    smooth = uniform_filter1d(force - section.offset, width)
+    top, peak = int(smooth.argmax()), float(smooth.max())
+    if peak <= 0:
+        return ()
+    noise, step = section.noise, section.quantization.step
+    # Noise averages the steps.
+    least = max(noise / math.sqrt(width), step if noise < step / 2 else 0.0, MIN_FRACTION * peak)
+    lowest = MIN_FLAT * least / peak
+    # The height of the whole force, from its first to its last sample.
+    height = np.array([peak]), np.array([0]), np.array([len(smooth) - 1])
+    for fraction in lowest * 2.0 ** np.arange(math.log2(max(MAX_FLAT / lowest, 0.5)) + 1):
+        inner, outer = (peak_widths(smooth, [top], k * fraction, height)[0][0] for k in (1, 4))
+        if outer < MAX_WIDTH_RATIO * inner and inner > MIN_TOP * rate:
+            size = {"fraction": 100 * float(fraction), "duration": 1e3 * inner / rate}
+            return (Note("flat_top", value=peak, unit="N", others=size),)
+    return ()
 
 
 def check_lost(section: Section) -> tuple[Note, ...]:
@@ -131,3 +186,28 @@ def check_slope(section: Section) -> tuple[Note, ...]:
         if jumps.size:
             return (Note("jump", value=float(jumps.max()), unit="N", others={"what": what}),)
     return ()
+
+
+def check_aliasing(section: Section, contact: Contact) -> tuple[Note, ...]:
+    """Return a warning if content may alias into the octave of 500 Hz.
+
+    This is content above half the rate, where no filter precedes sampling; from 0.1 dB on, the
+    warning states what it adds. The amplitude of a pulse with kinks is assumed to fall as 1/f**2
+    there; stated instruments reduce it further.
+    """
+    rate, bands = contact.sample_rate, get_bands()
+    lower, upper = bands.lower[-1], bands.upper[-1]
+    # Padded to a length with several frequencies in the octave.
+    force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
+    frequency = np.fft.rfftfreq(len(force), 1 / rate)
+    power = np.abs(np.fft.rfft(force)) ** 2
+    noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
+    octave_power = power[(frequency > lower) & (frequency < upper)].mean()
+    top = max(power[frequency > ALIASED_FRACTION * rate].mean() - 3 * noise, 0.0)
+    folded = top * (0.45 * rate / (rate - upper)) ** 4
+    if section.chain is not None:
+        folded *= abs(section.chain.response(np.array([rate - upper]))[0]) ** 2
+    error = 20 * math.log10(1 + math.sqrt(folded / octave_power))
+    if error < MAX_ERROR:
+        return ()
+    return (Note("aliasing", value=error, unit="dB", others={"frequency": rate / 2}),)
