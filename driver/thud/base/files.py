@@ -34,7 +34,7 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
         target = Path(path)
         if target.exists():
             require_regular(target)
-        part = unique_path(target)
+        part = target.with_name(f".{target.name}.{secrets.token_hex(8)}.new")
         try:
             part.write_bytes(content)
             part.replace(target)
@@ -45,11 +45,6 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
         raise OSError(error.errno, error.strerror, str(path)) from error
     except ValueError as error:  # a path that no file system can hold
         refuse(f"{path!r} is not allowed", "the path of a file", error)
-
-
-def unique_path(path: Path) -> Path:
-    """Return an unused path of a hidden file beside another one."""
-    return path.with_name(f".{path.name}.{secrets.token_hex(8)}.new")
 
 
 class Page(ABC):
@@ -213,21 +208,8 @@ def require_small(path: Path, kind: str, limit: int = MAX_IN_MEMORY) -> None:
         )
 
 
-def content_of(path: Path) -> bytes | None:
-    """Return the content of a regular file, None for anything else."""
-    with suppress(OSError, ValueError):  # a zero byte
-        return read_input(path)
-    return None
-
-
 def inputs_folder() -> Path:
-    """Return the folder of the inputs: those of the installed package, or of the clone.
-
-    Raise InputError if there is none.
-    """
+    """Return the folder of the inputs: those of the installed package, or of the clone."""
     package = Path(__file__).parents[1]
-    folders = (package / "inputs", package.parents[1] / "inputs")
-    folder = next(filter(Path.is_dir, folders), None)
-    if folder is None:
-        refuse("this package has no inputs", "an installed package, or a clone")
-    return folder
+    installed = package / "inputs"
+    return installed if installed.is_dir() else package.parents[1] / "inputs"

@@ -16,7 +16,7 @@ from thud.base.bridge import ask, notes
 from thud.base.checks import refuse
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
-from thud.base.files import Results, inputs_folder, unique_path
+from thud.base.files import Results, inputs_folder
 from thud.base.tables import format_rows
 from thud.case.case import Case, read_case
 from thud.cli.command import (
@@ -260,17 +260,14 @@ def copy_examples(options: argparse.Namespace) -> int:
     target = Path(options.directory)
     if target.exists() or target.is_symlink():
         refuse(f"{target} exists", "a new directory")
-    source = inputs_folder()
     target.parent.mkdir(parents=True, exist_ok=True)
-    partial = unique_path(target)
-    try:
-        # Installers compile Python scripts.
-        shutil.copytree(source, partial, ignore=shutil.ignore_patterns("__pycache__"))
-        partial.rename(target)
-    except shutil.Error as error:
-        refuse(f"{target} cannot be written", "a writable directory with free space", error)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    with TemporaryDirectory(dir=target.parent) as folder:
+        try:
+            # Installers compile Python scripts.
+            ignored = shutil.ignore_patterns("__pycache__")
+            shutil.copytree(inputs_folder(), Path(folder, "inputs"), ignore=ignored).rename(target)
+        except shutil.Error as error:
+            refuse(f"{target} cannot be written", "a writable directory with free space", error)
     if not options.quiet:
         print_path("Inputs", target)
     return 0

@@ -22,7 +22,7 @@ from thud.base.checks import (
     require_whole,
 )
 from thud.base.extras import library
-from thud.base.files import content_of, replace_file
+from thud.base.files import replace_file
 from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.base.tables import csv_text
@@ -143,8 +143,8 @@ class BlockedForce(Immutable):
             If the file cannot be written.
         """
         require_choice("kind", kind, EXPORTS)
-        existing = content_of(Path(path).resolve())
-        if existing is not None and hashlib.sha256(existing).hexdigest() == self.checksum:
+        file = Path(path)
+        if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() == self.checksum:
             refuse(f"{path} is the recording of the force", "another path")
         replace_file(path, EXPORTS[kind][1](self))
 

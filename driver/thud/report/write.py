@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from thud.base.checks import refuse, require_kind, shown_text
 from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
-from thud.base.files import Results, content_of
+from thud.base.files import Results, read_input
 
 if TYPE_CHECKING:
     import os
@@ -138,7 +138,7 @@ def _earlier(folder: Path) -> list[str] | None:
     from thud.report.contents import FORMAT
 
     try:
-        data = json.loads(content_of(folder / JSON) or "")
+        data = json.loads(read_input(folder / JSON))
         return _checksums(data) if data["format"] == FORMAT else None
-    except (ValueError, RecursionError, KeyError, TypeError):
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return None
