@@ -238,7 +238,7 @@ def test_tables_of_instruments_are_checked(config: dict[str, Any], words: tuple[
 
 
 def test_filter_below_the_bands_is_refused() -> None:
-    with pytest.raises(thud.InputError, match=naming("cutoff", "300 Hz", "707.9 Hz")):
+    with pytest.raises(thud.InputError, match=naming("cutoff", "300 Hz", "707.95 Hz")):
         measured(PULSE, filter=RecorderFilter("butterworth", 6, 300.0))
     chain = Chain((Plate(1100.0, 8.0), RecorderFilter("bessel", 4, 900.0)))
     assert chain.highest == min(part.highest for part in chain.instruments)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, get_args
 import numpy as np
 
 from thud.base.errors import InputError
+from thud.base.immutable import plain
 from thud.base.note import Note
 
 if TYPE_CHECKING:
@@ -118,12 +119,19 @@ def require_array(
     return np.asarray(array, dtype=np.float64, order="C")
 
 
-def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
-    """Return two finite numbers; raise InputError for anything else."""
-    array = require_array(name, values, (1,), "iuf")
-    if array.shape != (2,) or not np.isfinite(array).all():
-        refuse_value(name, values, "two finite numbers")
-    return float(array[0]), float(array[1])
+def require_pair(
+    name: str,
+    values: object,
+    allowed: str = "two finite numbers",
+    low: float = -MAX_NUMBER,
+    high: float = MAX_NUMBER,
+) -> tuple[float, float]:
+    """Return two numbers from low to high; raise InputError if the values are not `allowed`."""
+    pair = plain(values)
+    if not isinstance(pair, tuple) or len(pair) != 2:  # noqa: PLR2004
+        refuse_value(name, values, allowed)
+    first, last = (require_number(name, value, low, high) for value in pair)
+    return first, last
 
 
 def require_whole(name: str, value: Any, low: int, high: int) -> int:  # noqa: ANN401

@@ -60,14 +60,6 @@ def to_text(name: str, value: object) -> str:
     return str(value)
 
 
-def to_pair(name: str, value: object, ends: str, low: float, high: float) -> tuple[float, float]:
-    """Return two numbers from low to high; raise InputError if a value is not `ends`."""
-    if not isinstance(value, list | tuple) or len(value) != 2:  # noqa: PLR2004
-        refuse_value(name, value, ends)
-    first, last = (require_number(name, entry, low, high) for entry in value)
-    return first, last
-
-
 def require_table(name: str, value: object) -> Mapping[str, Any]:
     """Return a table; raise InputError if a value is none."""
     if not isinstance(value, Mapping):

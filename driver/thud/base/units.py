@@ -179,16 +179,6 @@ def scaled(value: float, power: int) -> float:
     return float(Decimal(repr(float(value))).scaleb(power))
 
 
-def frequency_text(frequency: float) -> str:
-    """Return a frequency, Hz, as text, in kHz from 10 kHz on.
-
-    >>> frequency_text(1600.0), frequency_text(12_800.0)
-    ('1600 Hz', '12.8 kHz')
-    """
-    is_large = round(frequency) >= 10_000  # noqa: PLR2004
-    return f"{frequency / 1e3:.4g} kHz" if is_large else f"{frequency:.4g} Hz"
-
-
 def display_unit(unit: str, value: float) -> tuple[str, float]:
     """Return the largest unit in which a value is at least 1, and this unit in SI units."""
     names = [name for name in DISPLAY_UNITS.get(unit, ()) if SIZES[unit][name] <= abs(value)]

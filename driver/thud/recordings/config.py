@@ -9,7 +9,14 @@ from datetime import date
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse_unknown, refuse_value, require_number, require_whole, shown_text
+from thud.base.checks import (
+    refuse_unknown,
+    refuse_value,
+    require_number,
+    require_pair,
+    require_whole,
+    shown_text,
+)
 from thud.base.errors import InputError
 from thud.base.files import regular_file
 from thud.base.note import Note
@@ -21,7 +28,6 @@ from thud.base.toml_tables import (
     read_toml,
     require_table,
     to_line,
-    to_pair,
     to_text,
 )
 from thud.level.assessment import get_criteria
@@ -140,7 +146,7 @@ def to_limits(name: str, value: object) -> dict[str, tuple[float, float]]:
     limits = {}
     for criterion, span in table.items():
         label = f"{name}: {criterion}"
-        low, high = to_pair(label, span, "[minimum, maximum]", -1e6, 1e6)
+        low, high = require_pair(label, span, "[minimum, maximum]", -1e6, 1e6)
         if not low < high:
             refuse_value(label, span, "minimum < maximum")
         limits[criterion] = (low, high)

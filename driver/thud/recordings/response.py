@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, refuse_value, require_whole
+from thud.base.checks import refuse, refuse_value, require_pair, require_whole
 from thud.base.note import Note
-from thud.base.toml_tables import TomlTable, between, key, one_of, to_pair
-from thud.base.units import frequency_text
+from thud.base.toml_tables import TomlTable, between, key, one_of
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def _to_linearity(name: str, value: object) -> tuple[tuple[float, float], ...]:
     pairs = value if isinstance(value, list | tuple) else []
     if len(pairs) < 2:  # noqa: PLR2004
         refuse_value(name, value, "two or more pairs [applied, indicated], N")
-    return tuple(to_pair(name, pair, "[applied, indicated]", 1e-3, 1e9) for pair in pairs)
+    return tuple(require_pair(name, pair, "[applied, indicated]", 1e-3, 1e9) for pair in pairs)
 
 
 @dataclass(frozen=True)
@@ -102,9 +101,9 @@ class Plate(TomlTable):
         """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""
         if self.f0 < MIN_RATIO * edge:
             refuse(
-                f"plate: the resonance, {frequency_text(self.f0)}, is too close "
-                f"to the bands, which reach up to {frequency_text(edge)}, for a correction",
-                f"{frequency_text(MIN_RATIO * edge)} or more",
+                f"plate: the resonance, {self.f0:.5g} Hz, is too close "
+                f"to the bands, which reach up to {edge:.5g} Hz, for a correction",
+                f"{MIN_RATIO * edge:.5g} Hz or more",
             )
 
 
@@ -161,10 +160,10 @@ class RecorderFilter(TomlTable):
         """Raise InputError if the response is below 1/3 at the highest edge of bands, Hz."""
         if self.highest < edge:
             refuse(
-                f"filter: the cutoff, {frequency_text(self.cutoff)}, is too low for the bands, "
-                f"which reach up to {frequency_text(edge)}: the response falls to 1/3 at "
-                f"{frequency_text(self.highest)}",
-                f"{frequency_text(self.cutoff * edge / self.highest)} or more",
+                f"filter: the cutoff, {self.cutoff:.5g} Hz, is too low for the bands, "
+                f"which reach up to {edge:.5g} Hz: the response falls to 1/3 at "
+                f"{self.highest:.5g} Hz",
+                f"{self.cutoff * edge / self.highest:.5g} Hz or more",
             )
 
 
