@@ -11,7 +11,7 @@ import numpy as np
 from thud.base._schema import BandSet, InfinitePlate
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind
-from thud.base.tabulated import Tabulated
+from thud.base.display import Tabulated
 from thud.case.case import Case, case_text, impact_only
 from thud.impact.compute import new_floor_impact
 from thud.impact.impact import Impact
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import FloorOptions
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
 
     Array = NDArray[np.float64]
 

@@ -12,11 +12,10 @@ import numpy as np
 from thud.base._schema import MeasuredMobility
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_whole
-from thud.base.display import Displayed
+from thud.base.display import Displayed, column_rows
 from thud.base.errors import NumericalError, ThudError
 from thud.base.extras import data_frame
 from thud.base.note import Note
-from thud.base.tabulated import column_rows
 from thud.case.case import Case
 from thud.floors.mobility_table import Quantity, read_mobility
 from thud.impact.floor_impact import mobility

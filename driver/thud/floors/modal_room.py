@@ -15,7 +15,7 @@ import numpy as np
 from thud.base._schema import RectangularFloor
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_number
-from thud.base.tabulated import Tabulated
+from thud.base.display import Tabulated
 from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import FloorOptions, Room
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
     from thud.recordings.recording import ImpactResult
 
     Array = NDArray[np.float64]

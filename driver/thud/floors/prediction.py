@@ -12,8 +12,8 @@ import numpy as np
 from thud.base._schema import LIMITS, RATINGS, VERDICTS, Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
+from thud.base.display import Tabulated
 from thud.base.note import Note
-from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 from thud.floors.survey import RoomLevels
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions, RoomRating
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
     from thud.recordings.recording import ImpactResult
 
     Array = NDArray[np.float64]

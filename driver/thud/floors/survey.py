@@ -16,8 +16,8 @@ import numpy as np
 
 from thud.base.bridge import ask
 from thud.base.checks import refuse
+from thud.base.display import Tabulated
 from thud.base.note import Note
-from thud.base.tabulated import Tabulated
 from thud.level.levels import BANDWIDTHS
 from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
 from thud.recordings.table import read_table
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
 
     Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from thud.base._schema import Plate, Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_kind
-from thud.base.tabulated import Tabulated
+from thud.base.display import Tabulated
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
 
 
 # Rounded mid frequencies of the one-third-octave bands 50 to 3150 Hz; bands from 100 Hz are rated.

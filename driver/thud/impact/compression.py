@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask, without_units
-from thud.base.tabulated import Tabulated
+from thud.base.display import Tabulated
 from thud.case.case import Case, case_text, new_model
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
     from thud.base.bridge import Bundle
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
 
 
 @dataclass(frozen=True, eq=False)

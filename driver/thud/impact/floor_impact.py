@@ -10,8 +10,8 @@ import numpy as np
 from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
 from thud.base.checks import require_choice, require_kind, require_pair
+from thud.base.display import column_rows
 from thud.base.immutable import Immutable
-from thud.base.tabulated import column_rows
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact
 from thud.level.levels import BANDWIDTHS, finite_array, force_exposure_levels

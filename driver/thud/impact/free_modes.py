@@ -11,8 +11,8 @@ import numpy as np
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.bridge import ask, notes, without_units
 from thud.base.checks import refuse, require_array, require_kind
+from thud.base.display import Tabulated
 from thud.base.errors import PlausibilityWarning
-from thud.base.tabulated import Tabulated
 from thud.case.case import Case, case_text
 from thud.impact.motion import write_vtu
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.bridge import Bundle
+    from thud.base.display import Columns
     from thud.base.note import Note
-    from thud.base.tabulated import Columns
 
 
 @dataclass(frozen=True, eq=False)

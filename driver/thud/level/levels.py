@@ -10,14 +10,14 @@ import numpy as np
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_number
-from thud.base.tabulated import Tabulated
+from thud.base.display import Tabulated
 
 if TYPE_CHECKING:
     from collections.abc import Container
 
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.tabulated import Columns
+    from thud.base.display import Columns
 
 
 BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
