@@ -48,11 +48,10 @@ def known_keys(case: Case) -> dict[str, Key]:
     model = case.model.name if case.model else ""
     keys = {
         key.name: key
-        for key in KEYS
-        if (key.owner == model or (not key.owner and key.group in GROUPS))
-        and key.group != OUTPUT_GROUP
+        for key in (*KEYS, DENSITY, TEMPERATURE)
+        if key.owner == model or (not key.owner and key.group in GROUPS)
+        if key.group != OUTPUT_GROUP
     }
-    keys |= {key.name: key for key in (DENSITY, TEMPERATURE)}
     below = {case.floor.name if case.floor else "", "room" if case.room else ""}
     for key in KEYS:
         if key.owner and key.owner in below:
@@ -72,10 +71,8 @@ def find_key(name: str, case: Case) -> tuple[Key, int | None]:
     if match is None or key is None or (match[2] and key.kind != "list"):
         hint = suggestion(str(name).partition("(")[0], keys)
         groups = ", ".join(dict.fromkeys(f"&{entry.group}" for entry in keys.values()))
-        owners: list[str] = [owner.name for owner in (case.model, case.floor) if owner]
-        owners += ["room"] if case.room else []
         refuse(
-            f"{shown(name)} is not a key of {' and '.join(owners)}{hint}",
+            f"{shown(name)} is not a key of this case{hint}",
             f"keys of {groups}, density and temperature (`thud --keys` lists them)",
         )
     return key, int(match[2]) if match[2] else None
