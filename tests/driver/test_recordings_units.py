@@ -310,6 +310,21 @@ def matrix_73(path: Path) -> None:
         file["M"] = np.stack([TIME, FORCE])
 
 
+def big_endian_mat(version: int) -> bytes:
+    content = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x01\x00MI" if version == 5 else b""
+    for name, values in ((b"t\0", TIME), (b"F_N\0", FORCE)):
+        raw = values.astype(">f8").tobytes()
+        if version == 4:
+            content += struct.pack(">5i", 1000, values.size, 1, 0, len(name)) + name + raw
+            continue
+        # Flags (class double), shape, name and numbers, each behind its type and size.
+        flags = struct.pack(">6I", 6, 8, 6, 0, 5, 8) + struct.pack(">2i", values.size, 1)
+        title = struct.pack(">2I", 1, len(name) - 1) + name.rstrip(b"\0").ljust(8, b"\0")
+        element = flags + title + struct.pack(">2I", 9, len(raw)) + raw
+        content += struct.pack(">2I", 14, len(element)) + element
+    return content
+
+
 def packed_times(path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["force"], file["time"] = FORCE, np.arange(FORCE.size)
@@ -336,6 +351,8 @@ def nanoseconds(path: Path) -> None:
     ("name", "write"),
     [
         ("a.tdms", lambda path: path.write_bytes(big_endian_tdms())),
+        ("4.mat", lambda path: path.write_bytes(big_endian_mat(4))),
+        ("5.mat", lambda path: path.write_bytes(big_endian_mat(5))),
         ("b.mat", matrix_73),
         ("a.nc", packed_times),
         ("b.nc", nanoseconds),

@@ -100,9 +100,9 @@ class Format(NamedTuple):
     pattern: bytes
 
 
-# A MATLAB file of version 4 begins with integers: type (kind and precision of numbers), rows,
-# columns, imaginary part, length of the name. A universal file begins with the mark -1 and the
-# number of a data set. Text is UTF-16 with a mark, or without zero bytes.
+# A MATLAB file of version 4 begins with integers: type (kind and precision of numbers; 1000 more if
+# they are big-endian), rows, columns, imaginary part, length of the name. A universal file begins
+# with the mark -1 and the number of a data set. Text is UTF-16 with a mark, or without zero bytes.
 FORMATS = (
     Format("WAV", "audio", (".wav", ".rf64", ".bwf"), rb"(RIFF|RF64).{4}WAVE"),
     Format("FLAC", "audio", (".flac",), rb"fLaC"),
@@ -110,7 +110,9 @@ FORMATS = (
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
            rb"(.{512}|.{1024}|.{2048})?\x89HDF\r\n\x1a\n"),
     Format("MATLAB", "matlab", (".mat",),
-           rb".{124}\x00\x01IM|[\x00-\x34]\x00{3}.{8}[\x00\x01]\x00{3}[\x02-\x40]\x00{3}"),
+           rb".{124}(\x00\x01IM|\x01\x00MI)"
+           rb"|[\x00-\x34]\x00{3}.{8}[\x00\x01]\x00{3}[\x02-\x40]\x00{3}"
+           rb"|\x00{2}[\x03\x04].{9}\x00{3}[\x00\x01]\x00{3}[\x02-\x40]"),
     Format("universal", "universal", (".uff", ".unv", ".uf"), rb"\s*-1 *\r?\n *\d+ *b?"),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"),
            rb"\xff\xfe|\xfe\xff|[^\x00]+\Z"),
