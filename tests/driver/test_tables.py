@@ -248,6 +248,8 @@ LAYOUTS = [
      "Plate (Collected) (N)"), "{t}\t{a}"),
     ("kN", "Units: s, kN, kN, V\nTime,F1,F2,Trigger", "{t},{a},{b},0.5"),
     ("kN", "Unit;kN\nTime;F1;F2", "{t};{a};{b}"),
+    ("kN", "Unit: s, kN\nTime,Force,Comment", "{t},{a},"),
+    ("kN", "Unit: kN;kN\nx;F1;F2", "{t};{a};{b}"),
     ("kN", "Time (ms)\tState\tF1 (kN)\tF2 (kN)", "{m}\tok\t{a}\t{b}"),
     ("N", "t/s,F1/N,F2/N", "{t},{a},{b}"),
     ("N", "F2 in N,F1 in N,Time in ms", "{b},{a},{m}"),

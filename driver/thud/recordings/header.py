@@ -169,17 +169,24 @@ def _are_units(titles: Pairs) -> bool:
 def _units_of_entry(
     title: str, value: str, times: list[int], layout: Layout, width: int
 ) -> Iterable[tuple[int, str]]:
-    """Return columns and units of an entry of the header: of times, of the others, or of all."""
+    """Return columns and units of an entry of the header, of times or of other columns.
+
+    A list of units is that of all columns, of those of numbers, of these without times, or without
+    the first, which may be times that no title names.
+    """
     word = plain(split_title(title)[0])
     if word not in UNIT | TIME_UNIT:
         return ()
     units = [part.strip(" \"'") for part in re.split(r"[\t;,]", value)]
     if word in TIME_UNIT:
         return [(i, units[0]) for i in times or [*layout.units][:1]]
-    channels = [i for i in layout.units if i not in times]
-    columns = range(width) if len(units) == width else channels
-    units *= len(columns) if len(units) == 1 else 1
-    if len(units) != len(columns):
+    numbers = [*layout.units]
+    channels = [i for i in numbers if i not in times]
+    if len(units) == 1:
+        return [(i, units[0]) for i in channels]
+    lists = ([*range(width)], numbers, channels, numbers[1:])
+    columns = next((some for some in lists if len(some) == len(units)), [])
+    if not columns:
         count = f"{len(units)} units for {len(channels)} channels"
         refuse(f"{layout.name}: {shown_text(title)!r} has {count}", "one, or one each")
     return zip(columns, units, strict=True)
