@@ -82,7 +82,7 @@ def test_gap_is_told_however_the_times_are_rounded() -> None:
     ],
 )
 @pytest.mark.parametrize("head", ["", "# plate\n\ntime_s,force_N\n", "Zeit;Kraft\n[s];[µN]\n"])
-@pytest.mark.parametrize("end", ["", "sep", " sep", " "])
+@pytest.mark.parametrize("end", ["", "sep", " sep", " ", "#x", " # x"])
 def test_columns_are_read_whatever_is_between(
     line: str, head: str, end: str, tmp_path: Path
 ) -> None:

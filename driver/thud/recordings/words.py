@@ -19,8 +19,9 @@ SEPARATORS = ("\t", ";", ",")
 # Decimal marks; the mark that is not the decimal one groups digits, as do the characters below.
 MARKS = {".": "point", ",": "comma"}
 GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
-# Begin of a comment; not that of 1.#IND, which programs by Microsoft's compilers write for NaN.
-COMMENT = re.compile(r"(?:^|\s)#")
+# Begin of a comment. Programs by Microsoft's compilers write 1.#IND, 1.#QNAN and 1.#INF for NaN and
+# infinity, which are no numbers here.
+COMMENT = re.compile(r"#(?!(?<=\d[.,]#)(?:IND|QNAN|SNAN|INF))")
 # Marks at the end of a line that separate nothing.
 TRAILING = "\t; "
 # Dates and times of day: 23.11.2026 10:15:30.25, 2026-11-23T10:15Z, 15:30,25.
