@@ -317,6 +317,13 @@ def test_units_and_titles_that_do_not_fit_are_refused(
         time_and_force(read_table(path))
 
 
+@pytest.mark.parametrize("head", ["Time;Plate\n[s];[stone]", "[s];[stone]\nTime;Plate"])
+def test_units_in_brackets_are_no_titles(head: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"{head}\n0.5;1\n")
+    columns = read_table(tmp_path / "t.csv").columns
+    assert [(column.name, column.unit) for column in columns] == [("Time", "s"), ("Plate", "stone")]
+
+
 @pytest.mark.parametrize(
     ("text", "unit"),
     [("nanoseconds", "ns"), ("Newtons", "N"), ("KN", "kN"), ("µs", "us"), ("m·s^-2", ""),

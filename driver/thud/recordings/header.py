@@ -160,10 +160,12 @@ def _split_titles(line: str, separator: str | None) -> list[str]:
 
 
 def _are_units(titles: Pairs) -> bool:
-    """Whether most titles are units without a name."""
+    """Whether titles are units without a name: most are known, or all are in brackets."""
     filled = [title for title in titles if any(map(str.isalpha, "".join(title)))]
     known = sum(bool(find_unit(unit or name)) for name, unit in filled)
-    return 2 * known > len(filled) and not any(name and unit for name, unit in filled)
+    has_names = any(name and unit for name, unit in filled)
+    is_bare = bool(filled) and all(unit for _, unit in filled)
+    return not has_names and (2 * known > len(filled) or is_bare)
 
 
 def _units_of_entry(
