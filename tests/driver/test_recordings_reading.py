@@ -1060,6 +1060,7 @@ def test_dates_and_times_of_day_show_no_rate(title: str, shown: str, tmp_path: P
     [
         ("サンプリング周波数: 8000 Hz", "力（N）", "cp932"),  # noqa: RUF001 - as printed
         ("샘플링 주파수: 8000 Hz", "충격력 (N)", "cp949"),
+        ("온도: 20 ℃\n샘플링 주파수: 8000 Hz", "충격력 (N)", "cp949"),
         ("Prüfer: Müller\nAbtastrate: 8000 Hz", "Stoßkraft (N)", "latin-1"),
         ("Prüfer: Müller – Lab\nAbtastrate: 8000 Hz", "Stoßkraft (N)", "cp1252"),
     ],

@@ -49,9 +49,10 @@ UNUSUAL = {
     ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
     ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
 }
-# Number of bytes from which the encoding is determined, and pairs of bytes of Korean syllables.
+# Number of bytes from which the encoding is determined, and pairs of bytes of Korean symbols (as
+# the degree Celsius) and syllables.
 MAX_HEADER_SIZE = 2**16
-HANGUL = re.compile(rb"[\xb0-\xc8][\xa1-\xfe]")
+HANGUL = re.compile(rb"[\xa1-\xc8][\xa1-\xfe]")
 ALLOWED = (
     "columns of numbers, separated by commas, semicolons, tabs or blanks (decimal commas with "
     "semicolons, tabs and blanks, or in quotes)"
@@ -174,7 +175,7 @@ def _find_encoding(path: Path) -> str:
     """Return the encoding of a text: Unicode, or that of Japanese, Korean or Western spreadsheets.
 
     The first bytes of kana and of common kanji in Shift JIS are control characters elsewhere. In
-    Korean headers all bytes beyond ASCII are pairs of those of syllables.
+    Korean headers all bytes beyond ASCII are pairs of those of symbols and syllables.
     """
     with path.open("rb") as file:
         header = file.read(MAX_HEADER_SIZE)
