@@ -355,6 +355,23 @@ def test_rate_of_header_and_times_must_agree(tmp_path: Path) -> None:
         opened(tmp_path / "t.csv")
 
 
+@pytest.mark.parametrize("is_matrix", [False, True])
+def test_rate_of_group_and_times_must_agree(is_matrix: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    force = half_sine(8000.0)
+    time = np.arange(force.size) / 8000
+    arrays = {"F": np.column_stack([time, force])} if is_matrix else {"F": force, "t": time}
+    for stated in (8050.0, 8100.0):
+        scipy.io.savemat(tmp_path / "a.mat", {"ball": {**arrays, "Fs": stated}})
+        if stated < 8080:
+            assert read_all(tmp_path / "a.mat")[0].sample_rate == stated
+            continue
+        with pytest.raises(InputError, match=naming("ball/F", "8100 Hz", "8000 Hz")):
+            opened(tmp_path / "a.mat")
+    # Times are nearer than the header of the file.
+    scipy.io.savemat(tmp_path / "a.mat", {"ball": arrays, "Fs": 4000.0})
+    assert read_all(tmp_path / "a.mat")[0].sample_rate == pytest.approx(8000)
+
+
 def test_rounded_times_are_told(tmp_path: Path) -> None:
     rows = "".join(f"{i / 44100:.6f},{v:g}\n" for i, v in enumerate(half_sine(44100.0)))
     (tmp_path / "t.csv").write_text("time_s,force_N\n" + rows)

@@ -35,6 +35,8 @@ STEPS = (1e-9, 1e3)
 # deviates by half an interval or more.
 NOTED = 1e-3
 TOLERANCE = 0.25
+# Relative tolerance between the sample rate in a header and that of the times.
+SAME_RATE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,3 +208,13 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
         return begin, step, ()
     size = float(deviation[worst]) * step
     return begin, step, (Note("times_rounded", name, size, unit="s", others={"rate": 1 / step}),)
+
+
+def agreed_rate(stated: float | None, of_times: float, name: str) -> float:
+    """Return the sample rate, Hz, of a header, or that of times without one; refuse two."""
+    if stated is not None and abs(stated / of_times - 1) > SAME_RATE:
+        refuse(
+            f"{name}: {stated:.6g} Hz by its header and {of_times:.6g} Hz by its times",
+            "one sample rate; times are in s if no unit is stated",
+        )
+    return stated or of_times

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
-from thud.recordings.formats import MIN_SAMPLES, Channel, rise_uniformly, uniform_grid
+from thud.recordings.formats import MIN_SAMPLES, Channel, agreed_rate, rise_uniformly, uniform_grid
 from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
 from thud.recordings.words import DATE, find_rate, find_word
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
     from thud.recordings.table import Column, Table
-
-# Relative tolerance between the sample rate in a header and that of the times.
-SAME_RATE = 0.01
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -33,12 +30,7 @@ def read_channels(path: Path) -> list[Channel]:
     notes: tuple[Note, ...] = ()
     if time is not None:
         step, notes = uniform_grid(time.to("s"), table.name)[1:]
-        if rate is not None and abs(step * rate - 1) > SAME_RATE:
-            refuse(
-                f"{table.name}: {rate:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
-                "one sample rate",
-            )
-        rate = rate or 1 / step
+        rate = agreed_rate(rate, 1 / step, table.name)
     return [
         Channel(
             name=column.name,

@@ -12,7 +12,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.files import MAX_IN_MEMORY
 from thud.base.units import factor_to, find_unit
-from thud.recordings.formats import MIN_SAMPLES, Channel, rise_uniformly, uniform_grid
+from thud.recordings.formats import MIN_SAMPLES, Channel, agreed_rate, rise_uniformly, uniform_grid
 from thud.recordings.words import (
     DATE,
     TIME,
@@ -124,13 +124,15 @@ def _channel(
     own, near, entries = _header_of(vector, header)
     notes: tuple[Note, ...] = ()
     rate = find_rate(near)
-    # Times override a rate in the header of an outer group; of several it is not known which apply.
+    # Times override a rate in the header of an outer group, and must fit that of array and group if
+    # they are in the same group; of several it is not known which apply.
     own_key, count = f"{vector.array}/", vector.n_sample
     fitting = [t for t in times if t.n_sample == count and own_key.startswith(t.group)]
     depth = max((len(time.group) for time in fitting), default=0)
     inner = [time for time in fitting if len(time.group) == depth]
-    if len(inner) == 1 and rate is None:
-        rate, notes = _rate(inner[0], header, name)
+    if len(inner) == 1 and (rate is None or depth > vector.array.rfind("/")):
+        of_times, notes = _rate(inner[0], header, name)
+        rate = agreed_rate(rate, of_times, f"{name}: {vector.array}") if of_times else rate
     stated, titled = find_word(own, UNIT), split_title(vector.title)[1]
     unit = stated or titled or find_word(entries, UNIT)
     if len({find_unit(stated), find_unit(titled)} - {""}) > 1:
