@@ -72,7 +72,7 @@ class Contribution(Immutable):
         return self.uncertainty * self.divisor / self.size if self.size else math.nan
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Estimate(Immutable):
     """Value and its uncertainty; that of a computed value is its numerical error.
 
@@ -102,6 +102,10 @@ class Estimate(Immutable):
     contributions: tuple[Contribution, ...] = ()
     upper_bound: bool = False
     not_stated: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return value and standard uncertainty."""
+        return f"{self.value:.6g} ± {self.uncertainty:.2g} {self.unit}".rstrip()
 
     @classmethod
     def from_budget(

@@ -158,7 +158,8 @@ def _draw_drops(
             x, curves.min(axis=0), curves.max(axis=0), color="0.6", linewidth=0,
             label=f"range of {count} drops",
         )  # fmt: skip
-    title = f"{count} drops" if count > 1 else "drop"
+    others = count - number
+    title = f"{others} drops" if others > 1 else "drop"
     outliers = f"{number} outliers" if number > 1 else "outlier"
     for chosen, name, style in ((~marked, title, THIN), (marked, outliers, DEVIANT)):
         for i, curve in enumerate(curves[chosen] if count <= MAX_LINES or style is DEVIANT else []):

@@ -47,7 +47,7 @@ def draw_stage(stage: Stage) -> Figure:
     for panel, (draw, part) in zip(axes, panels, strict=True):
         draw(panel, part)
         if len(panel.get_legend_handles_labels()[0]) > 1:
-            panel.legend(loc="upper right")
+            panel.legend(loc="best", framealpha=0.8)
     return figure
 
 

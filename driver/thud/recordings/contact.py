@@ -88,7 +88,7 @@ TICK, BEFORE, AFTER = 1e-3, 2.0, 13.0
 DELAYS = np.concatenate([np.linspace(0, 0.5, 101), np.linspace(0.52, 4, 175)])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Contact(Stage):
     """Contact of one pulse; times are in s from the first sample of `force`.
 

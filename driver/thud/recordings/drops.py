@@ -15,6 +15,7 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
+from thud.level.estimate import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,6 +82,12 @@ FROM_CUBIC = np.array([0.4, -0.9, 0.0, 1.0, 0.0, -0.9, 0.4])
 class Stage(Immutable):
     """What a stage of a measurement returns: its arrays are read-only, and it can be drawn."""
 
+    def __repr__(self) -> str:
+        """Return the numbers and names of the stage in one line, without its arrays."""
+        values = [(k, v) for k, v in vars(self).items() if isinstance(v, str | float | Estimate)]
+        shown = [f"{k} {v:.6g}" if isinstance(v, float) else f"{k} {v!r}" for k, v in values]
+        return f"<{': '.join(filter(None, (type(self).__name__, ', '.join(shown))))}>"
+
     def plot(self) -> Figure:
         """Draw what the stage has measured or changed."""
         from thud.plot.stage_figures import draw_stage
@@ -132,7 +139,7 @@ class Quantization:
     offset: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Section(Stage):
     """Samples of a signal around one drop or bounce.
 

@@ -85,7 +85,7 @@ def find_doubts(drops: Sequence[Drop], config: Config) -> list[Doubt]:
         worst = ((limit or FLAT[1]) * math.sqrt(1 + 1 / TOLERANCE), 100.0)
         code = "plate_estimated" if ringing else "" if limit else "plate_assumed"
         assumed = Plate(*np.median(ringing or [worst], axis=0))
-        doubts.append(Doubt(ASSUMED_PLATE, assumed.response, code))
+        doubts.append(Doubt(ASSUMED_PLATE, lambda f: 1 / assumed.response(f), code))
     elif False in seen and True not in seen:
         doubts.append(Doubt(ASSUMED_PLATE, plate.response, "plate_not_recorded"))
     if plate and plate.share is None:

@@ -60,7 +60,7 @@ CUTOFF_RATIO = 0.9
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Drop(Stage):
     """One measured drop.
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     Source = str | os.PathLike[str] | Signal
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stages(Stage):
     """One drop after each stage of its measurement.
 

@@ -36,7 +36,7 @@ ENERGY_DECIBEL = 10 / math.log(10)
 PADDING, N_SCALING = 4, 5
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class DropLevels(Stage):
     """Levels of drops.
 
