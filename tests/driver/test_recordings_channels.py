@@ -295,6 +295,20 @@ def test_hum_and_tones_do_not_make_drops_equal(tmp_path: Path) -> None:
     assert len(thud.read_recording(paths, calibration=2000).drops) == 8
 
 
+@pytest.mark.parametrize(
+    ("rate", "before"), [(2500.0, 0.005), (2500.0, 0.012), (5000.0, 0.002), (5000.0, 0.004)]
+)
+def test_drops_differ_also_with_little_background(rate: float, before: float) -> None:
+    length = round((before + 0.12) * rate)
+    signals = [
+        Signal.from_array(
+            half_sine(rate, before, length) + np.random.default_rng(k).normal(scale=9, size=length),
+            rate, f"drop {k}",
+        ) for k in range(2)
+    ]  # fmt: skip
+    assert len(thud.read_recording(signals).drops) == 2
+
+
 def test_a_file_is_given_once(tmp_path: Path) -> None:
     path = write_wav(tmp_path / "drop.wav", [record(0) / 2000])
     with pytest.raises(InputError, match=naming("drop.wav: is given twice", "each record once")):
