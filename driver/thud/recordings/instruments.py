@@ -18,15 +18,14 @@ from thud.level.levels import get_bands, low_pass
 from thud.recordings.response import Plate, RecorderFilter, filtered
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
-
-    Gain = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
+    from thud.recordings.response import Gain
 
 # Requirements of the standard on a force plate: a flat response between these frequencies, Hz, and
 # linearity within this relative tolerance, which is used for flatness too.

@@ -14,7 +14,8 @@ from scipy.ndimage import maximum_filter, median_filter
 
 from thud.base.checks import refuse
 from thud.base.note import Note, of_part
-from thud.recordings.checks import CELL_CHECKS, SECTION_CHECKS, cells
+from thud.recordings.checks import CELL_CHECKS, SECTION_CHECKS
+from thud.recordings.checks.force import check_cells
 from thud.recordings.drops import BACKGROUND_MARGIN, MAX_BACKGROUND, Quantization
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def repair(section: Section) -> Section:
             said.append(Note("spikes", value=duration, unit="ms", others={"count": count}))
         notes += of_part(cell.name, said) if section.cells else said
     if section.cells:
-        notes += cells.check(section, forces)
+        notes += check_cells(section, forces)
     repaired = replace(section, force=np.sum(forces, axis=0), cells=())
     notes += (note for check in SECTION_CHECKS for note in check(repaired))
     return replace(repaired, notes=tuple(notes))

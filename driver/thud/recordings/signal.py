@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.checks import refuse, require_array, require_number
+from thud.base.checks import refuse, require_number
 from thud.base.immutable import Immutable
 from thud.base.note import Note
+from thud.level.levels import finite_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,12 +89,10 @@ class Signal(Immutable):
     @classmethod
     def from_array(cls, force: ArrayLike, sample_rate: float, name: str = "recording") -> Signal:
         """Return the signal of a force in memory, N, shape (n_sample,)."""
-        values = require_array(f"{name}: force", force, (1,), "iuf")
+        values = finite_array(f"{name}: force", force)
         require_number(f"{name}: sample_rate", sample_rate)
         if not sample_rate > 0:
             refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")
-        if not np.isfinite(values).all():
-            refuse(f"{name}: a value is not finite", "real numbers")
         return cls(name, "", float(sample_rate), len(values), partial(read_array, values.copy()))
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Checks of the force of one drop: a top that is cut off, samples that are lost, aliasing."""
+"""Checks of the force of one drop: top cut off, samples lost, aliasing, load cells."""
 
 from __future__ import annotations
 
@@ -12,8 +12,13 @@ from scipy.signal import peak_widths
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.level.levels import get_bands
+from thud.recordings.signal import MIN_OPPOSITE
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
 
@@ -65,6 +70,11 @@ MIN_JUMP = 0.005
 # raised, dB.
 ALIASED_FRACTION = 0.4
 MAX_ERROR = 0.1
+# Maximum deviation of a channel from the sum of the others, as a fraction, if it is their sum.
+MAX_DEVIATION = 0.05
+# Minimum magnitude of the impulse of a cell as a fraction of that of the sum: without one of four
+# cells, levels are 2.5 dB too low.
+MIN_SHARE = 0.005
 
 
 def check_clipping(section: Section) -> tuple[Note, ...]:
@@ -211,3 +221,32 @@ def check_aliasing(section: Section, contact: Contact) -> tuple[Note, ...]:
     if error < MAX_ERROR:
         return ()
     return (Note("aliasing", value=error, unit="dB", others={"frequency": rate / 2}),)
+
+
+def check_cells(section: Section, forces: Sequence[NDArray[np.float64]]) -> list[Note]:
+    """Return a warning for each load cell of a section without a force in the contact.
+
+    `forces` are those of the cells, N. Raise InputError if a channel is the sum of the others,
+    which would count twice.
+    """
+    first, stop = section.contact
+    levels = [
+        force[first:stop] - np.median(np.delete(force, slice(first, stop))) for force in forces
+    ]
+    total = np.sum(levels, axis=0)
+    shares = [float(level.sum() / total.sum()) for level in levels]
+    cells = section.cells
+    # Two cells may have equal forces, and a cell of the wrong sign, which `orient` names, makes
+    # another one the sum of the others.
+    if len(cells) > 2 and min(shares) > -MIN_OPPOSITE:  # noqa: PLR2004
+        for cell, level in zip(cells, levels, strict=True):
+            if np.ptp(total - 2 * level) < MAX_DEVIATION * np.ptp(total - level):
+                refuse(
+                    f"{cell.name}: is the sum of the other channels, which would count twice",
+                    "channels without it, or channel = this one",
+                )
+    return [
+        Note("cell_without_force", value=share, others={"part": cell.name})
+        for cell, share in zip(cells, shares, strict=True)
+        if abs(share) < MIN_SHARE
+    ]
