@@ -63,7 +63,7 @@ def unmarked(text: str) -> str:
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
     """Return rows of text as lines with aligned columns, up to `WIDTH` wide.
 
-    Cells of wider tables are broken, but not those of the first column. If there are too many
+    Cells of wider tables are broken, those of the first column last. If there are too many
     columns, they are distributed over several tables, each with the first column.
 
     >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
@@ -75,7 +75,6 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
         min(max(len(word.rstrip()) for cell in column for word in _WORD.findall(cell)), _MAX_WORD)
         for column in columns
     ]
-    minima[0] = min(max(map(len, columns[0])), _MAX_WORD)  # labels stay whole
     natural = [max(map(len, column)) for column in columns]
 
     def split(limit: float) -> list[list[int]]:
@@ -126,8 +125,14 @@ def wrap(text: str) -> str:
 
 
 def _format_table(columns: Sequence[Column], minima: Sequence[int]) -> str:
-    """Return columns of text as lines; the widest columns are made narrower until they fit."""
+    """Return columns of text as lines; the widest are made narrower until the table fits.
+
+    The labels in the first column stay whole if the table fits with them.
+    """
     widths = [max(map(len, column)) for column in columns]
+    label = min(widths[0], _MAX_WORD)
+    if _total([label, *minima[1:]]) <= WIDTH:
+        minima = [label, *minima[1:]]
     while _total(widths) > WIDTH:
         reducible = [i for i, minimum in enumerate(minima) if widths[i] > minimum]
         widths[max(reducible, key=widths.__getitem__)] -= 1
