@@ -13,7 +13,8 @@ import xarray as xr
 from conftest import naming
 
 import thud
-from thud.level.assessment import Criterion, Verdict, get_criteria, octave_limits
+from thud.base._schema import LIMITS
+from thud.level.assessment import Criterion, Verdict, octave_limits
 from thud.level.estimate import Estimate
 from thud.level.levels import (
     BANDWIDTHS,
@@ -165,7 +166,7 @@ def test_nominal_tyre_conforms() -> None:
 
 def criteria_of(source: LimitsSource, **changes: float) -> thud.Verdict:
     """Return the verdict on a source in the middle of all its limits but for some changes."""
-    value = {one.name: (one.lower + one.upper) / 2 for one in get_criteria(source)} | changes
+    value = {name: (lower + upper) / 2 for name, _, lower, upper in LIMITS[source]} | changes
     values = [*value.values()]
     values[7] = int(values[7])
     return thud.assess_levels(values[:5], *values[5:], source)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import MET_FROM, VERDICTS, FiniteElement
+from thud.base._schema import LIMITS, MET_FROM, VERDICTS, FiniteElement
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.note import Note
@@ -26,7 +26,6 @@ from thud.explorer.recording import read_copies
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
-from thud.level.assessment import get_criteria
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.search import size_of_residuals
@@ -276,9 +275,9 @@ def _smallest_change(case: Case, name: str, begin: float, length: float) -> Sear
 def _range(case: Case, name: str) -> tuple[float, float]:
     """Return the limits of a parameter; those of the standards if it is a criterion itself."""
     low, high = limits(find_key(name, case)[0], case)
-    for criterion in get_criteria(case.limits.source):
-        if criterion.name == name:
-            low, high = max(low, criterion.lower), min(high, criterion.upper)
+    for criterion, _, *ends in LIMITS[case.limits.source]:
+        if criterion == name:
+            low, high = max(low, ends[0]), min(high, ends[1])
     return low, high
 
 

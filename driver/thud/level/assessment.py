@@ -24,7 +24,7 @@ from thud.base.display import Displayed
 from thud.base.immutable import Immutable
 from thud.base.key import Quantity
 from thud.base.tables import Result, csv_text
-from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, UNKNOWN, Estimate
+from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
 if TYPE_CHECKING:
@@ -364,30 +364,20 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
         refuse(f"levels: {len(octaves)} values", allowed)
     values = (*octaves, contact_time, restitution, peaks, mass, drop_height)
-    criteria, standards = [], get_criteria(source)
+    require_choice("source", source, SOURCES)
     limits = {} if limits is None else limits
     require_kind("limits", limits, Mapping)
-    refuse_unknown("limits", limits, [standard.name for standard in standards])
-    for standard, value in zip(standards, values, strict=True):
-        name, unit = standard.name, standard.unit
+    refuse_unknown("limits", limits, [name for name, *_ in LIMITS[source]])
+    criteria = []
+    for (name, unit, *standard), value in zip(LIMITS[source], values, strict=True):
         if not isinstance(value, Estimate):
             is_unknown = isinstance(value, float | np.floating) and math.isnan(value)
             value = Estimate(math.nan if is_unknown else require_number(name, value))  # noqa: PLW2901
             if name == "peak_count" and not (is_unknown or 0 <= value.value == round(value.value)):
                 refuse_value("peaks", value.value, "whole numbers, 0 or more, or NaN")
-        limit = limits.get(name, (standard.lower, standard.upper))
-        lower, upper = require_pair(f"limits: {name}", limit)
+        lower, upper = require_pair(f"limits: {name}", limits.get(name, standard))
         criteria.append(Criterion(name, replace(value, unit=unit), lower, upper))
     return Verdict(source, tuple(criteria))
-
-
-def get_criteria(source: LimitsSource) -> tuple[Criterion, ...]:
-    """Return the criteria of the standards for a source, with unknown values."""
-    require_choice("source", source, SOURCES)
-    return tuple(
-        Criterion(name, replace(UNKNOWN, unit=unit), lower, upper)
-        for name, unit, lower, upper in LIMITS[source]
-    )
 
 
 def criterion_quantity(name: str) -> Quantity:
@@ -398,5 +388,6 @@ def criterion_quantity(name: str) -> Quantity:
 
 def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
-    octaves = get_criteria(source)[: len(get_bands(BANDWIDTHS[0]).nominal)]
-    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
+    require_choice("source", source, SOURCES)
+    lower, upper = np.array([limits for _, unit, *limits in LIMITS[source] if unit == "dB"]).T
+    return lower, upper

@@ -9,6 +9,7 @@ from datetime import date
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
+from thud.base._schema import LIMITS
 from thud.base.checks import (
     refuse_unknown,
     refuse_value,
@@ -30,7 +31,6 @@ from thud.base.toml_tables import (
     to_line,
     to_text,
 )
-from thud.level.assessment import get_criteria
 from thud.level.levels import SOURCES
 from thud.recordings.force_units import Calibration, require_unit
 from thud.recordings.response import Chain, Plate, RecorderFilter
@@ -142,7 +142,7 @@ def to_reasons(name: str, value: object) -> dict[str, str]:
 def to_limits(name: str, value: object) -> dict[str, tuple[float, float]]:
     """Return minimum and maximum by criterion."""
     table = require_table(name, value)
-    refuse_unknown(name, table, [criterion.name for criterion in get_criteria(SOURCES[0])])
+    refuse_unknown(name, table, [criterion for criterion, *_ in LIMITS[SOURCES[0]]])
     limits = {}
     for criterion, span in table.items():
         label = f"{name}: {criterion}"

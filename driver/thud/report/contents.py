@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base._schema import LIMITS
 from thud.base.bridge import version
-from thud.level.assessment import get_criteria
 from thud.level.estimate import CONFIDENCE, NOISE, REPEATABILITY
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.checks.plate import check_plate
@@ -126,7 +126,7 @@ def criteria_data(recording: Recording) -> list[dict[str, Any]]:
     verdict = recording.assess()
     average = recording.average()
     count = len(average.level)
-    standard = get_criteria(verdict.source)
+    standard = [(lower, upper) for *_, lower, upper in LIMITS[verdict.source]]
     spreads = {
         name: _spread(getattr(drop, name).value for drop in recording.drops)
         for name in ("contact_time", "restitution")
@@ -153,7 +153,7 @@ def criteria_data(recording: Recording) -> list[dict[str, Any]]:
                 "upper_bound": estimate.upper_bound,
                 "lower": criterion.lower,
                 "upper": criterion.upper,
-                "limits_of_standard": limits == (default.lower, default.upper),
+                "limits_of_standard": limits == default,
                 "margin": None if estimate.upper_bound or is_count else criterion.margin,
                 "probability": criterion.probability,
                 "verdict": criterion.conforms,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from thud.base._schema import LIMITS
 from thud.base.bridge import version
 from thud.base.checks import (
     MAX_SEED,
@@ -28,7 +29,6 @@ from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import Case, case_text
 from thud.case.keys import OUTPUT_GROUP, value_in, with_values
 from thud.impact.datasets import FREQUENCIES, LEVELS, RESULTS
-from thud.level.assessment import get_criteria
 from thud.studies.study_result import StudyResult
 
 if TYPE_CHECKING:
@@ -387,9 +387,7 @@ def assess_many(
     """
     count, bands = values[0].shape
     assessed, deviation = (_columns(columns, count) for columns in (values, errors))
-    criteria = get_criteria(source)
-    lower = np.array([criterion.lower for criterion in criteria])
-    upper = np.array([criterion.upper for criterion in criteria])
+    lower, upper = np.array([(low, high) for *_, low, high in LIMITS[source]]).T
     margins = np.minimum(assessed - lower, upper - assessed)
     certain, possible = ((margins >= sign * deviation).all(axis=1) for sign in (1, -1))
     return {
