@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.base.extras import require_extra
+from thud.base.extras import library
 from thud.base.files import replace_file
 from thud.base.immutable import Immutable
 
@@ -141,8 +141,7 @@ def write_vtu(
         Values at the nodes by name, shape (n_line, n_ring) or, of vectors, (n_line, n_ring, 2).
     """
     target = require_ending(path, ".vtu")
-    with require_extra("meshes"):
-        import meshio
+    meshio = library("meshio", "meshes")
     node = np.arange(position[..., 0].size).reshape(position.shape[:2])
     corners = (node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1])
     fields = {

@@ -247,19 +247,16 @@ def standardized_level(
     InputError
         If a value is not finite, a time or the volume is not positive, or the lengths differ.
     """
-    values, times = (
-        np.atleast_1d(finite_array(name, entries, (0, 1)))
-        for name, entries in (("level", level), ("reverberation_time", reverberation_time))
-    )
-    if len(times) == 1:
-        times = np.full(len(values), times[0])
-    if len(times) != len(values):
+    values = np.atleast_1d(finite_array("level", level, (0, 1)))
+    times = np.atleast_1d(finite_array("reverberation_time", reverberation_time, (0, 1)))
+    if len(times) not in {1, len(values)}:
         refuse(
             f"reverberation_time has {len(times)} values for {len(values)} levels",
             "one, or one for each level",
         )
     if (times <= 0).any():
         refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
+    times = np.broadcast_to(times, values.shape)
     answer = ask("rating", levels=values, reverberation_time=times, volume=require_volume(volume))
     return np.asarray(answer["levels"])
 
