@@ -351,41 +351,38 @@ def test_levels_differ_from_single_drops_by_the_rounding_of_their_energy() -> No
     assert max(ratios) > 1e8
 
 
-def test_shells_that_need_shorter_steps_equal_single_drops() -> None:
-    columns = {"youngs_modulus": [99.5e6, 60e6, 150e6, 1.6e6], "height": [8.77, 8.77, 4.0, 1.0]}
-    many = thud.solve_many(columns, replace(SHELL, sampling=thud.Sampling(8000.0)))
-    shortened = []
-    for i, (modulus, height) in enumerate(zip(*columns.values(), strict=True)):
-        single = thud.solve(
-            thud.Ball(youngs_modulus=modulus),
-            thud.Drop(height),
-            sample_rate=8e3,
-            model="hollow_sphere",
-        )
-        shortened.append("shortened_time_step" in single.model_quantities)
-        for force in ("elastic", "floor"):
-            levels = getattr(many, f"{force}_octave")[i]
-            np.testing.assert_allclose(levels, single.levels(force=force), rtol=0, atol=1e-6)
-        assert many.contact_time[i] == pytest.approx(single.contact_time, rel=1e-10)
-    assert shortened == [True, False, True, False]
-
-
-def test_levels_of_long_contacts_are_those_of_single_drops() -> None:
-    # Contacts of 0.2 s, whose levels are taken record by record, beside one of 0.02 s.
-    case = thud.Case(model=thud.HollowSphere("none"), sampling=thud.Sampling(duration=0.3))
-    columns = {"mass": [250.0, 2.5, 240.0], "height": [0.01, 1.0, 0.01]}
+@pytest.mark.parametrize(
+    ("case", "columns", "shortened", "longest"),
+    [
+        (
+            replace(SHELL, sampling=thud.Sampling(8000.0)),
+            {"youngs_modulus": [99.5e6, 60e6, 150e6, 1.6e6], "height": [8.77, 8.77, 4.0, 1.0]},
+            [True, False, True, False], 0.0,
+        ),
+        # Contacts of 0.2 s, whose levels are taken record by record, beside one of 0.02 s.
+        (
+            thud.Case(model=thud.HollowSphere("none"), sampling=thud.Sampling(duration=0.3)),
+            {"mass": [250.0, 2.5, 240.0], "height": [0.01, 1.0, 0.01]}, [False] * 3, 0.15,
+        ),
+    ],
+    ids=["shorter_steps", "long_contacts"],
+)  # fmt: skip
+def test_unusual_drops_equal_single_drops(
+    case: thud.Case, columns: dict[str, list[float]], shortened: list[bool], longest: float
+) -> None:
     many = thud.solve_many(columns, case)
-    for i, (mass, height) in enumerate(zip(*columns.values(), strict=True)):
-        single = thud.solve(
-            dataclasses.replace(case, ball=thud.Ball(mass=mass), drop=thud.Drop(height=height))
-        )
-        alone = thud.solve_many({name: [one[i]] for name, one in columns.items()}, case)
-        assert many.contact_time[i] == pytest.approx(single.contact_time, rel=1e-12)
+    for i, is_shortened in enumerate(shortened):
+        alone = {name: values[i] for name, values in columns.items()}
+        one = thud.solve_many(alone, case)
+        drop = thud.Drop(alone.pop("height"))
+        single = thud.solve(replace(case, ball=thud.Ball(**alone), drop=drop))
+        assert ("shortened_time_step" in single.model_quantities) == is_shortened
+        assert many.contact_time[i] == pytest.approx(single.contact_time, rel=1e-10)
         for force in ("elastic", "floor"):
             levels = getattr(many, f"{force}_octave")[i]
             np.testing.assert_allclose(levels, single.levels(force=force), rtol=0, atol=1e-6)
-            np.testing.assert_array_equal(getattr(alone, f"{force}_octave")[0], levels)
-    assert max(many.contact_time) > 0.15
+            np.testing.assert_array_equal(getattr(one, f"{force}_octave")[0], levels)
+    assert max(many.contact_time) > longest
 
 
 def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
