@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
+from thud.base._schema import QUANTITIES, RATED_BANDS, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import humanize
@@ -25,7 +25,7 @@ from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level, rating_title
 from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.level.rating import class_text, rated_bands
+from thud.level.rating import class_text
 from thud.plot.impact_figures import contact_force
 from thud.plot.style import FORCE_NAMES
 from thud.report.predicted_floor import CONTRIBUTIONS
@@ -230,7 +230,7 @@ def _room(prediction: RoomPrediction) -> Answer:
 
 def _ratings_text(prediction: RoomPrediction) -> str:
     """Return the ratings, the class, and the levels of octaves."""
-    octaves = zip(rated_bands("octave"), prediction.octave_level, strict=True)
+    octaves = zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
     levels = ", ".join(f"{level:.1f} dB at {frequency:g} Hz" for frequency, level in octaves)
     ratings = [
         f"{rating_title(prediction, name)} {entry}" for name, entry in prediction.ratings.items()

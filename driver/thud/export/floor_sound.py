@@ -12,13 +12,14 @@ import numpy as np
 from scipy.signal import butter, lfilter, resample, sosfilt
 from scipy.special import exprel
 
+from thud.base._schema import RATED_BANDS
 from thud.base.checks import refuse_value, require_whole
 from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.floors.modal_room import positions_below
 from thud.floors.prediction import BANDS, RoomPrediction
 from thud.level.levels import get_bands
-from thud.level.rating import MAX_LEVEL, rated_bands, rating
+from thud.level.rating import MAX_LEVEL, rating
 from thud.recordings.filters import band_filters
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ class FloorSound(Immutable):
     @property
     def description(self) -> str:
         """Bands of the modal sound and of the noise."""
-        bands, n_modal = rated_bands(BANDS), self.prediction.n_modal
+        bands, n_modal = RATED_BANDS[BANDS], self.prediction.n_modal
         parts = []
         if self.position is not None:
             parts.append(
@@ -323,14 +324,14 @@ def _a_weighting(frequency: Array) -> Array:
 def _band_sections() -> tuple[Array, Array, Array]:
     """Return the filters of the rated one-third-octave bands, and their lower and upper edges."""
     bands = get_bands(BANDS)
-    rated = np.isin(bands.nominal, rated_bands(BANDS))
+    rated = np.isin(bands.nominal, RATED_BANDS[BANDS])
     return band_filters(BANDS, RATE)[rated], bands.lower[rated], bands.upper[rated]
 
 
 @lru_cache
 def _weights() -> Array:
     """Return the factors of the A-weighting in the rated one-third-octave bands."""
-    n_band = len(rated_bands(BANDS))
+    n_band = len(RATED_BANDS[BANDS])
     alone = np.where(np.eye(n_band) > 0, 0.0, -MAX_LEVEL)
     return np.array([10 ** (rating(levels, BANDS).a_weighted / 10) for levels in alone])
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from thud.base._schema import RATED_BANDS
 from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Displayed
 from thud.base.errors import ThudError
@@ -23,7 +24,6 @@ from thud.floors.prediction import (
 )
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
-from thud.level.rating import rated_bands
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -159,7 +159,7 @@ def _column(name: str, prediction: RoomPrediction, titled: RoomPrediction) -> di
         else "",
         **{
             f"{frequency:g} Hz octave, dB": f"{level:.1f}"
-            for frequency, level in zip(rated_bands("octave"), prediction.octave_level, strict=True)
+            for frequency, level in zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
         },
         "energy into the bearing floor, 50 to 630 Hz, mJ": f"{1e3 * prediction.energy.sum():.3g}",
         "tapping machine, L_n,w (C_I), dB": tapping,

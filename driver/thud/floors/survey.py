@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import RATED_BANDS
 from thud.base.bridge import ask
 from thud.base.checks import refuse
 from thud.base.display import Tabulated
 from thud.base.note import Note
 from thud.level.levels import BANDWIDTHS
-from thud.level.rating import Rating, rated_bands, rating, require_volume, standardized_level
+from thud.level.rating import Rating, rating, require_volume, standardized_level
 from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
@@ -212,7 +213,7 @@ class RoomLevels(Tabulated):
 
     @property
     def _rated(self) -> NDArray[np.bool_]:
-        return np.isin(self.frequency, rated_bands(self.bands))
+        return np.isin(self.frequency, RATED_BANDS[self.bands])
 
     def _corrected(self) -> tuple[Array, NDArray[np.bool_]]:
         if self.background is None:
@@ -321,8 +322,8 @@ def _bands_of(frequency: Array, path: object) -> BandSet:
         refuse(f"{path}: frequency {duplicates[0]:g} Hz occurs twice", "each band once")
     steps = np.diff(np.log10(frequency))
     bands: BandSet = BANDWIDTHS[0] if steps.size and steps.min() > 0.2 else BANDWIDTHS[1]  # noqa: PLR2004
-    rated = rated_bands(bands)
-    missing = rated[~np.isin(rated, frequency)]
+    rated = RATED_BANDS[bands]
+    missing = np.setdiff1d(rated, frequency)
     if missing.size:
         words = ", ".join(f"{f:g}" for f in missing)
         refuse(

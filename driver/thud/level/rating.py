@@ -167,15 +167,6 @@ def class_text(korean_class: int | None) -> str:
     return f"class {number} ({limit})" if korean_class else f"no class (class {number}: {limit})"
 
 
-def rated_bands(bands: BandSet) -> NDArray[np.float64]:
-    """Return the rounded mid frequencies of the rated bands, Hz.
-
-    Raise InputError if `bands` is not known.
-    """
-    require_choice("bands", bands, RATED_BANDS)
-    return np.array(RATED_BANDS[bands])
-
-
 def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     """Return the single-number rating of levels in the room below.
 
@@ -199,12 +190,13 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     >>> thud.rating([65.3, 64.5, 58.0, 55.8]).rounded
     55
     """
-    frequencies = rated_bands(bands)
+    require_choice("bands", bands, RATED_BANDS)
+    frequencies = RATED_BANDS[bands]
     values = finite_array("levels", levels)
-    if values.shape != frequencies.shape:
+    if values.shape != (len(frequencies),):
         refuse(
             f"levels have the shape {values.shape}",
-            f"{frequencies.shape}, the {bands}s {frequencies[0]:g} to {frequencies[-1]:g} Hz",
+            f"({len(frequencies)},), the {bands}s {frequencies[0]:g} to {frequencies[-1]:g} Hz",
         )
     excess = values[abs(values) > MAX_LEVEL]
     if excess.size:

@@ -7,12 +7,12 @@ from importlib.util import find_spec
 from textwrap import fill
 from typing import TYPE_CHECKING
 
+from thud.base._schema import RATED_BANDS
 from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text, marked
 from thud.base.workbooks import workbook
 from thud.floors.prediction import source_note
-from thud.level.rating import rated_bands
 from thud.report.predicted_floor import CAVEAT, sheets, tables, verdict_text
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def screen_text(floor: PredictedFloor) -> str:
     """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
     prediction = floor.prediction
     (title, _, _, text), *others = floor.ratings
-    octaves = zip(rated_bands("octave"), prediction.octave_level, strict=True)
+    octaves = zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
     lines = [
         floor.name,
         f"  {title}: {', '.join(filter(None, (text, source_note(prediction))))}",

@@ -11,6 +11,7 @@ import numpy as np
 
 from thud.base._schema import (
     KEYS,
+    RATED_BANDS,
     JoistFloor,
     LaminateFloor,
     MeasuredMobility,
@@ -31,7 +32,7 @@ from thud.floors.prediction import (
 )
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.levels import get_bands
-from thud.level.rating import class_text, rated_bands
+from thud.level.rating import class_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -356,7 +357,7 @@ def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
 
 def octave_titles() -> list[str]:
     """Return the titles of the columns of octave levels."""
-    return [f"{frequency:g} Hz, dB" for frequency in rated_bands("octave")]
+    return [f"{frequency:g} Hz, dB" for frequency in RATED_BANDS["octave"]]
 
 
 def _effective_values(group: FloorOptions | Room, owner: str) -> Iterator[tuple[Key, object, bool]]:
