@@ -29,6 +29,7 @@ soundfile = pytest.importorskip("soundfile", reason="the extra recordings is not
 IMPACT = thud.solve()
 FORCE = blocked_force(IMPACT)
 PEAK, DURATION = 1500.0, 0.02
+CASE = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
 
 
 def export(*words: str) -> int:
@@ -204,8 +205,7 @@ def test_command_writes_what_is_asked_for(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert list(KINDS) == list(EXPORTS)
-    case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
-    assert export(case, "--csv", "--wav", "-o", str(tmp_path / "a")) == 0
+    assert export(CASE, "--csv", "--wav", "-o", str(tmp_path / "a")) == 0
     names = ["rubber_ball_100cm.csv", "rubber_ball_100cm.wav"]
     assert names_in(tmp_path / "a") == [*names, "thud.txt"]
     assert capsys.readouterr().out.count("rubber_ball_100cm") == 2
@@ -230,34 +230,24 @@ def test_recording_is_not_replaced_by_its_force(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("source", "words", "message"),
     [
-        ((), naming("--wav", "--csv", "--uff", "--mat", "--spectrum")),
-        (("--csv", "--drop", "3"), naming("drop", 3, 1, 2)),
-        (("--csv", "--config", "no.toml"), naming("no.toml")),
+        ("two.wav", (), naming("--wav", "--csv", "--uff", "--mat", "--spectrum")),
+        ("two.wav", ("--csv", "--drop", "3"), naming("drop", 3, 1, 2)),
+        ("two.wav", ("--csv", "--config", "no.toml"), naming("no.toml")),
+        # A case has neither drops nor a laboratory.
+        (CASE, ("--csv", "--drop", "2"), naming("drop", 2, 1)),
+        (CASE, ("--csv", "--config", "lab.toml"), naming("config", "lab.toml")),
+        *((name, ("--csv",), None) for name in ("no.nml", "no.wav", "no", "\0.csv")),
     ],
 )
 def test_bad_input_gets_one_sentence(
-    words: tuple[str, ...], message: str, recording: Path, tmp_path: Path
+    source: str, words: tuple[str, ...], message: str | None, recording: Path, tmp_path: Path
 ) -> None:
     with pytest.raises((thud.InputError, OSError), match=message) as caught:
-        export(str(recording), *words, "-o", str(tmp_path / "out"))
+        export(str(recording.parent / source), *words, "-o", str(tmp_path / "out"))
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("words", [("--drop", "2"), ("--config", "lab.toml")])
-def test_cases_have_neither_drops_nor_a_laboratory(words: tuple[str, ...], tmp_path: Path) -> None:
-    case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
-    with pytest.raises(thud.InputError, match=words[0].lstrip("-")):
-        export(case, "--csv", *words, "-o", str(tmp_path / "out"))
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("name", ["no.nml", "no.wav", "no", "\0.csv"])
-def test_missing_files_get_one_sentence(name: str, tmp_path: Path) -> None:
-    with pytest.raises((thud.InputError, OSError)):
-        export(str(tmp_path / name), "--csv", "-o", str(tmp_path / "out"))
 
 
 @pytest.fixture(scope="module")
