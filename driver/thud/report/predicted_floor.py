@@ -89,6 +89,8 @@ _THICKNESSES = {
 }
 # Thicknesses that a case does not state, for its drawing, m.
 _LAYER, _BOARD = 0.02, 0.0125
+# Density of layers in a drawing, which shows only whether they are solid, kg/m3.
+_SOLID = 1000.0
 # Density that gives the drawn thickness of an added mass, kg/m3: that of loose gravel.
 _GRAVEL_DENSITY = 1500.0
 # Thicknesses of the layers of a laminate by default, m.
@@ -434,8 +436,8 @@ def _case_layers(prediction: RoomPrediction) -> list[Layer]:
     floor, room = prediction.floor, prediction.room
     layers: list[Layer] = []
 
-    def add(material: str, thickness: float, *further: float) -> None:
-        layers.append(Layer(material, round(thickness, 6), *(further or (0.0,))))
+    def add(material: str, thickness: float, density: float = _SOLID, *members: float) -> None:
+        layers.append(Layer(material, round(thickness, 6), density, *members))
 
     built = floor if isinstance(floor, RectangularFloor) else None
     if built and built.screed_thickness:
