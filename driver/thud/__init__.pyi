@@ -102,7 +102,7 @@ from .level.rating import (
 )
 from .recordings.read_recording import read_recording as read_recording
 from .recordings.recording import Recording as Recording
-from .report.write import write_report as write_report
+from .report.recording_files import write_report as write_report
 from .studies.calibrated_set import assess as assess
 from .studies.compression_fit import (
     CompressionFit as CompressionFit,

@@ -117,7 +117,6 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.chdir(tmp_path)
     # To draw them takes long, and is tested elsewhere.
     monkeypatch.setattr("thud.plot.save_figures._content", lambda *_: b"figure")
-    monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
     monkeypatch.setattr(
         "thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"}
     )

@@ -24,8 +24,8 @@ from thud.recordings.config import Instrument
 from thud.recordings.signal import Signal
 from thud.report import recording_files
 from thud.report.contents import criteria_data
+from thud.report.recording_files import PDF
 from thud.report.rows import HEAD
-from thud.report.write import PDF
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -40,9 +40,8 @@ from thud.report.fonts import missing_characters
 from thud.report.notes import group_notes, shorten
 from thud.report.page import _range_picture, report_page
 from thud.report.pdf import html_to_pdf
-from thud.report.recording_files import table
+from thud.report.recording_files import file_names, read_picture, table, write_report
 from thud.report.rows import criterion_row, excluded_text, freedom_text, risk_text
-from thud.report.write import read_picture, write_report
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -99,7 +98,7 @@ def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN40
 def test_page_lists_the_requirements_that_the_plate_meets(one: Recording) -> None:
     plate = Plate(full_scale=6000.0)
     data = report_data(replace(one, config=replace(LAB, plate=plate)))
-    assert "the plate reads up to 6000 N" in report_page(data, [], "")
+    assert "the plate reads up to 6000 N" in report_page(data)
 
 
 def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
@@ -115,7 +114,7 @@ def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
     contact_time = drop.contact_time.value
     assert -3e-3 < drop.time[first] < 0
     assert contact_time < drop.time[stop - 1] < contact_time + 3e-3
-    page = report_page(report_data(one), [], "")
+    page = report_page(report_data(one))
     assert "from first touch to release, with a margin for their uncertainty; zero outside" in page
 
 
@@ -178,7 +177,7 @@ def written(
     recording = KINDS[request.param](one)
     folder = tmp_path_factory.mktemp("written")
     paths = write_report(recording, folder)
-    assert [path.name for path in paths] == ["report.json", "report.html", "report.pdf"]
+    assert [path.name for path in paths] == file_names()
     return recording, folder
 
 
@@ -287,13 +286,13 @@ def test_each_page_has_its_number_and_that_of_the_report(
 @pytest.mark.usefixtures("weasyprint")
 def test_signature_is_on_a_page_with_the_last_notes(one: Recording, tmp_path: Path) -> None:
     data = report_data(many(one, 5))
-    figures = ['<svg viewBox="0 0 9 9"></svg>'] * 2
+    figures = [b'<svg viewBox="0 0 9 9"></svg>'] * 2
     counts = set()
     # The end of the notes moves over the end of a page.
     for count in range(14, 24):
         warnings = [f"last note {i} " + "of some length " * 4 for i in range(count)]
         path = tmp_path / f"{count}.pdf"
-        path.write_bytes(html_to_pdf(report_page({**data, "warnings": warnings}, figures, "")))
+        path.write_bytes(html_to_pdf(report_page({**data, "warnings": warnings}, figures)))
         pages = [page.get_textpage().get_text_bounded() for page in open_pdf(path)]
         assert "last note" in pages[-1]
         assert "Signature" in pages[-1]
@@ -467,7 +466,7 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
         monkeypatch.syspath_prepend(tmp_path)
     with pytest.warns(ReportWarning, match=naming("report.pdf", "pip install")):
         paths = write_report(one, folder)
-    assert [path.name for path in paths] == ["report.json", "report.html"]
+    assert [path.name for path in paths] == [name for name in file_names() if name != "report.pdf"]
     assert not capsys.readouterr().out
 
 
@@ -615,7 +614,7 @@ def words_of(page: str) -> str:
 def test_page_states_what_the_laboratory_states(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
     data = report_data(recording)
-    page = report_page(data, [], "abc", read_picture(tmp_path / "mark.svg"))
+    page = report_page(data, [], read_picture(tmp_path / "mark.svg"))
     words = words_of(page)
     for text in (
         "Calibration report 2024-17", "Address Street 1 Town", "Client Client & Co. Their town",
@@ -652,7 +651,7 @@ def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
     traceable = stated(one, tmp_path, text)
     missing.remove("metrological traceability")
     assert missing_fields(traceable.config, traceable.origins) == missing
-    assert "Traceability to the SI by K-1" in words_of(report_page(report_data(traceable), [], ""))
+    assert "Traceability to the SI by K-1" in words_of(report_page(report_data(traceable)))
     nothing = missing_fields(Config(), one.origins)
     assert nothing == [*FIELDS.values(), "instruments"]
     # The files have dates.
@@ -692,7 +691,7 @@ def test_marks_that_are_no_pictures_are_refused(
 def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
     data = report_data(recording)
-    words = words_of(report_page(data, [], ""))
+    words = words_of(report_page(data))
     for entry in data["criteria"]:
         parts = [part for part in entry["contributions"] if part["counted"]]
         if not entry["uncertainty"]:
@@ -753,7 +752,7 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
         "† U excludes calibration, mass, drop height (uncertainty not stated: undecided); scatter "
         "between drops (unknown from one drop). Stated standard uncertainties that decide:"
     )
-    page = report_page(report_data(one), [], "")
+    page = report_page(report_data(one))
     assert note in words_of(page)
     assert "U is incomplete where it is marked †" in words_of(page)
     assert len(re.findall(r'data-label="U \(95 %\)">[^<]* †<', page)) == 9
@@ -767,7 +766,7 @@ def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -
     recording = stated(one, tmp_path)
     assert not any(excluded(recording).values())
     assert excluded_text(criteria_data(recording)) == ""
-    assert "†" not in report_page(report_data(recording), [], "")
+    assert "†" not in report_page(report_data(recording))
     # An effective mass has the uncertainties of its origins.
     effective = replace(many(one, 1), config=replace(LAB, mass=None), calibration_uncertainty=None)
     assert set(excluded(effective)["mass"]) <= {"calibration", "drop height", SCATTER}
@@ -776,7 +775,7 @@ def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -
 
 
 def test_table_names_the_measurand_and_its_reference(one: Recording) -> None:
-    words = words_of(report_page(report_data(one), [], ""))
+    words = words_of(report_page(report_data(one)))
     # The index is in an element of its own.
     assert "Verdict Force exposure level L FE , dB re 1 N 31.5 Hz, dB" in words
     assert "the repeatability in the budgets is that of the mean energy" in words
@@ -800,7 +799,7 @@ def test_risk_that_rounds_to_certainty_is_a_bound() -> None:
 
 
 def test_rules_and_standards_are_named(one: Recording) -> None:
-    words = words_of(report_page(report_data(one), [], ""))
+    words = words_of(report_page(report_data(one)))
     for text in (
         "guard bands w = U (ILAC-G8:09/2019", "JCGM 106:2012", "JIS A 1418-2:2019",
         "ISO 10140-5:2021 (table F.1)", "ISO 16283-2:2020", "published transcription",
@@ -813,7 +812,7 @@ def test_outliers_are_on_the_page_as_on_the_screen(one: Recording) -> None:
     recording = many(one, 60)
     assert recording.outliers
     data = report_data(recording)
-    words = words_of(report_page(data, [], ""))
+    words = words_of(report_page(data))
     for outlier in recording.outliers:
         assert str(outlier) in words
     assert "1 outlier (Grubbs, 5 %), marked but not excluded" in words
@@ -861,7 +860,7 @@ def test_reflows_on_a_narrow_screen(one: Recording, tmp_path: Path) -> None:
     if browser is None:
         pytest.skip("there is no chromium")
     path = tmp_path / "report.html"
-    page = report_page(report_data(stated(one, tmp_path)), [], "0" * 64)
+    page = report_page(report_data(stated(one, tmp_path)))
     root = "document.documentElement"
     width = f"<script>document.title=`${{innerWidth}} ${{{root}.scrollWidth-{root}.clientWidth}}`"
     path.write_text(page.replace("</body>", f"{width}</script></body>"))
@@ -884,7 +883,7 @@ def test_reflows_on_a_narrow_screen(one: Recording, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_budgets_scroll_inside_a_narrow_page(one: Recording, tmp_path: Path) -> None:
-    html = report_page(report_data(stated(one, tmp_path)), [], "0" * 64)
+    html = report_page(report_data(stated(one, tmp_path)))
     with open_in_browser(tmp_path / "report.html", html) as page:
         for width in (390, 1000):
             assert_scrolls_inside(page, page.locator(".budget"), width)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -21,8 +20,8 @@ from thud.recordings.read_recording import read_recording
 from thud.recordings.signal_files import open_signals
 from thud.report.contents import criteria_data, report_data
 from thud.report.page import report_page
+from thud.report.recording_files import draw_figures
 from thud.report.rows import INCOMPLETE, excluded_text, expanded_text, value_text
-from thud.report.write import figures, json_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -75,9 +74,7 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, object]) -> dict[
 def calibration_report(paths: Sequence[str], table: Mapping[str, object]) -> str:
     """Return the page with the calibration report of recorded drops, as `answer_recording`."""
     recording = read_copies(paths, table)
-    data = report_data(recording)
-    drawings = [content.decode() for content in figures(recording).values()]
-    return report_page(data, drawings, hashlib.sha256(json_bytes(data)).hexdigest())
+    return report_page(report_data(recording), draw_figures(recording).values())
 
 
 def read_copies(paths: Sequence[str], table: Mapping[str, object]) -> Recording:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -114,6 +115,11 @@ def report_data(recording: Recording) -> dict[str, Any]:
     }
     finite: dict[str, Any] = _finite(data)
     return finite
+
+
+def json_bytes(data: dict[str, Any]) -> bytes:
+    """Return the content of ``report.json``."""
+    return (json.dumps(data, indent=1, allow_nan=False) + "\n").encode()
 
 
 def criteria_data(recording: Recording) -> list[dict[str, Any]]:

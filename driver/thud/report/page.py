@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import math
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from markupsafe import Markup
 from thud.base._schema import QUANTITIES, VERDICTS
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND
+from thud.report.contents import json_bytes
 from thud.report.markup import inline_svg, plain, render
 from thud.report.notes import shorten
 from thud.report.rows import (
@@ -31,7 +33,7 @@ from thud.report.rows import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
 # Maximum length of the list of files.
 MAX_FILES = 60
@@ -64,16 +66,16 @@ LOWER_LIMIT_X, UPPER_LIMIT_X = 25.0, 75.0
 
 def report_page(
     data: dict[str, Any],
-    figures: Sequence[str],
-    checksum: str,
+    figures: Iterable[bytes] = (),
     mark: tuple[str, bytes] | None = None,
 ) -> str:
     """Return the page as self-contained HTML.
 
     `data` is the result of `thud.report.contents.report_data`, `figures` are up to two figures of
-    column width as SVG, `checksum` is the SHA-256 of ``report.json``, and `mark` the media type and
-    the content of the accreditation mark.
+    column width as SVG, and `mark` is the media type and the content of the accreditation mark. The
+    page states the SHA-256 of ``report.json``.
     """
+    checksum = hashlib.sha256(json_bytes(data)).hexdigest()
     report, criteria = data["report"], data["criteria"]
     name = data["serial"] or data["name"]
     identity = f"Report {report['number'] or f'of {name}'}"
@@ -96,7 +98,7 @@ def report_page(
         excluded=excluded_text(criteria),
         standards=STANDARDS.get(data["source"], "the standards"),
         has_own_limits=any(not criterion["limits_of_standard"] for criterion in criteria),
-        figures=[inline_svg(svg, f"f{i}") for i, svg in enumerate(figures)],
+        figures=[inline_svg(svg.decode(), f"f{i}") for i, svg in enumerate(figures)],
         budget_head=BUDGET_HEAD,
         budgets=[_budget(criterion) for criterion in criteria if _has_budget(criterion)],
         without_budget=", ".join(

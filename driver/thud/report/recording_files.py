@@ -1,39 +1,45 @@
-"""Tables and result files of a measured recording."""
+"""Texts for the screen and files of a measured recording: its tables, page and data."""
 
 from __future__ import annotations
 
+import json
 import math
 import warnings
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from thud.base._schema import VERDICTS
 from thud.base.bridge import version
-from thud.base.display import warn_if_not_drawn
+from thud.base.checks import refuse, require_kind, shown_text
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import InputError, ReportWarning
 from thud.base.extras import require_extra
+from thud.base.files import Results, read_input
 from thud.base.tables import csv_text, marked
 from thud.level.estimate import UNKNOWN, Estimate
 from thud.level.levels import get_bands
-from thud.report import write
-from thud.report.contents import report_data
+from thud.recordings.recording import Recording
+from thud.report.contents import FORMAT, json_bytes, report_data
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row
-from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterable, Sequence
-    from pathlib import Path
 
-    from thud.base.files import Results
     from thud.recordings.read_recording import Stages
-    from thud.recordings.recording import Recording
 
 # Columns of the page that the printed table has.
 _SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")
 # Verdicts of several criteria.
 _PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
-DATASET = "recording.nc"
-_PAGE = (HTML, PDF, "force.svg", "levels.svg")
-STAGES = "stages"
+LEVELS, CRITERIA, JSON, DATASET = "levels.csv", "criteria.csv", "report.json", "recording.nc"
+HTML, PDF, STAGES = "report.html", "report.pdf", "stages"
+# Names of the figures of the page.
+FIGURES: tuple[Literal["force", "levels"], ...] = ("force", "levels")
+# Formats and maximum size of the accreditation mark, bytes.
+PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
+MAX_PICTURE = 300_000
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
@@ -136,18 +142,26 @@ def criteria_csv(data: dict[str, Any]) -> str:
 
 def file_names(*, figures: bool = True, stages: bool = False) -> list[str]:
     """Return the names of the files that `save` writes."""
-    drawn = (*(_PAGE if figures else ()), *([f"{STAGES}.svg"] if stages else ()))
-    return ["levels.csv", "criteria.csv", JSON, DATASET, *drawn]
+    page = [HTML, PDF, *(f"{name}.svg" for name in FIGURES)] if figures else []
+    return [LEVELS, CRITERIA, JSON, DATASET, *page, *([f"{STAGES}.svg"] if stages else [])]
 
 
-def save(
-    recording: Recording, results: Results, *, figures: bool = True, stages: Stages | None = None
-) -> None:
-    """Write levels, criteria and data; with `figures` also the figures and the page.
+def write_report(
+    recording: Recording, directory: str | os.PathLike[str], *, replace: bool = False
+) -> list[Path]:
+    """Write the calibration report of a recording, its tables and figures; return their paths.
 
-    With the stages of a drop, they are drawn too.
+    The page, ``report.html`` and ``report.pdf``, is printed on sheets of A4; very long lists are
+    complete in ``report.json`` only.
 
-    The directory of the results is replaced as a whole.
+    Parameters
+    ----------
+    recording
+        Measured recording.
+    directory
+        Directory for the files; replaced as a whole if it holds an earlier report.
+    replace
+        Whether to replace results of something else.
 
     Raises
     ------
@@ -159,23 +173,79 @@ def save(
     Warns
     -----
     ReportWarning
-        If a file is not written, or the results of another recording are replaced.
+        If a file is not written because an extra is missing, a font is missing, or the report of
+        another recording is replaced.
     """
-    data = report_data(recording)
+    require_kind("recording", recording, Recording)
+    return save(recording, Results(Path(directory), "measure", replace=replace))
+
+
+def save(
+    recording: Recording, results: Results, *, figures: bool = True, stages: Stages | None = None
+) -> list[Path]:
+    """Write levels, criteria and data; with `figures` also the figures and the page.
+
+    With the stages of a drop, they are drawn too. For errors and warnings see `write_report`.
+    """
+    data, folder = report_data(recording), results.folder
     contents = {
-        "levels.csv": levels_csv(data).encode(),
-        "criteria.csv": criteria_csv(data).encode(),
+        LEVELS: levels_csv(data).encode(),
+        CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
-        **_dataset(data, results.folder),
+        **_dataset(data, folder),
     }
     if figures and _has_matplotlib():
-        drawings = write.figures(recording)
-        contents |= page_contents(recording, data, drawings, results.folder) | drawings
+        drawings = draw_figures(recording)
+        contents |= page_contents(recording, data, drawings, folder) | drawings
     if stages and _has_matplotlib():
         from thud.plot.save_figures import figure_files
 
         contents |= figure_files({STAGES: stages.plot()})
-    write_files(results, data, contents)
+    earlier = _checksums_in(folder)
+    paths = results.write(contents)
+    if earlier not in (None, _checksums(data)):
+        message = f"{folder}: replaces the results of another recording"
+        warnings.warn(message, ReportWarning, stacklevel=3)
+    return paths
+
+
+def draw_figures(recording: Recording) -> dict[str, bytes]:
+    """Return the figures of a recording as SVG, by file name; warn of those not drawn."""
+    # Matplotlib is slow to import.
+    from thud.plot.save_figures import figure_files
+
+    return figure_files(draw_all({name: partial(recording.plot, name) for name in FIGURES}))
+
+
+def page_contents(
+    recording: Recording, data: dict[str, Any], drawings: dict[str, bytes], folder: Path
+) -> dict[str, bytes]:
+    """Return the page as HTML and, if possible, PDF, by file name.
+
+    `drawings` are the figures as SVG. Warn if there is no PDF, or no font for some characters;
+    `folder` is named in the warning.
+    """
+    from thud.report.page import laboratory_text, report_page
+    from thud.report.pdf import pdf_file
+
+    mark = recording.config.report.accreditation_mark
+    page = report_page(data, drawings.values(), read_picture(Path(mark)) if mark else None)
+    return {HTML: page.encode(), **pdf_file(page, PDF, folder, laboratory_text(data))}
+
+
+def read_picture(path: Path) -> tuple[str, bytes]:
+    """Return media type and content of a picture; raise InputError if it cannot be used."""
+    kind = PICTURES.get(path.suffix.lower().replace(".jpeg", ".jpg"))
+    allowed = f"{', '.join(PICTURES)} up to {MAX_PICTURE // 1000} kB"
+    problem = f"report: accreditation_mark = {shown_text(path)} cannot be used"
+    try:
+        content = path.read_bytes() if kind and path.stat().st_size <= MAX_PICTURE else b""
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or shown_text(error)
+        refuse(f"{problem} ({reason})", allowed, error)
+    if not kind or not content:
+        refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
+    return kind, content
 
 
 def _has_matplotlib() -> bool:
@@ -195,3 +265,16 @@ def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
         warnings.warn(message, ReportWarning, stacklevel=3)
         return {}
     return {DATASET: netcdf(data)}
+
+
+def _checksums(data: dict[str, Any]) -> list[str]:
+    return [file["sha256"] for file in data["files"]]
+
+
+def _checksums_in(folder: Path) -> list[str] | None:
+    """Return the checksums of the files of an earlier report; None if there is none."""
+    try:
+        data = json.loads(read_input(folder / JSON))
+        return _checksums(data) if data["format"] == FORMAT else None
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return None
