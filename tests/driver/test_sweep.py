@@ -588,6 +588,8 @@ def test_missing_study_is_reported(tmp_path: Path, errors_of: ErrorsOf) -> None:
     assert "no.toml" in errors_of("sweep", tmp_path / "no.toml")
     with pytest.raises(thud.InputError, match=naming("study", 3)):
         thud.sweep(3)  # type: ignore[arg-type]
+    with pytest.raises(thud.InputError, match=naming("no path")):
+        thud.sweep("a\0b.toml")
 
 
 SWEEP = (REPOSITORY / "inputs/studies/sweep.toml").read_text()

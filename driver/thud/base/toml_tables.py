@@ -8,7 +8,14 @@ from dataclasses import MISSING, dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from thud.base.checks import refuse, refuse_unknown, refuse_value, require_choice, require_number
+from thud.base.checks import (
+    refuse,
+    refuse_unknown,
+    refuse_value,
+    require_choice,
+    require_number,
+    shown_text,
+)
 from thud.base.files import read_input
 
 if TYPE_CHECKING:
@@ -26,10 +33,11 @@ def read_toml(path: Path) -> tuple[dict[str, Any], str]:
     """
     try:
         text = read_input(path).decode("utf-8-sig")
-    except OSError as error:
-        refuse(f"{path}: {error.strerror}", "a file that exists and can be read", error)
     except UnicodeDecodeError as error:
         refuse(f"{path}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
+    except (OSError, ValueError) as error:  # a zero byte
+        reason = getattr(error, "strerror", "no path")
+        refuse(f"{shown_text(path)}: {reason}", "a file that exists and can be read", error)
     try:
         return tomllib.loads(text), text
     except (ValueError, RecursionError) as error:  # no TOML, or thousands of digits or brackets
