@@ -145,6 +145,16 @@ def test_lost_samples_are_named(step: float, after: float, value: float | None, 
         measured(force, 48e3)
 
 
+@pytest.mark.parametrize("rate", [2.5e3, 3e3, 4e3, 5e3])
+@pytest.mark.parametrize("duration", [0.012, 0.019])
+def test_steps_of_a_background_with_hum_are_not_lost(rate: float, duration: float) -> None:
+    time = np.arange(round(0.6 * rate)) / rate
+    pulse = 1600 * np.sin(np.pi * np.clip((time - 0.2) / duration, 0, 1)) ** 1.1
+    for phase in range(6):
+        force = pulse + 40 * np.sin(2 * np.pi * 50 * time + phase)
+        assert measured(np.round(force / 8) * 8, rate).drops
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 2.0])
 @pytest.mark.parametrize("repeats", [1, 4])
 def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, repeats: int) -> None:
