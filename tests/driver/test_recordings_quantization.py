@@ -174,6 +174,14 @@ def test_constant_background_next_to_a_steep_flank_is_not_lost() -> None:
     assert measure_stages(window, Config()).drop.contact_time.value == pytest.approx(0.02, rel=0.05)
 
 
+def test_bounce_of_a_step_has_a_touch() -> None:
+    length = round(1.4 * RATE)
+    force = half_sine(RATE, 0.1, length, PEAK, DURATION)
+    force += half_sine(RATE, 0.7, length, 500.0, DURATION)
+    (drop,) = measured(375 * np.rint(force / 375)).drops
+    assert drop.bounce == pytest.approx(0.6, abs=0.005)
+
+
 def test_load_cells_add_their_steps() -> None:
     cells = [Signal.from_array(record(step, 0.01, 1), RATE, "F") for step in (5.0, 12.0)]
     (window,) = cut_drops(replace(cells[0], cells=tuple(cells)))

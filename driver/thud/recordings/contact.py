@@ -235,7 +235,7 @@ def find_edge(
     begin and end are at 1 % of the peak.
     """
     rate = section.sample_rate
-    index = section.contact[0 if side > 0 else 1]
+    index, other = section.contact[::side]
     end = background.ends[0 if side > 0 else 1]
     step = side * max(1, round(CELL * rate))
     bounds = np.arange(round(end * rate), int(index + side * LENGTH * rate), step)[::side]
@@ -284,10 +284,15 @@ def find_edge(
     quantization, rise = background.quantization, 0.0
     if quantization.offset:
         # Where the background lies within a step, offset and samples are uncertain by half a step
-        # and a step: the edge by the time that the force needs for both.
+        # and a step: the edge by the time that the force needs for both or, in a bounce of few
+        # steps that does not reach them, up to the other edge.
         limit = THRESHOLD * background.peak + 1.5 * quantization.step
         later = side * np.flatnonzero(force > limit) / rate
-        rise = quantization.offset / quantization.step * (later[later > middle].min() - middle)
+        rise = (
+            quantization.offset
+            / quantization.step
+            * (later[later > middle].min(initial=side * other / rate) - middle)
+        )
     return (
         Estimate(side * mean, math.hypot(deviation, TOUCH_ERRORS[side < 0])),
         Estimate(side * middle, math.hypot(math.sqrt(variance), correction, rise)),
