@@ -335,6 +335,18 @@ def test_taps_show_the_resonance_of_the_plate(
     assert np.abs(deviations(found, frequency, quality)).max() < 4
 
 
+@pytest.mark.parametrize("before", [0.003, 0.007])
+def test_tap_at_the_begin_of_a_record_has_no_known_noise(before: float) -> None:
+    """What rings after the tap is no noise before it, and some samples do not show the noise."""
+    record = tapped([(1100.0, 30.0, 1.0)], 1)
+    level = record.read(0, record.n_sample)
+    begin = int(np.argmax(np.abs(level))) - round(before * record.sample_rate)
+    found = calibrate_tap(Signal.from_array(level[begin:], record.sample_rate))
+    # The fit begins 6 ms after the peak.
+    assert 1.5 < found.quality_uncertainty / calibrate_tap(record).quality_uncertainty < 2
+    assert np.abs(deviations(found, 1100, 30)).max() < 3
+
+
 def test_errors_of_taps_are_as_large_as_stated() -> None:
     """Of 60 normal errors 0 to 8 lie outside 95 %, with a probability of 99.7 %."""
     errors = [

@@ -248,7 +248,10 @@ def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]
     # The second half of what lies between two taps is quiet.
     quiet = [0, *(tops[1:] + tops[:-1]) // 2]
     return [
-        _Tap(level[top : min(end, top + after)], level[max(start, top - before) : top - contact])
+        _Tap(
+            level[top : min(end, top + after)],
+            level[max(start, top - before) : max(top - contact, 0)],
+        )
         for top, start, end in zip(tops, quiet, ends, strict=True)
     ]
 
@@ -283,7 +286,8 @@ def fit_modes(level: NDArray[np.float64], rate: float, quiet: NDArray[np.float64
 
     `quiet` is the level before they begin; what remains of the fit is compared with its noise.
     """
-    noise = quiet - closest(quiet, np.zeros((0, 2)), rate)[0] if quiet.size else quiet
+    is_known = len(quiet) >= MIN_LENGTH
+    noise = quiet - closest(quiet, np.zeros((0, 2)), rate)[0] if is_known else np.empty(0)
     modes: list[Mode] = []
     parameters, used = np.zeros((0, 2)), level
     while len(parameters) < MAX_MODES and len(used) >= MIN_LENGTH:
