@@ -96,6 +96,10 @@ def test_background_within_a_step_has_its_error() -> None:
     assert offset(np.full(4800, 3.0)) == pytest.approx(1 / math.sqrt(12))
     # Either value half the time: in the middle between both, whatever the noise.
     assert offset(np.tile([0.0, 1.0], 2400)) == 0.0
+    assert offset(np.append(np.tile([0.0, 1.0], 2400), [2.0, -1.0])) == 0.0
+    # Two values that are no neighbors are a slow change.
+    slow = 1 / math.sqrt(12 * (1 + math.sqrt(8)))
+    assert offset(np.repeat([0.0, 2.0], 2400)) == pytest.approx(slow, rel=1e-3)
     # Noise of a step and more averages the steps.
     assert offset(np.rint(np.random.default_rng(1).normal(0.3, 1.0, 4800))) == 0.0
 

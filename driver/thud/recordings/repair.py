@@ -139,15 +139,18 @@ def _find_step(values: NDArray[np.float64]) -> float:
 def _offset_deviation(background: NDArray[np.float64], step: float) -> float:
     """Return the standard deviation of the error of the mean of a background, N.
 
-    In two codes, of which the rarer one has the fraction p, the true mean is up to 1/2 - p steps
-    from the recorded one. Noise of s steps from sample to sample lowers step / sqrt(12), the error
-    of a constant, by exp(-2 pi**2 s**2), the first harmonic of the error over the steps; hum and
-    drift lower it by the root of the number of steps over which they change the background.
+    In two neighboring codes, of which the rarer one has the fraction p, the true mean is up to 1/2
+    - p steps from the recorded one. Noise of s steps from sample to sample lowers step / sqrt(12),
+    the error of a constant, by exp(-2 pi**2 s**2), the first harmonic of the error over the steps;
+    hum and drift lower it by the root of the number of steps over which they change the background.
     """
     steps = np.rint((background - background[0]) / step)
-    fractions = np.sort(np.unique(steps, return_counts=True)[1])[:-3:-1] / len(steps)
-    if fractions.sum() > TWO_CODES:
-        return step * float(fractions[0] - 0.5) / math.sqrt(3)
+    fractions = np.bincount((steps - steps.min()).astype(int), minlength=2) / len(steps)
+    pairs = fractions[:-1] + fractions[1:]
+    first = int(np.argmax(pairs))
+    if pairs[first] > TWO_CODES:
+        larger = float(fractions[first : first + 2].max())
+        return step * max(larger - 0.5, 0.0) / math.sqrt(3)
     noise = max(float(np.mean(np.diff(steps) ** 2)) / 2 - 1 / 12, 0.0)
     if noise > MAX_NOISE**2:
         return 0.0
