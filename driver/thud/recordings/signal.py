@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse, require_number
-from thud.base.immutable import Immutable
+from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
 from thud.level.levels import finite_array
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike, NDArray
+
+    from thud.recordings.formats import Samples
 
 # Peak forces of heavy/soft sources, N: from drops of some centimeters to the tyre on stiff floors.
 PEAKS = (300.0, 15000.0)
@@ -53,9 +55,8 @@ class Signal(Immutable):
         Samples per second, Hz.
     n_sample : int
         Number of samples.
-    samples : callable
-        Returns the recorded values, shape (stop - start,), of the samples from start to before
-        stop.
+    samples : ndarray, shape (n_sample,), or callable
+        The recorded values, or a function that reads them from a sample to before another one.
     scale : float
         Force per recorded value, N, positive if positive values are compression.
     full_scale : float or None
@@ -77,7 +78,7 @@ class Signal(Immutable):
     path: str
     sample_rate: float
     n_sample: int
-    samples: Callable[[int, int], NDArray[np.float64]] = field(repr=False)
+    samples: Samples = field(repr=False)
     scale: float = 1.0
     full_scale: float | None = None
     date: str = ""
@@ -93,7 +94,7 @@ class Signal(Immutable):
         require_number(f"{name}: sample_rate", sample_rate)
         if not sample_rate > 0:
             refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")
-        return cls(name, "", float(sample_rate), len(values), partial(read_array, values.copy()))
+        return cls(name, "", float(sample_rate), len(values), freeze(values.copy()))
 
     @cached_property
     def checksum(self) -> str:
@@ -113,7 +114,9 @@ class Signal(Immutable):
         """
         if not 0 <= start <= stop <= self.n_sample:
             refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")
-        force = self.samples(start, stop) * self.scale
+        values = self.samples
+        force = values(start, stop) if callable(values) else values[start:stop]
+        force = force * self.scale
         if force.shape != (stop - start,):
             refuse(
                 f"{self.name}: {force.size} samples from sample {start}, {stop - start} expected",
@@ -152,11 +155,6 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
         notes=(*notes, Note("cells_added", name, len(cells))),
         cells=tuple(cells),
     )
-
-
-def read_array(values: NDArray[np.float64], start: int, stop: int) -> NDArray[np.float64]:
-    """Return the samples of an array from start to before stop."""
-    return values[start:stop]
 
 
 def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.float64]:

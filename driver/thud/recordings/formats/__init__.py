@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    Samples = NDArray[np.float64] | Callable[[int, int], NDArray[np.float64]]
+
 # Number of bytes from which the format is identified.
 HEAD = 4096
 # Minimum number of samples of a recording.
@@ -51,8 +53,8 @@ class Channel:
         Number of the channel, or of the column, from 1.
     n_sample : int
         Number of samples.
-    samples : callable
-        Returns the values in the file from index start to before stop, shape (stop - start,).
+    samples : ndarray, shape (n_sample,), or callable
+        The values in the file, or a function that reads them from an index to before another one.
     unit : str
         Unit of the values; ``"FS"`` for fractions of full scale, empty if unknown.
     sample_rate : float or None
@@ -73,7 +75,7 @@ class Channel:
     name: str
     number: int
     n_sample: int
-    samples: Callable[[int, int], NDArray[np.float64]]
+    samples: Samples
     unit: str = ""
     sample_rate: float | None = None
     counts: float | None = None

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
+from thud.base.immutable import freeze
 from thud.recordings.formats import MIN_SAMPLES, Channel, agreed_rate, rise_uniformly, uniform_grid
-from thud.recordings.signal import read_array
 from thud.recordings.table import read_table
 from thud.recordings.words import DATE, find_rate, find_word
 
@@ -36,7 +35,7 @@ def read_channels(path: Path) -> list[Channel]:
             name=column.name,
             number=column.number,
             n_sample=rows,
-            samples=partial(read_array, column.values),
+            samples=freeze(column.values),
             unit=column.unit,
             sample_rate=rate,
             date=find_word(table.header, DATE),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,10 +11,10 @@ import numpy as np
 from thud.base.checks import refuse, shown_text
 from thud.base.extras import library
 from thud.base.files import require_small
+from thud.base.immutable import freeze
 from thud.base.note import Note
 from thud.base.units import factor_to, size_of
 from thud.recordings.formats import Channel, uniform_grid
-from thud.recordings.signal import read_array
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -105,7 +104,7 @@ def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
         name=data_set.label("ordinate_axis_lab") or record["id1"].strip(),
         number=number,
         n_sample=expected,
-        samples=partial(read_array, data[:expected] * newtons),
+        samples=freeze(data[:expected] * newtons),
         unit=unit,
         sample_rate=1 / step if step > 0 else None,
         date=data_set.label("id3"),
