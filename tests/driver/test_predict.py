@@ -199,6 +199,16 @@ def test_natural_frequencies_are_those_of_plate_and_box(floor: PredictedFloor) -
     assert names.keys() > {"floor 1", "room 1, 0, 0", "floating plate on its layer"}
 
 
+def test_floor_without_modes_is_reported(tmp_path: Path) -> None:
+    """The report of a measured mobility was refused for the lack of modes."""
+    case = thud.read_case(REPOSITORY / "inputs/floors/measured_slab.nml")
+    floor = PredictedFloor("a", "a", thud.predict_level(floor=case.floor, room=case.room))
+    assert not [name for name, _ in floor.modes if name.startswith("floor")]
+    assert "modes.csv" in contents([floor], tmp_path, report=False)
+    assert [layer.thickness for layer in floor.layers] == [0.14]
+    assert "Lowest natural frequencies" in floor_page(floor, "", "")
+
+
 def test_resonance_of_a_subceiling_has_the_stiffness_of_air_and_channels() -> None:
     plate = thud.Plate(
         thickness=0.05, subceiling_thickness=0.05, subceiling_density=2300.0,

@@ -46,7 +46,10 @@ _UNITS = {(k.owner, k.name): k.unit for k in KEYS}
 
 @dataclass(frozen=True)
 class Layer(TomlTable):
-    """A layer of a floor, with width and spacing of members such as joists; 0: none."""
+    """A layer of a floor, with width and spacing of members such as joists; 0: none.
+
+    Values of a file are checked; a layer that is only drawn may have no density.
+    """
 
     material: str = key(to_text, "name of the material", "")
     thickness: float = key(between(1e-5, 10.0, "m"), "thickness", 0.0)
@@ -55,9 +58,15 @@ class Layer(TomlTable):
     spacing: float = key(between(1e-2, 10.0, "m"), "distance between their axes", 0.0)
 
     def __post_init__(self) -> None:
-        """Raise InputError if a value is not allowed or missing."""
-        super().__post_init__()
-        self.require("material", "thickness", "density")
+        """Take any values: those of a floor that is drawn are in its own ranges."""
+
+    @classmethod
+    def read(cls, name: str, value: object) -> Layer:
+        """Return the layer of a table; raise InputError if a value is not allowed or missing."""
+        layer = super().read(name, value)
+        TomlTable.__post_init__(layer)
+        layer.require("material", "thickness", "density")
+        return layer
 
     def __str__(self) -> str:
         """Return thickness and material."""

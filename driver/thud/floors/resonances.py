@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import JoistFloor, RectangularFloor
 from thud.base.bridge import ask
+from thud.base.errors import InputError
 from thud.case.case import Case, case_text
 
 if TYPE_CHECKING:
@@ -18,9 +19,15 @@ COUNT = 8
 
 
 def floor_frequencies(prediction: RoomPrediction) -> list[float]:
-    """Return the lowest natural frequencies of the floor, Hz; see `get_modal_room`."""
+    """Return the lowest natural frequencies of the floor, Hz; see `get_modal_room`.
+
+    A floor without modes, such as a measured mobility, has none.
+    """
     case = case_text(Case(floor=prediction.floor))
-    modes = ask("floor_modes", case=case, highest=prediction.frequency[-1])
+    try:
+        modes = ask("floor_modes", case=case, highest=prediction.frequency[-1])
+    except InputError:
+        return []
     return [float(value) for value in modes["frequency"][:COUNT]]
 
 
