@@ -36,10 +36,9 @@ from thud.recordings.recording import Recording
 from thud.recordings.response import Plate
 from thud.recordings.words import read_date
 from thud.report.contents import FIELDS, criteria_data, missing_fields, report_data
-from thud.report.fonts import missing_characters
 from thud.report.notes import group_notes, shorten
 from thud.report.page import _range_picture, report_page
-from thud.report.pdf import html_to_pdf
+from thud.report.pdf import html_to_pdf, missing_characters
 from thud.report.recording_files import file_names, read_picture, table, write_report
 from thud.report.rows import criterion_row, excluded_text, freedom_text, risk_text
 

@@ -13,7 +13,7 @@ from thud.base.display import draw_all
 from thud.base.tables import csv_text, marked
 from thud.base.workbooks import workbook
 from thud.floors.prediction import source_note
-from thud.report.predicted_floor import CAVEAT, sheets, tables, verdict_text
+from thud.report.predicted_floor import CAVEAT, tables, verdict_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from thud.report.predicted_floor import PredictedFloor
 
 WORKBOOK = "predictions.xlsx"
-# Names of the tables; the last is part of the report.
+# Tables that are files too, not only sheets of the workbook; the last is part of the report.
 _TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "modes", "changes")
 # Maximum number of characters in a line on the screen.
 _WIDTH = 80
@@ -71,9 +71,9 @@ def contents(floors: Sequence[PredictedFloor], folder: Path, *, report: bool) ->
     warning.
     """
     rows = tables(floors, changes=report)
-    result = {f"{name}.csv": _csv(table) for name, table in rows.items()}
+    result = {f"{name}.csv": _csv(table) for name, table in rows.items() if name in _TABLES}
     if find_spec("openpyxl"):
-        result[WORKBOOK] = workbook({**rows, **sheets(floors)})
+        result[WORKBOOK] = workbook(rows)
     if report:
         for floor in floors:
             result |= page_contents(floor, folder)

@@ -9,8 +9,8 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
 from thud.base.display import html_text
-from thud.report.fonts import FAMILY
 from thud.report.notes import shorten
+from thud.report.pdf import FAMILY
 from thud.report.rows import NOT_KNOWN
 
 # Maximum length of a list of notes.

@@ -87,10 +87,14 @@ _THICKNESSES = {
     "sheathing_thickness": "sheathing",
     "joist_height": "joists",
 }
+# Changed key of a floor by the words for its change: its factor, and the plate that it belongs to.
+_FACTORS = {
+    "stiffness of the resilient layer halved": ("layer_stiffness", 0.5, "screed_thickness"),
+    "stiffness of the channels halved": ("channel_stiffness", 0.5, "subceiling_thickness"),
+    "mass of the subceiling doubled": ("subceiling_density", 2.0, "subceiling_thickness"),
+}
 # Thicknesses that a case does not state, for its drawing, m.
 _LAYER, _BOARD = 0.02, 0.0125
-# Density of layers in a drawing, which shows only whether they are solid, kg/m3.
-_SOLID = 1000.0
 # Density that gives the drawn thickness of an added mass, kg/m3: that of loose gravel.
 _GRAVEL_DENSITY = 1500.0
 # Thicknesses of the layers of a laminate by default, m.
@@ -187,20 +191,16 @@ class PredictedFloor:
 
         The source is empty for default values of keys that are not main ones.
         """
-        construction = self.construction
-        prediction, ceiling = self.prediction, construction.room if construction else {}
+        floor, room, construction = self.prediction.floor, self.prediction.room, self.construction
         sources = construction.sources if construction else {}
-        for group, owner, known in (
-            (prediction.floor, prediction.floor.name, sources),
-            (prediction.room, "room", {key: sources[key] for key in ceiling}),
-        ):
+        ceiling = {key: sources[key] for key in construction.room} if construction else {}
+        for group, owner, known in ((floor, floor.name, sources), (room, "room", ceiling)):
             for key, value, is_default in _effective_values(group, owner):
-                source = known.get(key.name, "" if is_default else "stated in the case")
-                if not source and key.name in _MAIN:
-                    source = "default value"
+                default = "default value" if key.name in _MAIN else ""
+                source = known.get(key.name, default if is_default else "stated in the case")
                 # The construction takes the sides of the case.
                 stated = getattr(construction.floor, key.name, value) if construction else value
-                if owner != "room" and value != stated:
+                if group is floor and value != stated:
                     source = "that of the case"
                 yield humanize(key.name), key.meaning, _value_text(key, value), source
 
@@ -313,48 +313,42 @@ def _columns(floor: PredictedFloor) -> list[list[float | str]]:
 
 def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list[Cells]]:
     """Return every number of floors in tables by name, each with a header."""
-    bands: list[Cells] = [("floor", "band, Hz", *COLUMNS, "by modes")]
-    ratings: list[Cells] = [("floor", "rating", "value, dB", "standard uncertainty, dB", "text")]
-    contributions: list[Cells] = [("floor", "contribution", "standard uncertainty, dB")]
-    octaves: list[Cells] = [("floor", *octave_titles())]
-    modes: list[Cells] = [("floor", "mode", "natural frequency, Hz")]
-    paths: list[Cells] = [("floor", "band, Hz", "path", "fraction of the energy")]
-    changed: list[Cells] = [("floor", "change", "difference, dB")]
+    result: dict[str, list[Cells]] = {}
     for floor in floors:
-        prediction = floor.prediction
-        count = len(prediction.frequency)
-        columns = [
-            map(float, prediction.frequency), *_columns(floor),
-            map(float, np.arange(count) < prediction.n_modal),
-        ]  # fmt: skip
-        bands += [(floor.name, *row) for row in zip(*columns, strict=True)]
-        octaves.append((floor.name, *map(float, prediction.octave_level)))
-        ratings += [(floor.name, *entry) for entry in floor.ratings]
-        if prediction.requirement:
-            limit = prediction.requirement.limit
-            ratings.append((floor.name, "required", limit, "", verdict_text(prediction)))
-        contributions += [(floor.name, *entry) for entry in floor.contributions.items()]
-        modes += [(floor.name, *entry) for entry in floor.modes]
-        shares = [*prediction.path_shares, prediction.weighted_shares]
-        for band, row in zip([*prediction.frequency, "A"], shares, strict=True):
-            paths += [(floor.name, band, *path) for path in zip(floor.paths, row, strict=True)]
-        if changes:
-            changed += [(floor.name, *change) for change in floor.changes]
-    result = {
-        "bands": bands, "octaves": octaves, "ratings": ratings, "contributions": contributions,
-        "paths": paths, "modes": modes,
-    }  # fmt: skip
-    return {**result, "changes": changed} if changes else result
+        for name, (titles, rows) in _tables(floor, changes=changes).items():
+            table = result.setdefault(name, [("floor", *titles)])
+            table += [(floor.name, *row) for row in rows]
+    return result
 
 
-def sheets(floors: Sequence[PredictedFloor]) -> dict[str, list[Cells]]:
-    """Return the assumptions and the warnings of floors as tables, each with a header."""
-    assumptions: list[Cells] = [("floor", "quantity", "value", "source")]
-    warnings: list[Cells] = [("floor", "warning")]
-    for floor in floors:
-        assumptions += [(floor.name, *row) for row in floor.assumptions[1:]]
-        warnings += [(floor.name, warning) for warning in floor.prediction.warnings]
-    return {"assumptions": assumptions, "warnings": warnings}
+def _tables(
+    floor: PredictedFloor, *, changes: bool
+) -> dict[str, tuple[Sequence[str], Iterable[Iterable[str | float]]]]:
+    """Return titles and rows of each table of a floor."""
+    prediction, required = floor.prediction, floor.prediction.requirement
+    bands = prediction.frequency.tolist()
+    by_modes = [float(i < prediction.n_modal) for i in range(len(bands))]
+    texts = [("required", required.limit, "", verdict_text(prediction))] if required else []
+    shares = zip([*bands, "A"], [*prediction.path_shares, prediction.weighted_shares], strict=True)
+    deviation = "standard uncertainty, dB"
+    changed: list[Change] = [*floor.changes] if changes else []
+    return {
+        "bands": (
+            ("band, Hz", *COLUMNS, "by modes"),
+            zip(bands, *_columns(floor), by_modes, strict=True),
+        ),
+        "octaves": (octave_titles(), [prediction.octave_level.tolist()]),
+        "ratings": (("rating", "value, dB", deviation, "text"), [*floor.ratings, *texts]),
+        "contributions": (("contribution", deviation), floor.contributions.items()),
+        "paths": (
+            ("band, Hz", "path", "fraction of the energy"),
+            [(band, *path) for band, row in shares for path in zip(floor.paths, row, strict=True)],
+        ),
+        "modes": (("mode", "natural frequency, Hz"), floor.modes),
+        **({"changes": (("change", "difference, dB"), changed)} if changes else {}),
+        "assumptions": (("quantity", "value", "source"), floor.assumptions[1:]),
+        "warnings": (("warning",), [(warning,) for warning in prediction.warnings]),
+    }
 
 
 def octave_titles() -> list[str]:
@@ -399,80 +393,63 @@ def _value_text(key: Key, value: object) -> str:
 def _variants(
     floor: Any,  # noqa: ANN401 - the keys of floors differ
     room: Room,
-) -> list[tuple[str, FloorOptions, Room]]:
-    """Return changes of floor and room in words, with the changed floor and room."""
-    variants: list[tuple[str, FloorOptions, Room]] = []
-
-    def add(text: str, floor: FloorOptions = floor, room: Room = room) -> None:
-        variants.append((text, floor, room))
-
+) -> Iterator[tuple[str, FloorOptions, Room]]:
+    """Yield changes of floor and room in words, with the changed floor and room."""
+    added = f"+{1e3 * _ADDED:g} mm"
+    # The mobility or the modes of a known floor do not follow its plate.
+    is_computed = not isinstance(floor, ModalFloor | MeasuredMobility)
     for key, title in _THICKNESSES.items():
-        value = getattr(floor, key, 0.0)
-        # The mobility or the modes of a known floor do not follow its plate.
-        if value and not isinstance(floor, ModalFloor | MeasuredMobility):
-            add(f"{title} +{1e3 * _ADDED:g} mm", replace(floor, **{key: value + _ADDED}))
+        if is_computed and (value := getattr(floor, key, 0.0)):
+            yield f"{title} {added}", replace(floor, **{key: value + _ADDED}), room
     if isinstance(floor, LaminateFloor) and floor.layer_thickness:
         top, *others = floor.layer_thickness
         layers = (top + _ADDED, *others)
-        add(f"top lamella +{1e3 * _ADDED:g} mm", replace(floor, layer_thickness=layers))
-    if getattr(floor, "screed_thickness", 0.0):
-        stiffness = floor.layer_stiffness / 2
-        add("stiffness of the resilient layer halved", replace(floor, layer_stiffness=stiffness))
-    if getattr(floor, "subceiling_thickness", 0.0):
-        stiffness = floor.channel_stiffness / 2
-        add("stiffness of the channels halved", replace(floor, channel_stiffness=stiffness))
-        density = 2 * floor.subceiling_density
-        add("mass of the subceiling doubled", replace(floor, subceiling_density=density))
+        yield f"top lamella {added}", replace(floor, layer_thickness=layers), room
+    for text, (key, factor, plate) in _FACTORS.items():
+        if getattr(floor, plate, 0.0):
+            yield text, replace(floor, **{key: factor * getattr(floor, key)}), room
     if room.ceiling_mass:
-        add("mass of the ceiling doubled", room=replace(room, ceiling_mass=2 * room.ceiling_mass))
+        yield (
+            "mass of the ceiling doubled",
+            floor,
+            replace(room, ceiling_mass=2 * room.ceiling_mass),
+        )
     time = room.reverberation_time
     times = tuple(2 * value for value in (time if isinstance(time, tuple) else (time,)))
-    add("reverberation time doubled", room=replace(room, reverberation_time=times))
-    return variants
+    yield "reverberation time doubled", floor, replace(room, reverberation_time=times)
 
 
-def _case_layers(prediction: RoomPrediction) -> list[Layer]:
-    """Return the layers that the keys of floor and room describe."""
+def _case_layers(prediction: RoomPrediction) -> Iterator[Layer]:
+    """Yield the layers that the keys of floor and room describe, from top to bottom."""
     floor, room = prediction.floor, prediction.room
-    layers: list[Layer] = []
-
-    def add(material: str, thickness: float, density: float = _SOLID, *members: float) -> None:
-        layers.append(Layer(material, round(thickness, 6), density, *members))
-
     built = floor if isinstance(floor, RectangularFloor) else None
     if built and built.screed_thickness:
-        add(f"floating plate, {built.screed_density:g} kg/m³", built.screed_thickness)
-        add(f"resilient layer {_ASSUMED}", _LAYER)
+        yield Layer(f"floating plate, {built.screed_density:g} kg/m³", built.screed_thickness)
+        yield Layer(f"resilient layer {_ASSUMED}", _LAYER)
     below = built if built and built.subceiling_thickness else None
     cavity = below.cavity_depth if below else room.ceiling_depth if room.ceiling_mass else 0.0
-    if isinstance(floor, Plate):
-        add(f"plate, {floor.density:g} kg/m³", floor.thickness)
-    elif isinstance(floor, LaminateFloor):
-        for material, thickness in _laminate_layers(floor):
-            add(material, thickness)
-    elif isinstance(floor, ModalFloor | MeasuredMobility):
-        add(f"plate like the floor, {floor.density:g} kg/m³", floor.thickness)
-    else:
-        assert isinstance(floor, JoistFloor)  # noqa: S101 - no other floor radiates
-        add(f"sheathing, {floor.sheathing_density:g} kg/m³", floor.sheathing_thickness)
+    if isinstance(floor, JoistFloor):
+        yield Layer(f"sheathing, {floor.sheathing_density:g} kg/m³", floor.sheathing_thickness)
         width, spacing = floor.joist_width, floor.spacing
         mean_density = floor.joist_density * width / spacing
-        add("joists", floor.joist_height, mean_density, width, spacing)
+        yield Layer("joists", floor.joist_height, mean_density, width, spacing)
         cavity -= floor.joist_height
-    if cavity > 0:
-        add("cavity", cavity, room.air_density)
+    elif isinstance(floor, LaminateFloor):
+        if floor.added_mass:
+            added = f"added mass, {floor.added_mass:g} kg/m² {_ASSUMED}"
+            yield Layer(added, floor.added_mass / _GRAVEL_DENSITY)
+        # By default the key is empty.
+        for i, thickness in enumerate(floor.layer_thickness or _LAMELLAS):
+            yield Layer(f"lamella, {'across' if i % 2 else 'along'}", thickness)
+    else:
+        # No other floor radiates.
+        assert isinstance(floor, Plate | ModalFloor | MeasuredMobility)  # noqa: S101
+        kind = "plate" if isinstance(floor, Plate) else "plate like the floor"
+        yield Layer(f"{kind}, {floor.density:g} kg/m³", floor.thickness)
+    if round(cavity, 6) > 0:
+        yield Layer("cavity", round(cavity, 6), room.air_density)
     if below:
-        add(f"subceiling, {below.subceiling_density:g} kg/m³", below.subceiling_thickness)
+        density = f"{below.subceiling_density:g} kg/m³"
+        yield Layer(f"subceiling, {density}", below.subceiling_thickness)
     if room.ceiling_mass:
-        add(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)
-    return layers
-
-
-def _laminate_layers(floor: LaminateFloor) -> Iterator[tuple[str, float]]:
-    """Yield material and thickness, m, of an added mass and of the layers of a laminate."""
-    if floor.added_mass:
-        added = f"added mass, {floor.added_mass:g} kg/m² {_ASSUMED}"
-        yield added, floor.added_mass / _GRAVEL_DENSITY
-    # By default the key is empty.
-    for i, thickness in enumerate(floor.layer_thickness or _LAMELLAS):
-        yield f"lamella, {'across' if i % 2 else 'along'}", thickness
+        yield Layer(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)
