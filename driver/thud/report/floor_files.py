@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from thud.floors.prediction import RoomPrediction
     from thud.report.predicted_floor import PredictedFloor
 
 WORKBOOK = "predictions.xlsx"
@@ -31,13 +30,13 @@ _WIDTH = 80
 
 def screen_text(floor: PredictedFloor) -> str:
     """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
-    prediction = floor.prediction
+    prediction, required = floor.prediction, floor.prediction.requirement
     (title, _, _, text), *others = floor.ratings
     octaves = zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
     lines = [
         floor.name,
         f"  {title}: {', '.join(filter(None, (text, source_note(prediction))))}",
-        *([f"  {_marked_verdict(prediction)}"] if prediction.requirement else []),
+        *([f"  {marked(verdict_text(prediction), required.verdict)}"] if required else []),
         f"  {CAVEAT.capitalize()}",
         *(f"    {title}: {text}" for title, _, _, text in others),
         f"    Octaves: {', '.join(f'{level:.1f} dB at {f:g} Hz' for f, level in octaves)}",
@@ -49,11 +48,6 @@ def screen_text(floor: PredictedFloor) -> str:
         fill(line, _WIDTH, subsequent_indent="    ") if len(line) > _WIDTH else line
         for line in lines
     )
-
-
-def _marked_verdict(prediction: RoomPrediction) -> str:
-    required = prediction.requirement
-    return marked(verdict_text(prediction), required.verdict) if required else ""
 
 
 def file_names(files: Iterable[str], *, report: bool = True) -> list[str]:
