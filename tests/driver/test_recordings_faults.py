@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,6 +101,17 @@ def test_steep_noisy_and_ringing_forces_have_no_spikes(
 ) -> None:
     (drop,) = measured(fault(rate), rate).drops
     assert "spikes" not in codes(drop.notes)
+
+
+def test_force_of_finite_elements_has_no_jumps() -> None:
+    rate = 51.2e3
+    case = thud.read_case(REPOSITORY / "inputs/rubber_ball_fe.nml")
+    impact = thud.solve(replace(case, sampling=thud.Sampling(rate, 0.03)))
+    clean = np.pad(impact.floor_force, 5000)
+    for seed in range(3):
+        force = clean + np.random.default_rng(seed).normal(size=len(clean))
+        (drop,) = measured(force, rate).drops
+        assert "jump" not in codes(drop.notes)
 
 
 @pytest.mark.parametrize("rate", [8e3, 51.2e3])
