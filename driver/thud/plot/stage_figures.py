@@ -98,8 +98,9 @@ def _draw_contact(axes: Axes, contact: Contact) -> None:
     time = 1e3 * (np.arange(len(contact.force)) / rate - touch)
     recorded, removed = contact.force + contact.removed, contact.removed
     first, stop = contact.gate
-    quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
-    spread = max(RANGE * float(quiet.std()), 0.01 * contact.background.peak)
+    quiet = np.delete(contact.force, slice(first, stop))
+    noise = float(quiet.std()) if quiet.size else 0.0
+    spread = max(RANGE * noise, 0.01 * contact.background.peak)
     axes.axvspan(time[first], time[stop - 1], color=GRAY, linewidth=0, label="gate of the levels")
     axes.plot(time, recorded, color="0.55", linewidth=0.5, label="corrected force")
     axes.plot(time, removed, color=COLORS[1], linewidth=1.0, label="background")

@@ -133,10 +133,9 @@ class Drop(Stage):
 
     @cached_property
     def noise(self) -> float:
-        """Standard deviation of the noise of a sample, N."""
-        first, stop = self.gate
-        force = np.concatenate([self.force[:first], self.force[stop:]])
-        return robust_deviation(force - np.median(force))
+        """Standard deviation of the noise of a sample, N; NaN without samples beside the gate."""
+        force = np.delete(self.force, slice(*self.gate))
+        return robust_deviation(force - np.median(force)) if force.size else math.nan
 
     @property
     def effective_rate(self) -> float:

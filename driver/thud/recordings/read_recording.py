@@ -118,7 +118,7 @@ def read_recording(  # noqa: PLR0913 - what everybody states has a keyword
     config = config.updated(height=height, mass=mass, calibration=calibration)
     items = [paths] if isinstance(paths, str | os.PathLike | Signal) else paths
     require_kind("paths", items, Iterable)
-    begin, end = config.begin or 0.0, config.end or math.inf
+    begin, end = config.begin or 0.0, math.inf if config.end is None else config.end
     origins: list[Origin] = []
     measured: list[list[Drop]] = []
     uncertainties: list[float | None] = []
