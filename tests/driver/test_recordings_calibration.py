@@ -411,7 +411,7 @@ def test_second_resonance_is_stated() -> None:
     ("level", "rate", "words"),
     [
         (np.zeros(20_000), 20_000.0, naming("recording", "no tap")),
-        (np.zeros(0), 20_000.0, naming("recording", "no tap")),
+        (np.zeros(0), 20_000.0, naming("recording", "empty")),
         (np.random.default_rng(1).normal(size=20_000), 20_000.0, naming("recording", "no tap")),
         (np.zeros(20_000), 1000.0, naming("sample rate", "2000 Hz")),
         (
