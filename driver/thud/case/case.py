@@ -65,6 +65,9 @@ def attribute_of(key: Key) -> str:
     return "model" if key.owner in MODELS else "floor" if key.owner in FLOORS else key.group
 
 
+_ATTRIBUTES = [(key, attribute_of(key)) for key in KEYS]
+
+
 def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -> ModelOptions:
     """Return the options of a model by its name, by default those of the first one.
 
@@ -157,8 +160,7 @@ class Case(Displayed):
         If that is None, the value of the standard ball by the model follows, else None.
         """
         model = self.model.name if self.model else ""
-        for key in KEYS:
-            attribute = attribute_of(key)
+        for key, attribute in _ATTRIBUTES:
             options = getattr(self, attribute, None)
             is_used = self.model or attribute not in GROUPS or attribute == "ball"
             if options and is_used and key.owner in {"", attribute, getattr(options, "name", "")}:
