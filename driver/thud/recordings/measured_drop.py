@@ -77,9 +77,9 @@ class Drop(Stage):
     restitutions : dict of str to Estimate
         Restitution by ``"impulse"`` and by ``"bounces"``, as far as they are known.
     shared_effects : dict of dict of float
-        Changes of ``"impulse"``, ``"bounces"``, ``"restitution"`` and ``"effective_mass"`` by one
-        standard uncertainty of what all drops share, such as ``"calibration"``, by its name; the
-        uncertainties above exclude them.
+        Changes of ``"impulse"``, ``"bounces"``, their ``"difference"``, ``"restitution"`` and
+        ``"effective_mass"`` by one standard uncertainty of what all drops share, such as
+        ``"calibration"``, by its name; the uncertainties above exclude them.
     bounce : float or None
         Time at which the first bounce begins, s since first touch; None if it is not recorded.
     notes : tuple of Note
