@@ -116,7 +116,7 @@ class TomlTable:
             for entry, value in values
             # The default of keys without another one is an empty table.
             if value is not None and value is not entry.default
-            if value or entry.default is not MISSING
+            if entry.default is not MISSING or not (isinstance(value, dict) and not value)
         ]
 
     def require(self, *names: str) -> None:
