@@ -2,8 +2,7 @@
 
     .venv/bin/python tests/bench/recordings.py [MINUTES]    # 60 by default; 9 MB of disk a minute
 
-It prints the time against that of the recording, and the largest memory of the command and of its
-processes together.
+It prints the time against that of the recording, and the largest memory of the command.
 """
 
 from __future__ import annotations
@@ -67,24 +66,6 @@ def write_hour(path: Path, minutes: float) -> int:
     return count
 
 
-def memory_of(leader: int) -> dict[str, float]:
-    """Return the memory of a process alone and of its children, MB: what is not shared."""
-    found = {"alone": 0.0, "all": 0.0}
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (folder / "stat").read_text(encoding="ascii").rpartition(")")[2].split()
-            if leader not in {int(folder.name), int(fields[1])}:
-                continue
-            lines = (folder / "smaps_rollup").read_text(encoding="ascii").splitlines()
-        except OSError:  # it has ended
-            continue
-        sizes = {line.split(":")[0]: line.split()[1] for line in lines[1:]}
-        found["all"] += int(sizes["Pss"]) / 1024
-        if int(folder.name) == leader:
-            found["alone"] = int(sizes["Pss"]) / 1024
-    return found
-
-
 def main() -> None:
     """Write the recording, measure it and print time and memory."""
     minutes = float(sys.argv[1]) if len(sys.argv) > 1 else 60.0
@@ -95,17 +76,12 @@ def main() -> None:
         arguments += ["--calibration", f"{FULL_SCALE:g} N/FS", "--height", "1", "--mass", "2.5"]
         arguments += ["--output", str(Path(folder, "results"))]
         before = time.monotonic()
-        with subprocess.Popen(arguments) as process:
-            most = {"alone": 0.0, "all": 0.0}
-            while process.poll() is None:
-                now = memory_of(process.pid)
-                most = {key: max(most[key], now[key]) for key in most}
-                time.sleep(0.25)
+        subprocess.run(arguments, check=True)
         wall = time.monotonic() - before
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     print(f"{count} drops in {minutes:g} min: {wall:.1f} s on {os.cpu_count()} processors, ")
     print(f"{60 * minutes / wall:.0f} times real time; {used.ru_utime + used.ru_stime:.1f} s of")
-    print(f"processor time; {most['alone']:.0f} MB, with its processes {most['all']:.0f} MB")
+    print(f"processor time; {used.ru_maxrss / 1024:.0f} MB")
 
 
 if __name__ == "__main__":
