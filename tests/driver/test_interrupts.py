@@ -38,11 +38,8 @@ WORK: dict[str, Callable[[], object]] = {
     ),
     "batches": lambda: thud.solve_many(
         {"height": np.linspace(0.5, 1.5, 64)},
+        thud.Case(model=thud.HollowSphere(), sampling=thud.Sampling(4e6, 0.025, 1000)),
         threads=2,
-        sample_rate=4e6,
-        substeps=1000,
-        duration=0.025,
-        model="hollow_sphere",
     ),
     "drops": lambda: thud.solve_many(
         {"height": np.linspace(0.5, 1.5, 40)},
