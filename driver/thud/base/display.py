@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     # Values of a column, shape (n_row,), and their format; by title with unit, such as "level, dB".
-    Columns = Mapping[str, tuple[Any, str]]
+    Columns = Mapping[str, tuple[Iterable[float], str]]
 
 _SYMBOL = re.compile(r"\b([CL])_(FE|I|iA,Fmax|n,w)\b")
 # Maximum length of a cause in a warning.

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain, combinations, count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from tqdm import tqdm
@@ -150,9 +150,25 @@ def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
     return rows
 
 
+# mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
+@overload
 def compare(
-    # `object`: mypy infers no common type of several kinds in one dictionary.
-    impacts: Mapping[str, object] | Iterable[object],
+    impacts: Mapping[str, Case | ImpactResult],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
+@overload
+def compare(
+    impacts: Iterable[Case | ImpactResult],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
+def compare(
+    impacts: Mapping[str, Case | ImpactResult] | Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,

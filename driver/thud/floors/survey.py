@@ -192,7 +192,9 @@ class RoomLevels(Tabulated):
             "reverberation time, s": (self.reverberation_time, ".2f"),
             "standardized, dB": (self.standardized, "z.1f"),
         }
-        return {title: column for title, column in columns.items() if column[0] is not None}
+        return {
+            title: (values, form) for title, (values, form) in columns.items() if values is not None
+        }
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardized levels and the background."""
