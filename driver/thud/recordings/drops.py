@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -79,12 +79,14 @@ MIN_RATE = 2_000.0
 FROM_CUBIC = np.array([0.4, -0.9, 0.0, 1.0, 0.0, -0.9, 0.4])
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class Stage(Immutable):
     """What a stage of a measurement returns: its arrays are read-only, and it can be drawn."""
 
     def __repr__(self) -> str:
         """Return the numbers and names of the stage in one line, without its arrays."""
-        values = [(k, v) for k, v in vars(self).items() if isinstance(v, str | float | Estimate)]
+        values = [(entry.name, getattr(self, entry.name)) for entry in fields(self)]
+        values = [(k, v) for k, v in values if isinstance(v, str | float | Estimate)]
         shown = [f"{k} {v:.6g}" if isinstance(v, float) else f"{k} {v!r}" for k, v in values]
         return f"<{': '.join(filter(None, (type(self).__name__, ', '.join(shown))))}>"
 
