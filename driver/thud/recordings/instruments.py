@@ -53,7 +53,7 @@ ASSUMED_PLATE, ASSUMED_SHARE, ASSUMED_FILTER = ASSUMED = (
 MIN_SHARE = 0.5
 
 
-class Doubt(NamedTuple):
+class Effect(NamedTuple):
     """How the recorded force may differ from the applied one by an instrument.
 
     Attributes are the contribution to the uncertainty, the gain, a function of frequencies in Hz,
@@ -65,17 +65,17 @@ class Doubt(NamedTuple):
     code: str = ""
 
 
-def find_doubts(drops: Sequence[Drop], config: Config) -> list[Doubt]:
+def find_effects(drops: Sequence[Drop], config: Config) -> list[Effect]:
     """Return how the recorded force in drops may differ from the applied one."""
     plate, recorder = config.resonance, config.recorder_filter
-    doubts = []
+    effects = []
     if plate and plate.f0_uncertainty:
         higher = replace(plate, f0=plate.f0 * (1 + plate.f0_uncertainty))
-        doubts.append(Doubt("plate", lambda f: higher.response(f) / plate.response(f)))
+        effects.append(Effect("plate", lambda f: higher.response(f) / plate.response(f)))
     if recorder and recorder.cutoff_uncertainty:
         shifted = replace(recorder, cutoff=recorder.cutoff * (1 + recorder.cutoff_uncertainty))
         gain: Gain = lambda f: shifted.response(f) / recorder.response(f)  # noqa: E731
-        doubts.append(Doubt("recorder filter", gain))
+        effects.append(Effect("recorder filter", gain))
     seen = {drop.plate_recorded for drop in drops}
     if plate is None:
         ringing = [(drop.ringing.frequency, drop.ringing.quality) for drop in drops if drop.ringing]
@@ -84,19 +84,19 @@ def find_doubts(drops: Sequence[Drop], config: Config) -> list[Doubt]:
         worst = ((limit or FLAT[1]) * math.sqrt(1 + 1 / TOLERANCE), 100.0)
         code = "plate_estimated" if ringing else "" if limit else "plate_assumed"
         assumed = Plate(*np.median(ringing or [worst], axis=0))
-        doubts.append(Doubt(ASSUMED_PLATE, lambda f: 1 / assumed.response(f), code))
+        effects.append(Effect(ASSUMED_PLATE, lambda f: 1 / assumed.response(f), code))
     elif False in seen and True not in seen:
-        doubts.append(Doubt(ASSUMED_PLATE, plate.response, "plate_not_recorded"))
+        effects.append(Effect(ASSUMED_PLATE, plate.response, "plate_not_recorded"))
     if plate and plate.share is None:
         # A force that was corrected for the whole share is multiplied by it.
         smaller = replace(plate, share=MIN_SHARE)
         gain = lambda f: plate.response(f) / smaller.response(f)  # noqa: E731
-        doubts.append(Doubt(ASSUMED_SHARE, gain, "share_assumed"))
+        effects.append(Effect(ASSUMED_SHARE, gain, "share_assumed"))
     if config.filter is None:
         cutoff = ASSUMED_CUTOFF * min(drop.effective_rate for drop in drops)
         gain = RecorderFilter("bessel", ASSUMED_ORDER, cutoff).response
-        doubts.append(Doubt(ASSUMED_FILTER, gain, "filter_assumed"))
-    return doubts
+        effects.append(Effect(ASSUMED_FILTER, gain, "filter_assumed"))
+    return effects
 
 
 def instrument_uncertainties(
@@ -106,7 +106,7 @@ def instrument_uncertainties(
 
     They are by their names; `calibration` is the relative standard uncertainty of the force.
     """
-    gains = {doubt.name: doubt.gain for doubt in find_doubts(drops, config)}
+    gains = {effect.name: effect.gain for effect in find_effects(drops, config)}
     changes = mean_level_changes(drops, gains, bands)
     stated = np.full(len(get_bands(bands).nominal), AMPLITUDE_DECIBEL * (calibration or 0.0))
     return {CALIBRATION: stated} | {
@@ -146,7 +146,7 @@ def peak_uncertainty(drop: Drop, config: Config) -> float:
     rate, force = drop.contact.sample_rate, np.pad(drop.contact.gated, 2)
     peaks = [
         low_pass(filtered(force, rate, gain, len(force)), rate).max()
-        for name, gain, _ in find_doubts([drop], config)
+        for name, gain, _ in find_effects([drop], config)
         if name in ASSUMED
     ]
     return math.hypot(*(np.array(peaks) - low_pass(force, rate).max())) / RECTANGULAR
@@ -157,7 +157,7 @@ def check_instruments(drops: Sequence[Drop], config: Config) -> list[Note]:
     plate, nominal = config.resonance, get_bands("octave").nominal
     uncertainties = instrument_uncertainties(drops, config, None)
     notes = []
-    for name, _, code in find_doubts(drops, config):
+    for name, _, code in find_effects(drops, config):
         if code:
             half_widths = RECTANGULAR * uncertainties[name]
             band = int(np.nanargmax(half_widths))
