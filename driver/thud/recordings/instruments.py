@@ -152,10 +152,14 @@ def peak_uncertainty(drop: Drop, config: Config) -> float:
     return math.hypot(*(np.array(peaks) - low_pass(force, rate).max())) / RECTANGULAR
 
 
-def check_instruments(drops: Sequence[Drop], config: Config) -> list[Note]:
-    """Return a warning for each assumption on the instruments that matters."""
+def check_instruments(
+    drops: Sequence[Drop], config: Config, uncertainties: Mapping[str, NDArray[np.float64]]
+) -> list[Note]:
+    """Return a warning for each assumption on the instruments that matters.
+
+    `uncertainties` are those of `instrument_uncertainties` in octaves.
+    """
     plate, nominal = config.resonance, get_bands("octave").nominal
-    uncertainties = instrument_uncertainties(drops, config, None)
     notes = []
     for name, _, code in find_effects(drops, config):
         if code:

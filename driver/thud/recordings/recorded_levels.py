@@ -89,6 +89,8 @@ class AverageLevels(Immutable):
         Standard deviation of the drops' levels, dB; NaN for a single drop.
     estimates : tuple of Estimate, shape (n_band,)
         The levels with their uncertainty budgets.
+    instruments : dict of ndarray, shape (n_band,)
+        Standard uncertainties by the instruments, dB.
     """
 
     drops: DropLevels
@@ -97,6 +99,7 @@ class AverageLevels(Immutable):
     flag: NDArray[np.str_]
     spread: NDArray[np.float64]
     estimates: tuple[Estimate, ...]
+    instruments: Mapping[str, NDArray[np.float64]]
 
 
 def measure_levels(drops: Sequence[Drop], bands: BandSet = "octave") -> DropLevels:
@@ -167,7 +170,7 @@ def average_levels(
     spread = np.full(level.shape, np.nan)
     if len(drops.names) > 1:
         spread = drops.level.std(axis=0, ddof=1)
-    return AverageLevels(drops, level, background, flag, spread, estimates)
+    return AverageLevels(drops, level, background, flag, spread, estimates, instruments)
 
 
 def compare_methods(drops: Sequence[Drop]) -> dict[str, NDArray[np.float64]]:

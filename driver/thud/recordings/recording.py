@@ -175,7 +175,7 @@ class Recording(ImpactOrRecording):
             *check_estimates(self.drops, self.estimates, config),
             *(check.note for check in check_plate(config.plate) if check.met is False),
             *config.check_dates(origin.date for origin in self.origins),
-            *check_instruments(self.drops, config),
+            *check_instruments(self.drops, config, self.average().instruments),
         ]
         lacking = dict.fromkeys(name for names in self.not_stated.values() for name in names)
         if lacking:
