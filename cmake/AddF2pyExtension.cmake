@@ -22,6 +22,7 @@ function(add_f2py_extension name)
     DEPENDS ${inputs}
     COMMAND "${CMAKE_COMMAND}" -E copy ${inputs} "${CMAKE_CURRENT_BINARY_DIR}"
     COMMAND "${Python_EXECUTABLE}" -m numpy.f2py ${sources} -m "${name}" --lower --f2cmap "${f2py_MAP}" --quiet
+      --freethreading-compatible
     # f2py writes those that it needs.
     COMMAND "${CMAKE_COMMAND}" -E touch ${wrappers}
     COMMENT "Wrapping ${name} by f2py"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import sysconfig
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import naming, python
 
 import thud
 from thud.impact.contact_time import contact_span
@@ -70,6 +71,13 @@ def test_threads_do_not_disturb_each_other() -> None:
 
     with ThreadPoolExecutor(8) as pool:
         assert list(pool.map(levels, heights)) == list(map(levels, heights))
+
+
+def test_interpreters_without_a_lock_stay_so() -> None:
+    code = "import sys, thud; thud.solve(); print(getattr(sys, '_is_gil_enabled', lambda: True)())"
+    done = python("-W", "error", "-c", code)
+    has_lock = not sysconfig.get_config_var("Py_GIL_DISABLED")
+    assert done.stdout.strip() == str(has_lock), done.stderr
 
 
 @pytest.mark.parametrize(
