@@ -84,11 +84,10 @@ WRITERS = {
     "sets": Writer(["thud", "case.nml", "--samples", "table.csv"],
                    {"case.nml": MINIMAL, "table.csv": "height\n1\n0.5\n"}),
 }  # fmt: skip
-# They write no results; `examples` makes a directory of its own, and `assess` writes the drops of a
-# surrogate, as the command `surrogate` does.
+# They write no results, but `examples` a directory of its own and `assess` a table as others do.
 OTHERS = {"explore", "calibrate", "examples", "assess"}
 # Their directories grow: they replace files by their names.
-STUDIES = {"sweep", "sensitivity", "design", "uncertainty", "surrogate", "fit"}
+STUDIES = {"sweep", "sensitivity", "design", "uncertainty", "fit"}
 
 
 def test_no_command_escapes() -> None:

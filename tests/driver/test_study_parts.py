@@ -1,4 +1,4 @@
-"""The parts of studies one by one: parameters, designs, temperature, plans, maps, answers."""
+"""The parts of studies one by one: parameters, designs, temperature, maps."""
 
 from __future__ import annotations
 
@@ -20,16 +20,7 @@ from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
 from thud.studies.sensitivity import sobol_indices
 from thud.studies.surrogate_levels import SurrogateLevels, within_region
-from thud.studies.surrogate_training import regress
 from thud.studies.temperature import Temperature, read_temperature
-from thud.studies.trained_surrogate import (
-    MAX_DROPS,
-    MIN_DROPS,
-    Plan,
-    Surrogate,
-    assess_many,
-    read_plan,
-)
 from thud.studies.uncertainty import Uncertainty
 
 CASE = thud.Case()
@@ -234,65 +225,6 @@ def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words:
     assert read_temperature(None, case, ()) is None
 
 
-def test_stages_are_steps_of_a_half() -> None:
-    ends = [stop for _, stop in Plan(size=3000).stages]
-    expected = sorted({2**n for n in range(6, 12)} | {3 * 2**n for n in range(5, 11)})
-    assert ends == [*(n for n in expected if n < 3000), 3000]
-    assert [start for start, _ in Plan(size=3000).stages] == [0, *ends[:-1]]
-    assert Plan(size=64).stages == [(0, 64)]
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"size": MIN_DROPS - 1}, "size"), ({"size": MAX_DROPS + 1}, "size"),
-        ({"error": 0}, "error"), ({"seed": -1}, "seed"),
-        ({"size": MAX_DROPS, "error": 1e-6, "seed": 3}, ""), ({}, ""), ({"size": MIN_DROPS}, ""),
-        ({"file": ""}, "file"), ({"file": 1}, "file"), ({"a": 1}, "'a'"),
-    ],
-)  # fmt: skip
-def test_bounds_of_plans(given: dict[str, Any], words: str, tmp_path: Any) -> None:  # noqa: ANN401
-    if words:
-        with pytest.raises(thud.InputError, match=words):
-            read_plan(given, tmp_path)
-    else:
-        assert read_plan(given, tmp_path) == Plan(**given)
-
-
-def test_fewest_drops_are_those_of_the_order_statistic() -> None:
-    # The largest of n bounds 95 % with a confidence of 1 - 0.95**n.
-    fewest = math.ceil(math.log(0.05) / math.log(0.95))
-    assert fewest <= MIN_DROPS < 1.1 * fewest
-
-
-def test_verdict_is_undecided_where_errors_reach_a_limit() -> None:
-    criteria = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria
-    middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
-    half = np.array([(one.upper - one.lower) / 2 for one in criteria])
-
-    def verdict(value: np.ndarray, error: np.ndarray) -> tuple[float, bool, bool]:
-        parts = [(row[None, :5], *(row[i : i + 1] for i in range(5, 10))) for row in (value, error)]
-        found = assess_many(parts[0], parts[1], "rubber_ball")  # type: ignore[arg-type]
-        return tuple(found[name][0] for name in ("margin", "conforms", "undecided"))  # type: ignore[return-value]
-
-    none = np.zeros(10)
-    margin, conforms, undecided = verdict(middle, none)
-    assert margin == pytest.approx(half[:5].min())
-    assert (conforms, undecided) == (True, False)
-    for i in (0, 4, 5, 6, 9):
-        one = np.eye(10)[i]
-        for side in (-1, 1):
-            inside, outside = (middle + side * r * half * one for r in (0.9, 1.1))
-            # An error of less than a tenth of the half width, and one of more.
-            for r, is_undecided in ((0.09, False), (0.11, True)):
-                error = r * half * one
-                assert verdict(inside, error)[1:] == (True, is_undecided)
-                assert verdict(outside, error)[1:] == (False, is_undecided)
-    # A sample that surely fails another criterion is decided.
-    failed = middle + 2 * half * np.eye(10)[6] + 0.9 * half * np.eye(10)[0]
-    assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
-
-
 def test_range_of_a_surrogate_counts_undecided_samples_twice() -> None:
     dataset = xr.Dataset(
         {"conforms": ("sample", [True, True, True, False, False, False, False, False]),
@@ -419,91 +351,3 @@ def test_search_stays_within_the_region(
     else:
         found = within_region(entry, answers)  # type: ignore[arg-type]
         assert (found.low, found.high) == found.spread == expected
-
-
-def answering() -> Surrogate:
-    """Return a surrogate whose weights are 0: it answers the means."""
-    names = {"floor_octave": 5, "elastic_octave": 5, "contact_time": 1, "restitution": 1}
-    mean = np.array(
-        [39.0, 31, 23, 17, 12.5, 1, 2, 3, 4, 5, 20 * np.log10(0.02), 20 * np.log10(0.8)]
-    )
-    return Surrogate(
-        thud.Case(model=thud.HollowSphere()), ("height", "mass"),
-        np.array([[0.9, 1.1], [2.0, 3.0]]), names, 0.1, 1, {"thud": thud.__version__},
-        np.random.default_rng(1).random((64, 2)), np.ones(2), np.zeros((64, 12)), mean, np.ones(12),
-        np.random.default_rng(2).normal(0, 0.02, (64, 12)),
-    )  # fmt: skip
-
-
-def test_answers_are_the_verdict_of_what_is_predicted() -> None:
-    pytest.importorskip("sklearn", reason="the extra surrogate is not installed")
-    surrogate = answering()
-    case = replace(surrogate.case, levels=thud.Levels(force="floor"))
-    surrogate = replace(surrogate, case=case)
-    height = np.array([1.0, 0.985, 1.2, 0.9, 1.1, 0.9 - 1e-12, 1.1 + 1e-12, 0.9 - 1e-8])
-    found = surrogate.predict(case, {"height": height, "mass": 2.5})
-    assert found["status"].tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
-    good = found["status"] == 0
-    assert found["floor_octave"][good] == pytest.approx(np.tile(surrogate.mean[:5], (6, 1)))
-    assert found["contact_time"][good] == pytest.approx(0.02)
-    assert found["restitution"][good] == pytest.approx(0.8)
-    assert found["conforms"].tolist() == [True] + [False] * 7
-    assert [bool(reason) for reason in found["reason"]] == (~good).tolist()
-    assert "height = 1.2" in found["reason"][2]
-    # Errors: sorted magnitudes, at the order statistic.
-    sizes = np.sort(abs(surrogate.residuals), axis=0)
-    below = [
-        sum(math.comb(64, k) * 0.95**k * 0.05 ** (64 - k) for k in range(n + 1)) for n in range(64)
-    ]
-    place = next(n for n, share in enumerate(below) if share >= 0.95)
-    assert surrogate.errors.tolist() == sizes[place].tolist()
-    assert surrogate.error_of("elastic_octave").tolist() == sizes[place][5:10].tolist()
-    assert surrogate.mean_square("contact_time") == pytest.approx(
-        (surrogate.residuals[:, 10] ** 2).mean()
-    )
-    judged = [0, 1, 2, 3, 4, 10, 11]
-    worst = judged[int(np.argmax(surrogate.errors[judged]))]
-    assert surrogate.worst == (surrogate.labels[worst], surrogate.errors[worst])
-    # A level at its limit within the error is undecided, and so is a time by its ratio.
-    limit = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
-    for decibels, is_undecided in ((0.5, True), (1.5, False)):
-        mean = surrogate.mean.copy()
-        mean[10] = 20 * np.log10(limit) - decibels * surrogate.errors[10]
-        near = replace(surrogate, mean=mean).predict(case, {"height": np.array([1.0])})
-        assert near["undecided"].tolist() == [is_undecided]
-    # What exceeds the bound is withheld, and what has it is not.
-    for bound, known in ((surrogate.errors[11], True), (surrogate.errors[11] - 1e-12, False)):
-        one = replace(surrogate, bound=float(bound), residuals=np.where(
-            np.arange(12) == 11, surrogate.residuals, 0.0))  # fmt: skip
-        answer = one.predict(case, {"height": np.array([1.0])})["restitution"]
-        assert np.isfinite(answer).all() == known
-        assert one.withheld == ([] if known else ["restitution"])
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"bound": 0.0}, {"bound": -0.1}, {"peaks": 1.5}, {"identity": {}}, {"length": np.zeros(2)},
-        {"region": np.array([[1.1, 0.9], [2.0, 3.0]])}, {"length": np.ones(3)},
-        {"case": thud.Case(model=None)}, {"outputs": {"elastic_octave": 5, "peak_force": 7}},
-        *({name: np.full(shape, np.nan)} for name, shape in (
-            ("points", (64, 2)), ("length", 2), ("weights", (64, 12)), ("mean", 12),
-            ("residuals", (64, 12)))),
-    ],
-)  # fmt: skip
-def test_surrogate_whose_parts_do_not_fit_is_not_complete(change: dict[str, Any]) -> None:
-    assert answering().is_complete
-    assert not replace(answering(), **change).is_complete
-
-
-def test_quantity_that_varies_by_rounding_only_is_its_mean() -> None:
-    pytest.importorskip("sklearn", reason="the extra surrogate is not installed")
-    points = np.random.default_rng(1).random((20, 2))
-    varying = 30 + points.sum(axis=1)
-    values = np.column_stack([varying, 7 + 1e-12 * points[:, 0], np.full(20, np.nan)])
-    found = regress(points, values, np.array([True, False, False]))
-    assert found["mean"][:2] == pytest.approx([varying.mean(), 7])
-    assert found["scale"][:2] == pytest.approx([varying.std(), 0], abs=0)
-    assert not found["residuals"][:, 1].any()
-    assert found["residuals"][:, 0].any()
-    assert np.isnan(found["residuals"][:, 2]).all()

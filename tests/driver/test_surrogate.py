@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,10 @@ from scipy.stats import binom, norm
 
 import thud
 from thud import cli
-from thud.studies import samples
-from thud.studies.surrogate_training import regress
-from thud.studies.trained_surrogate import Plan, assess_many, keys_of
+from thud.studies import surrogate as training
+from thud.studies.sampling import unit_samples
+from thud.studies.surrogate import MIN_DROPS, regress
+from thud.studies.trained_surrogate import assess_many, differing_keys
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -100,19 +102,19 @@ def test_probability_lies_in_the_range_that_is_stated(
 
 def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -> None:
     known = direct.dataset
-    values = (
-        known["floor_octave"].values, known["contact_time"].values, known["restitution"].values,
-        np.array([1]), np.array([2.5]), known["height"].values,
-    )  # fmt: skip
-    none = (np.zeros((1, 5)), *[np.zeros(1)] * 5)
+    height = known["height"].values
+    values = np.column_stack([
+        known["floor_octave"], known["contact_time"], known["restitution"],
+        np.ones(len(height)), np.full(len(height), 2.5), height,
+    ])  # fmt: skip
+    none = np.zeros_like(values)
     found = assess_many(values, none, "rubber_ball")
     np.testing.assert_array_equal(found["margin"], known["margin"])
     np.testing.assert_array_equal(found["conforms"], known["conforms"])
     assert not found["undecided"].any()
-    assert 0 < found["conforms"].sum() < len(known["height"])
+    assert 0 < found["conforms"].sum() < len(height)
     # Errors of 1 cm leave the verdict undecided where the height is closer to its limits.
-    height = known["height"].values
-    by = (*none[:-1], np.full(1, 0.01))
+    by = none + 0.01 * (np.arange(10) == 9)
     close = np.minimum(np.abs(height - 0.99), np.abs(height - 1.01)) < 0.01
     others = found["margin"] >= 0
     np.testing.assert_array_equal(
@@ -121,7 +123,8 @@ def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -
 
 
 def test_powers_of_a_lumped_source_are_learned() -> None:
-    found = thud.sensitivity({**LUMPED, "design": {"size": 64}, "surrogate": {"error": 0.01}})
+    learned = thud.surrogate({**LUMPED, "surrogate": {"error": 0.01}})
+    found = thud.sensitivity({**LUMPED, "design": {"size": 64}}, surrogate=learned)
     exact = thud.sensitivity({**LUMPED, "design": {"size": 64}})
     assert "surrogate" not in exact.indices
     share = found.indices["surrogate"].values[:5]
@@ -131,8 +134,6 @@ def test_powers_of_a_lumped_source_are_learned() -> None:
     assert (difference < 0.01).all()
     assert found.rows()[0][-1] == "error of the surrogate"
     # Of other quantities the variances are those in dB; what does not vary has none.
-    learned = thud.surrogate(LUMPED)
-    found = thud.sensitivity({**LUMPED, "design": {"size": 64}}, surrogate=learned)
     time, peak = found.indices["surrogate"].values[5:7]
     missed = learned.mean_square("peak_force")[0]
     assert peak == pytest.approx(missed / np.var(20 * np.log10(found.dataset["peak_force"].values)))
@@ -145,7 +146,7 @@ def test_what_exceeds_the_bound_is_withheld() -> None:
     worse = learned.residuals.copy()
     worse[:, place] = 0.2
     coarse = replace(learned, residuals=worse)
-    assert coarse.withheld == ["peak force"]
+    assert coarse.to_dataframe().query("withheld").index.tolist() == ["peak force"]
     found = thud.sensitivity({**LUMPED, "design": {"size": 8}}, surrogate=coarse)
     assert np.isnan(found.dataset["peak_force"]).all()
     assert np.isfinite(found.dataset["floor_octave"]).all()
@@ -174,10 +175,11 @@ def test_leave_one_out_is_what_it_says() -> None:
     from sklearn.gaussian_process.kernels import Matern, WhiteKernel
 
     # The noise follows from the weights: K w = z.
-    normal = (values - whole["mean"]) / whole["scale"]
+    scale = values.std()
+    normal, weights = (values - values.mean()) / scale, whole["weights"] / scale
     shape = Matern(whole["length"], nu=2.5)(points)
     amplitude, noise = np.linalg.lstsq(
-        np.column_stack([shape @ whole["weights"], whole["weights"]]), normal[:, 0], rcond=None
+        np.column_stack([shape @ weights, weights]), normal[:, 0], rcond=None
     )[0]
     # Weights hold the amplitude of the kernel.
     assert amplitude == pytest.approx(1.0, rel=1e-6)
@@ -185,12 +187,12 @@ def test_leave_one_out_is_what_it_says() -> None:
         rest = np.arange(40) != i
         kernel = shape[np.ix_(rest, rest)] + noise * WhiteKernel(1.0)(points[rest])
         predicted = shape[i, rest] @ np.linalg.solve(kernel, normal[rest])
-        residual = (predicted - normal[i])[0] * whole["scale"][0]
+        residual = (predicted - normal[i])[0] * scale
         assert residual == pytest.approx(whole["residuals"][i, 0], rel=1e-4, abs=1e-9)
 
 
 def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    smooth = samples.solve_many
+    smooth = training.solve_many
 
     def jump(columns: dict[str, Any], *rest: Any, **words: Any) -> thud.Ensemble:  # noqa: ANN401
         found = smooth(columns, *rest, **words)
@@ -200,16 +202,13 @@ def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
 
     study = {**LUMPED, "surrogate": {"size": 128}}
     assert thud.surrogate(study).worst[1] < 0.01
-    monkeypatch.setattr(samples, "solve_many", jump)
-    words = naming("floor level 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
+    monkeypatch.setattr(training, "solve_many", jump)
+    words = naming("floor level 500 Hz", 128, "0.1 dB", "[surrogate] error")
     with pytest.raises(thud.NumericalError, match=words):
         thud.surrogate(study)
 
 
-def test_drops_are_added_until_the_bound_holds() -> None:
-    assert Plan(size=400).stages == [
-        (0, 64), (64, 96), (96, 128), (128, 192), (192, 256), (256, 384), (384, 400)
-    ]  # fmt: skip
+def test_drops_are_added_until_the_bound_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     study = {**REGION, "fixed": {"model": "hollow_sphere"}}
     first = thud.surrogate(study)
     assert len(first.points) == 64
@@ -218,10 +217,29 @@ def test_drops_are_added_until_the_bound_holds() -> None:
     assert len(found.points) > 64
     assert found.worst[1] <= bound
     np.testing.assert_array_equal(found.points[:64], first.points)
+    # Steps add a half or a third, up to the maximum; drops are those of one sequence.
+    monkeypatch.setattr(training, "regress", lambda points, drops, _: {
+        "length": np.ones(points.shape[1]), "weights": np.zeros_like(drops),
+        "residuals": np.ones_like(drops),
+    })  # fmt: skip
+    plan = training.read_training({**study, "surrogate": {"size": 400}})
+    counts, step = [], None
+    while step is None or len(step.points) < 400:
+        step = training.extend(step, plan, None, progress=False)
+        counts.append(len(step.points))
+    assert counts == [64, 96, 128, 192, 256, 384, 400]
+    whole = unit_samples("sobol", 3, 400, 0, 0, 400)
+    np.testing.assert_array_equal(step.points, whole)
+    heights = step.region[0, 0] + whole[:, 0] * np.ptp(step.region[0])
+    drops = thud.solve_many({"height": heights, **{
+        name: low + whole[:, i] * (high - low)
+        for i, (name, (low, high)) in enumerate(plan.region.items()) if i
+    }}, step.case)  # fmt: skip
+    np.testing.assert_array_equal(step.drops[:, -5:], drops.floor_octave)
 
 
 def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(samples, "peak_count", lambda force, _: 1 + (force.max() > 1500))
+    monkeypatch.setattr(training, "peak_count", lambda force, _: 1 + (force.max() > 1500))
     with pytest.raises(thud.InputError, match=naming("peaks", 1, 2)):
         thud.surrogate(LUMPED)
 
@@ -269,8 +287,9 @@ def test_files_of_a_run_make_no_other_case() -> None:
     cases = [
         thud.Case(model=thud.FiniteElement(snapshot_interval=interval)) for interval in (0.0, 1e-3)
     ]
-    assert keys_of(cases[0]) == keys_of(cases[1])
-    assert keys_of(cases[0]) != keys_of(replace(cases[0], drop=thud.Drop(height=0.9)))
+    assert not differing_keys(*cases)
+    other = replace(cases[0], drop=thud.Drop(height=0.9))
+    assert differing_keys(cases[0], other) == [("&drop: height", "1.0", "0.9")]
 
 
 def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:
@@ -289,20 +308,21 @@ def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:
     for name in ("damaged.npz", "pickle.npz", "missing.npz"):
         with pytest.raises(thud.InputError, match=naming(name)):
             thud.read_surrogate(tmp_path / name)
-    for parts in (
-        {"weights": trained.weights[:3]}, {"mean": trained.mean + np.inf}, {"identity": {}},
-        {"region": trained.region[:, ::-1]}, {"bound": "wide"}, {"outputs": {}},
-        {"residuals": trained.residuals[:0]},
-    ):  # fmt: skip
-        replace(trained, **parts).save(tmp_path / "foreign.npz")
-        with pytest.raises(thud.InputError, match=naming("foreign.npz")):
-            thud.read_surrogate(tmp_path / "foreign.npz")
-    changed = replace(trained, mean=trained.mean + 0.1)
+    changed = replace(trained, drops=trained.drops + 0.1)
     assert changed.digest != trained.digest
+    # What is not finished, or of another version, is refused when it is used.
+    for part, words in (("bound", "not finished"), ("version", "0.0")):
+        value = {"bound": 1e-9, "version": "0.0"}[part]
+        replace(trained, **{part: value}).save(path)
+        with pytest.raises(thud.InputError, match=words):
+            thud.uncertainty(study)
 
 
 def test_training_resumes_and_results_are_kept(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    errors_of: ErrorsOf,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     path = tmp_path / "lumped.toml"
     path.write_text(
@@ -313,19 +333,19 @@ def test_training_resumes_and_results_are_kept(
     assert cli.main(["surrogate", str(path), "-o", str(tmp_path / "results")]) == 0
     assert "floor level 500 Hz" in capsys.readouterr().out
     folder = tmp_path / "results"
-    names = set(names_in(folder))
-    assert names == {
-        "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.svg"
-    }  # fmt: skip
+    assert set(names_in(folder)) == {"lumped_surrogate.npz", "lumped.svg", "thud.txt"}
     first = thud.read_surrogate(folder / "lumped_surrogate.npz")
-    drops = thud.read_sweep(folder / "lumped_training_64.nc").dataset
-    assert (drops["peaks"] == 1).all()
-    # Without its result, the training takes the drops that are there.
-    before = (folder / "lumped_training_64.nc").stat().st_mtime_ns
-    (folder / "lumped_surrogate.npz").unlink()
-    assert cli.main(command) == 0
-    assert (folder / "lumped_training_64.nc").stat().st_mtime_ns == before
+    # A training takes the drops that are there, and keeps those of each step.
+    with monkeypatch.context() as patch:
+        patch.setattr(training, "solve_many", None)
+        assert cli.main(command) == 0
     assert thud.read_surrogate(folder / "lumped_surrogate.npz").digest == first.digest
+    path.write_text(f"{path.read_text()}surrogate = {{error=1e-9, size=96}}\n")
+    assert "96 drops" in errors_of(*command, code=2)
+    longer = thud.read_surrogate(folder / "lumped_surrogate.npz")
+    np.testing.assert_array_equal(longer.drops[:64], first.drops)
+    assert len(longer.drops) == 96
+    path.write_text(path.read_text().partition("surrogate")[0])
     # Another region needs other drops, and the old ones are not removed without a word.
     path.write_text(path.read_text().replace("high=3", "high=4"))
     assert "lumped" in errors_of(*command)
@@ -395,24 +415,37 @@ def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
         ({"error": "x"}, naming("[surrogate] error", "'x'")),
         ({"size": 10}, naming("[surrogate] size", 10, 64)),
         ({"drops": 100}, naming("[surrogate]", "'drops'")),
-        ({"file": "none.npz"}, naming("none.npz")),
-        ({"file": "none.npz", "size": 64}, naming("[surrogate]", "file", "'size'")),
+        ({"file": "none.npz"}, naming("[surrogate]", "'file'")),
     ],
 )
 def test_tables_are_checked(table: dict[str, Any], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
-        thud.sweep({**LUMPED, "design": {"kind": "sobol", "size": 4}, "surrogate": table})
+        thud.surrogate({**LUMPED, "surrogate": table})
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [({"file": "none.npz"}, "none.npz"), ({"file": "a", "size": 64}, "'size'"), ({}, "file")],
+)
+def test_studies_name_a_trained_surrogate(table: dict[str, Any], words: str) -> None:
+    study = {**LUMPED, "design": {"kind": "sobol", "size": 4}, "surrogate": table}
+    with pytest.raises(thud.InputError, match=naming("surrogate", words)):
+        thud.sweep(study)
 
 
 def test_only_real_parameters_are_learned() -> None:
-    study = {**REGION, "design": {"kind": "random", "size": 8}, "surrogate": {}}
-    rate = {"sample_rate": {"values": [20000.0, 44100.0]}}
-    laws = {"damping_law": {"values": ["rising", "constant"]}}
-    for name, parameters in (("sample_rate", rate), ("damping_law", laws)):
+    ends = {"low": 1.0, "high": 2.0}
+    for name, entry in (
+        ("sample_rate", {"low": 20000.0, "high": 44100.0}), ("substeps", {"low": 1, "high": 3}),
+        ("density", ends), ("damping_law", {"values": ["rising"]}),
+        ("height", {"std": 0.1, "mean": 1.0}),
+        ("height", {**ends, "count": 3}), ("height", {**ends, "scale": "log"}),
+    ):  # fmt: skip
+        study = {"fixed": {"model": "modal_ball"}, "parameters": {name: entry}}
         with pytest.raises(thud.InputError, match=naming("surrogate", name)):
-            thud.sweep({**study, "fixed": {"model": "modal_ball"}, "parameters": parameters})
-    with pytest.raises(thud.InputError, match=naming("height", "low", "high")):
-        thud.surrogate({**REGION, "parameters": {"height": {"std": 0.1}}})
+            thud.surrogate(study)
+    with pytest.raises(thud.InputError, match=naming("density", "surrogate", "mass")):
+        thud.surrogate({**REGION, "fixed": {**FIXED, "density": 1100.0}})
 
 
 def test_drops_without_result_are_refused() -> None:
@@ -464,3 +497,98 @@ def test_fits_refuse_what_a_surrogate_does_not_know(trained: thud.Surrogate) -> 
             },
             "fit",
         )
+
+
+def test_fewest_drops_are_those_of_the_order_statistic() -> None:
+    # The largest of n bounds 95 % with a confidence of 1 - 0.95**n.
+    fewest = math.ceil(math.log(0.05) / math.log(0.95))
+    assert fewest <= MIN_DROPS < 1.1 * fewest
+
+
+def test_verdict_is_undecided_where_errors_reach_a_limit() -> None:
+    criteria = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria
+    middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
+    half = np.array([(one.upper - one.lower) / 2 for one in criteria])
+
+    def verdict(value: np.ndarray, error: np.ndarray) -> tuple[float, bool, bool]:
+        found = assess_many(value[None], error[None], "rubber_ball")
+        return tuple(found[name][0] for name in ("margin", "conforms", "undecided"))  # type: ignore[return-value]
+
+    none = np.zeros(10)
+    margin, conforms, undecided = verdict(middle, none)
+    assert margin == pytest.approx(half[:5].min())
+    assert (conforms, undecided) == (True, False)
+    for i in (0, 4, 5, 6, 9):
+        one = np.eye(10)[i]
+        for side in (-1, 1):
+            inside, outside = (middle + side * r * half * one for r in (0.9, 1.1))
+            # An error of less than a tenth of the half width, and one of more.
+            for r, is_undecided in ((0.09, False), (0.11, True)):
+                error = r * half * one
+                assert verdict(inside, error)[1:] == (True, is_undecided)
+                assert verdict(outside, error)[1:] == (False, is_undecided)
+    # A sample that surely fails another criterion is decided.
+    failed = middle + 2 * half * np.eye(10)[6] + 0.9 * half * np.eye(10)[0]
+    assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
+
+
+def answering() -> thud.Surrogate:
+    """Return a surrogate whose weights are 0: it predicts the mean of its drops."""
+    names = {"floor_octave": 5, "elastic_octave": 5, "contact_time": 1, "restitution": 1}
+    mean = np.array(
+        [39.0, 31, 23, 17, 12.5, 1, 2, 3, 4, 5, 20 * np.log10(0.02), 20 * np.log10(0.8)]
+    )
+    return thud.Surrogate(
+        thud.Case(model=thud.HollowSphere()), ("height", "mass"),
+        np.array([[0.9, 1.1], [2.0, 3.0]]), names, 0.1, 1, 0, thud.__version__,
+        np.random.default_rng(1).random((64, 2)), np.tile(mean, (64, 1)), np.ones(2),
+        np.zeros((64, 12)), np.random.default_rng(2).normal(0, 0.02, (64, 12)),
+    )  # fmt: skip
+
+
+def test_answers_are_the_verdict_of_what_is_predicted() -> None:
+    surrogate = answering()
+    case = replace(surrogate.case, levels=thud.Levels(force="floor"))
+    surrogate = replace(surrogate, case=case)
+    height = np.array([1.0, 0.985, 1.2, 0.9, 1.1, 0.9 - 1e-12, 1.1 + 1e-12, 0.9 - 1e-8])
+    found = surrogate.predict(case, {"height": height, "mass": 2.5})
+    assert found["status"].tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
+    good = found["status"] == 0
+    assert found["floor_octave"][good] == pytest.approx(np.tile(surrogate.drops[0, :5], (6, 1)))
+    assert found["contact_time"][good] == pytest.approx(0.02)
+    assert found["restitution"][good] == pytest.approx(0.8)
+    assert found["conforms"].tolist() == [True] + [False] * 7
+    assert [bool(reason) for reason in found["reason"]] == (~good).tolist()
+    assert "height = 1.2" in found["reason"][2]
+    # Errors: sorted magnitudes, at the order statistic.
+    sizes = np.sort(abs(surrogate.residuals), axis=0)
+    below = [
+        sum(math.comb(64, k) * 0.95**k * 0.05 ** (64 - k) for k in range(n + 1)) for n in range(64)
+    ]
+    place = next(n for n, share in enumerate(below) if share >= 0.95)
+    assert surrogate.errors.tolist() == sizes[place].tolist()
+    assert surrogate.error_of("elastic_octave").tolist() == sizes[place][5:10].tolist()
+    assert surrogate.mean_square("contact_time") == pytest.approx(
+        (surrogate.residuals[:, 10] ** 2).mean()
+    )
+    judged = [0, 1, 2, 3, 4, 10, 11]
+    worst = judged[int(np.argmax(surrogate.errors[judged]))]
+    assert surrogate.worst == (surrogate.labels[worst], surrogate.errors[worst])
+    # A level at its limit within the error is undecided, and so is a time by its ratio.
+    limit = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
+    for decibels, is_undecided in ((0.5, True), (1.5, False)):
+        drops = surrogate.drops.copy()
+        drops[:, 10] = 20 * np.log10(limit) - decibels * surrogate.errors[10]
+        near = replace(surrogate, drops=drops).predict(case, {"height": np.array([1.0])})
+        assert near["undecided"].tolist() == [is_undecided]
+
+
+def test_quantity_that_varies_by_rounding_only_is_its_mean() -> None:
+    points = np.random.default_rng(1).random((20, 2))
+    varying = 30 + points.sum(axis=1)
+    values = np.column_stack([varying, 7 + 1e-12 * points[:, 0], np.full(20, np.nan)])
+    found = regress(points, values, np.array([True, False, False]))
+    assert not found["weights"][:, 1].any()
+    assert not found["residuals"][:, 1].any()
+    assert found["residuals"][:, 0].any()
+    assert np.isnan(found["residuals"][:, 2]).all()

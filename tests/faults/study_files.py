@@ -33,7 +33,7 @@ UNITS = [
 ]  # fmt: skip
 EXAMPLES = {
     "design.toml": "design", "fit_force.toml": "fit", "fit_heights.toml": "fit",
-    "fit_levels.toml": "fit", "fit_recording.toml": "fit", "flagship.toml": "surrogate",
+    "fit_levels.toml": "fit", "fit_recording.toml": "fit",
     "flagship_design.toml": "design", "flagship_uncertainty.toml": "uncertainty",
     "law_of_loss.toml": "sweep", "sensitivity.toml": "sensitivity", "sweep.toml": "sweep",
     "tyre.toml": "sensitivity", "uncertainty.toml": "uncertainty",
@@ -128,12 +128,6 @@ def _study(chance: random.Random) -> tuple[str, str]:
             }
     elif chance.random() < 0.9:
         study["design"] = _design(kind, chance)
-    if kind == "surrogate":
-        study["surrogate"] = {
-            "error": chance.choice([0.1, 1, 5]),
-            "size": chance.choice([8, 16, 32]),
-            "seed": 1,
-        }
     if "temperature" in study["parameters"] and chance.random() < 0.8:
         study["temperature"] = {"reference": 20, "coefficient": -0.01}
     while chance.random() < 0.2:
@@ -169,7 +163,7 @@ def _parameter(kind: str, name: str, chance: random.Random) -> dict[str, Any]:
         {"std": middle / 100},
         {"values": [low, middle, high]},
     ]
-    usual = {"sweep": 2, "design": 0, "sensitivity": 0, "surrogate": 0, "uncertainty": 1}
+    usual = {"sweep": 2, "design": 0, "sensitivity": 0, "uncertainty": 1}
     found = forms[usual.get(kind, 0)] if chance.random() < 0.8 else chance.choice(forms)
     if kind == "fit":
         found = {"start": middle, "low": low, "high": high}
@@ -185,7 +179,7 @@ def _parameter(kind: str, name: str, chance: random.Random) -> dict[str, Any]:
 
 
 def _design(kind: str, chance: random.Random) -> dict[str, Any]:
-    if kind in ("sensitivity", "uncertainty", "surrogate"):
+    if kind in ("sensitivity", "uncertainty"):
         return {"size": chance.choice([1, 2, 4, 8, 16]), "seed": chance.choice([0, 1, 2])}
     named = (
         "grid"

@@ -37,6 +37,7 @@ from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
 from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
 from thud.cli.screen import is_terminal, print_error
 from thud.cli.study_commands import study_commands
+from thud.cli.surrogate_command import SURROGATE
 from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:
@@ -140,6 +141,7 @@ COMMANDS = {
     "predict": PREDICT,
     "mobility": MOBILITY,
     **study_commands(),
+    "surrogate": SURROGATE,
     "examples": EXAMPLES,
 }
 

@@ -26,7 +26,7 @@ from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.studies.surrogate_levels import surrogate_misfit, within_region
-from thud.studies.trained_surrogate import Surrogate, get_surrogate, read_plan
+from thud.studies.trained_surrogate import Surrogate, get_surrogate, stated_surrogate
 
 if TYPE_CHECKING:
     import os
@@ -296,10 +296,7 @@ class FitKind(Kind[FitStudy, Fit]):
         result.pairs()
         if "surrogate" not in content:
             return result
-        trained = read_plan(table_of(content, "surrogate"), folder)
-        if not isinstance(trained, Surrogate):
-            refuse("[surrogate] of a fit has no file", "the file of a trained surrogate")
-        return self.with_surrogate(result, trained)
+        return self.with_surrogate(result, stated_surrogate(table_of(content, "surrogate"), folder))
 
     def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:
         """Return a study whose levels a surrogate predicts; raise InputError if it cannot."""

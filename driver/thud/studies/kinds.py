@@ -26,7 +26,6 @@ KINDS = {
     "sensitivity": KindInfo("Sobol indices: how much each parameter affects each result"),
     "design": KindInfo("which geometries and materials conform to the standards"),
     "uncertainty": KindInfo("effect of tolerances on levels and conformity"),
-    "surrogate": KindInfo("train a fast approximation of a slow model for other studies"),
     "fit": KindInfo("parameters of a model from a force or from levels", has_samples=False),
 }
 
@@ -50,8 +49,7 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
     source
         Path of a TOML file, or its content as a mapping; see docs/studies.md.
     kind
-        ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"``, ``"surrogate"`` or
-        ``"fit"``.
+        ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"`` or ``"fit"``.
 
     Returns
     -------

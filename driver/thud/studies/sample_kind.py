@@ -20,9 +20,8 @@ from thud.studies.samples import SampleStudy
 from thud.studies.sampling import read_design
 from thud.studies.study import table_of
 from thud.studies.study_result import StudyResult
-from thud.studies.surrogate_training import surrogate_name, train
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import Surrogate, read_plan
+from thud.studies.trained_surrogate import stated_surrogate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.study import Study
+    from thud.studies.trained_surrogate import Surrogate
 
 R = TypeVar("R", bound=StudyResult)
 
@@ -81,16 +81,13 @@ class DropsKind(Kind[SampleStudy, R]):
         if "surrogate" not in content:
             return result
         _require_no_floor(case)
-        plan = read_plan(table_of(content, "surrogate"), folder)
-        if isinstance(plan, Surrogate):
-            return self.with_surrogate(result, plan)
-        return replace(result, plan=plan)
+        return self.with_surrogate(result, stated_surrogate(table_of(content, "surrogate"), folder))
 
     def with_surrogate(self, study: SampleStudy, trained: Surrogate) -> SampleStudy:
         """Return a study whose samples a surrogate predicts; raise InputError if it cannot."""
         _require_no_floor(study.case)
         trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
-        return replace(study, plan=None, surrogate=trained)
+        return replace(study, surrogate=trained)
 
     def require_runnable(self, study: SampleStudy, **options: Unpack[RunOptions]) -> None:
         """Raise InputError for too many samples or a useless number of workers."""
@@ -102,9 +99,8 @@ class DropsKind(Kind[SampleStudy, R]):
         require_workers(options.get("workers"), options.get("executor"))
 
     def listed_files(self, study: SampleStudy) -> list[str]:
-        """Return the names of the figures, and of the surrogate if one is trained."""
-        trained = [surrogate_name(study)] if study.plan else []
-        return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
+        """Return the names of the figures."""
+        return [f"{study.name}{ending}" for ending in FORMATS]
 
 
 class SampleKind(DropsKind[R]):
@@ -115,9 +111,7 @@ class SampleKind(DropsKind[R]):
         space = disk_space(study) / 1e6
         amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
         by = ""
-        if study.plan:
-            by = f" by a surrogate, which is trained on up to {study.plan.size} drops"
-        elif study.surrogate:
+        if study.surrogate:
             by = f" by a surrogate of {len(study.surrogate.points)} drops"
         return f"{study.name}: {study.count} samples of {study.model}{by}, about {amount} on disk"
 
@@ -126,8 +120,6 @@ class SampleKind(DropsKind[R]):
     ) -> R:
         """Compute missing samples; return the result of all samples."""
         try:
-            if study.plan:
-                study = replace(study, surrogate=train(study, results, options))
             folder = results.folder if results else None
             return self.new_result(study, compute_samples(study, folder, options))
         except MemoryError as error:

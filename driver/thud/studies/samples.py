@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.studies.temperature import Temperature
-    from thud.studies.trained_surrogate import Plan, Surrogate
+    from thud.studies.trained_surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 
@@ -43,8 +43,6 @@ class SampleStudy(Study):
         Number of random samples (of base samples for ``"saltelli"``), and the seed.
     temperature : Temperature or None
         How the material depends on temperature, if the temperature is a parameter.
-    plan : Plan or None
-        How to train a surrogate that predicts the samples.
     surrogate : Surrogate or None
         Surrogate that predicts the samples instead of the model.
     """
@@ -53,7 +51,6 @@ class SampleStudy(Study):
     size: int = 0
     seed: int = 0
     temperature: Temperature | None = None
-    plan: Plan | None = None
     surrogate: Surrogate | None = None
 
     # Whether the peaks of the assessed force are counted in each sample.
@@ -66,9 +63,7 @@ class SampleStudy(Study):
             result |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:
             result |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.table.items()}
-        if self.plan:
-            result |= self.plan.identity
-        elif self.surrogate:
+        if self.surrogate:
             result["surrogate"] = self.surrogate.digest
         return result
 
@@ -91,7 +86,7 @@ class SampleStudy(Study):
     @property
     def block_size(self) -> int:
         """Number of samples that are computed together, the same for all executors."""
-        if self.plan or self.surrogate:
+        if self.surrogate:
             return _SURROGATE_BLOCK_SIZE
         model = self.case.model.name if self.case.model else ""
         if model == "finite_element":
